@@ -15,6 +15,7 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
+from adhesis.ensemble.run.dispatch import Unresponsive
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Cycle, Plan, Run, default_tables, make_plan
@@ -483,7 +484,10 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
     """Run a plan; see :func:`loss_of_trace`."""
     started = time.monotonic()
-    results = Loops(plan.jobs, plan.processes).run(watch)
+    try:
+        results = Loops(plan.jobs, plan.processes).run(watch)
+    except Unresponsive as error:  # a process of a loop hangs
+        raise NoAnswer(f"the loops could not be run to their end: {error}") from error
     main = results.get("answer")
     if not isinstance(main, dict):
         raise NoAnswer(f"the loop could not be run to its end: {main}")

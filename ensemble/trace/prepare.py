@@ -428,8 +428,8 @@ def _filled(
 
 def _why_missing(trace: Trace) -> str:
     """Return how heights became drop-outs when they were read, to follow a message."""
-    told = [note for note in trace.notes if "drop-outs" in note]
-    return f"; {'; '.join(told)}" if told else ""
+    notes = [note for note in trace.notes if "drop-outs" in note]
+    return f"; {'; '.join(notes)}" if notes else ""
 
 
 # ---------------------------------------------------------------------- form

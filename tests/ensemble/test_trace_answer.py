@@ -22,6 +22,7 @@ from matplotlib.image import imread
 from adhesis import Control, Problem, make_method, run_loop, self_affine_profile
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.html import html_page
+from adhesis.ensemble.run.dispatch import Unresponsive
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import (
     COVERAGE,
@@ -501,6 +502,17 @@ def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
     for pid in loops.pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+def test_a_process_that_hangs_leaves_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    trace, cycle, plan = small_plan()
+
+    def hang(*_: object) -> None:
+        raise Unresponsive("rank 1 has not answered for 120 s")
+
+    monkeypatch.setattr(Loops, "run", hang)
+    with pytest.raises(NoAnswer, match="rank 1 has not answered for 120 s"):
+        run_plan(trace, cycle, plan)
 
 
 def test_a_loop_of_a_trace_that_is_interrupted_has_not_failed() -> None:

@@ -450,9 +450,9 @@ def _chosen(
         )
     columns = table.columns[picked]
     if wanted is not None:
-        marked, told = invalid_rows(table.columns, table.fields, picked)
+        marked, about = invalid_rows(table.columns, table.fields, picked)
         columns[-1, marked] = np.nan
-        notes.extend(told)
+        notes.extend(about)
     # Of columns of unequal length, those chosen end where they do.
     kept = np.arange(columns.shape[1])
     there = np.flatnonzero(np.isfinite(columns).any(axis=0))
@@ -557,7 +557,7 @@ def _units(
         found, named = [found[-1]] * 2, [named[-1]] * 2
     if unit is not None:
         given = parse_units(unit)
-        told = parameter("unit")
+        source = parameter("unit")
         for kind in range(2 - len(columns), 2):
             if named[kind] not in (None, given[kind]):
                 raise InputError(
@@ -565,8 +565,8 @@ def _units(
                     f", and the header of {name} has {named[kind]}: correct the wrong one"
                 )
             if found[kind] not in (None, given[kind]):
-                told += f", against {found[kind]} in a line of the header"
-        return given, told
+                source += f", against {found[kind]} in a line of the header"
+        return given, source
     if found[0] is not None and found[1] is not None:
         return (found[0], found[1]), "header"
     if found[0] is not None or found[1] is not None:
