@@ -66,7 +66,11 @@ class EquilibriumPath(ByValue, ResultViews):
         In J/m, per period.
     jumps : tuple of Jump
     loss_from_drops : float
-        Sum of the energy drops at the jumps, in J/m² of nominal area.
+        Sum of the energy drops at the jumps, in J/m² of nominal area; with two works of adhesion
+        also the friction of the edges between the jumps.
+    friction : float
+        Energy that edges dissipate as they recede, by which the two works of adhesion differ, in
+        J/m² of nominal area, within jumps and between them; 0 for one work of adhesion.
     loss_error : float
         Estimated numerical error of the loss or work, in J/m² (docs/methods.md, "Error of the
         loss").
@@ -108,6 +112,7 @@ class EquilibriumPath(ByValue, ResultViews):
     method: MethodReport = field(compare=False)
     contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
     new_method: Callable[[], Method] | None = field(default=None, compare=False)
+    friction: float = 0.0
     interior: InteriorTension | None = None
     narrowest_length: float = float("nan")
 
@@ -310,7 +315,8 @@ def path_fields(method: Method, record: Record, started: float) -> dict[str, Any
         **{name: record.column(name) for name in arrays},
         "patches": record.column("patches").astype(np.int64),
         "jumps": tuple(record.jumps),
-        "loss_from_drops": float(sum(jump.energy_drop for jump in record.jumps)),
+        "loss_from_drops": record.dissipated(problem),
+        "friction": record.friction(problem)[0],
         "seconds": process_time() - started,
         "method": report,
         "contact_states": tuple(record.states),

@@ -122,6 +122,20 @@ class Record:
         copied.states, copied.jumps = [*self.states], [*self.jumps]
         return copied
 
+    def friction(self, problem: Problem) -> tuple[float, float]:
+        """Sum up what edges that recede dissipate beside γ, in J/m²: in all, and within jumps."""
+        if problem.pinning == 0 or not self.states:
+            return 0.0, 0.0
+        unit = problem.pinning / problem.profile.period
+        receded = unit * self.column("receded")
+        in_jumps = sum(receded[i + 1] - receded[i] for i in self.before_jumps())
+        return float(receded[-1] - receded[0]), float(in_jumps)
+
+    def dissipated(self, problem: Problem) -> float:
+        """Sum the energy drops at the jumps, and the friction of edges between them, in J/m²."""
+        friction, in_jumps = self.friction(problem)
+        return float(sum(jump.energy_drop for jump in self.jumps)) + friction - in_jumps
+
     def work(self, problem: Problem) -> float:
         """Compute the work of the driving device, -∫ Y dx over the states, in J/m².
 
