@@ -80,7 +80,7 @@ def strength_of(
 class Problem(ByValue):
     """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
 
-    Immutable; two problems are equal if all five parts are.
+    Immutable; two problems are equal if all six parts are.
 
     Parameters
     ----------
@@ -135,11 +135,15 @@ class Problem(ByValue):
         self._check_open()
 
     @property
+    def gamma_open(self) -> float:
+        """Work of adhesion of an edge that recedes, in J/m²: γ, unless another is given."""
+        found = self.work_of_adhesion_open
+        return self.work_of_adhesion if found is None else found
+
+    @property
     def pinning(self) -> float:
         """Work of adhesion of an edge that recedes less that of one that advances, in J/m²."""
-        if self.work_of_adhesion_open is None:
-            return 0.0
-        return self.work_of_adhesion_open - self.work_of_adhesion
+        return self.gamma_open - self.work_of_adhesion
 
     def _check_open(self) -> None:
         """Refuse a work of adhesion on opening that is the smaller one, or beside a strength."""
