@@ -42,6 +42,7 @@ from adhesis.solver.views import NotebookDisplay
 
 _SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # least change of stress or contact, relative to its range on the loop, that counts
+_ROUNDING = 1e-9  # of the largest contact: what it changes by where all edges are pinned
 
 
 @dataclass(frozen=True)
@@ -381,7 +382,8 @@ class _PathRunner:
                 contact_change=contact_change,
                 closes=bool(
                     abs(stress_change) <= _SAME * np.ptp(stress)
-                    and abs(contact_change) <= _SAME * np.ptp(contact)
+                    and abs(contact_change)
+                    <= max(_SAME * np.ptp(contact), _ROUNDING * contact.max())
                 ),
             )
         )
