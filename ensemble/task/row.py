@@ -170,7 +170,7 @@ NUMBERS = (
         lambda loop: loop.friction,
     ),
     _task(
-        *("work_of_adhesion_open", FLOAT, "J m-2", "work of adhesion where an edge recedes"),
+        *("gamma_open", FLOAT, "J m-2", "work of adhesion at which edges recede"),
         lambda loop: loop.problem.gamma_open,
     ),
     _task(

@@ -73,7 +73,6 @@ def test_loss_of_a_wave_is_the_closed_form(ratio, depth):
     assert loop.friction == pytest.approx(friction, rel=1e-4)
     assert abs(loop.audit_residual) < 1e-4
     assert loop.warnings == ()
-    # A deeper loop loses more, by the friction alone; one work of adhesion loses the same.
     assert 0 < loop.friction < loop.loss
 
 
