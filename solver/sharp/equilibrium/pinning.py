@@ -60,18 +60,22 @@ def turned_back(theta: float, edge: int, residual: float, law: EdgeLaw) -> bool:
 
 
 @compiled
-def stop_at_band(theta: Array, step: Array, law: EdgeLaw) -> None:
+def stop_at_band(theta: Array, step: Array, law: EdgeLaw) -> bool:
     """Shorten steps (outward motions) that lead into the band or across it: edges stop at its end.
 
-    Steps that begin inside end where they end.
+    Steps that begin inside end where they end. Returns whether a step was shortened.
     """
+    stopped = False
     for edge in range(step.shape[0]):
         depth = depth_in_band(theta[edge], edge, law)
         after = depth - step[edge] / law.band
         if depth < -BAND_END and after > 0:
             step[edge] = depth * law.band
+            stopped = True
         elif depth > 1 + BAND_END and after < 1:
             step[edge] = (depth - 1) * law.band
+            stopped = True
+    return stopped
 
 
 @compiled_for_both
@@ -101,10 +105,10 @@ def way_to_motion(gaps: Array, held: Array, rate: Array, law: EdgeLaw, step: flo
     return float((left[pinned] / np.abs(inwards[pinned])).min(initial=np.inf))
 
 
-def pinned_rates(opening: Array, by_prescribed: Array, depth: Array, law: EdgeLaw) -> Array:
-    """Compute dn/dd of edges that are all pinned, from C and ∂C/∂d at fixed edges."""
-    rise_of_band = law.pinning / law.band * opening / (1 + law.pinning * depth)
-    return np.asarray(-by_prescribed / rise_of_band)
+def into_band(held: Array, gaps: Array, band: float) -> Array:
+    """Return the memory with which edges at an end of their bands are just inside."""
+    depth = np.clip((held - gaps) * (1.0, -1.0) / band, 10 * BAND_END, 1 - 10 * BAND_END)
+    return np.asarray(gaps + depth * (1.0, -1.0) * band)
 
 
 def memory_of(held: Array, gaps: Array, band: float) -> Array:
