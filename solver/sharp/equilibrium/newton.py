@@ -27,9 +27,9 @@ from adhesis.solver.sharp.tolerances import (
     BAND_RESOLVED,
     KNOWN_TANGENT,
     MOST_CORRECTIONS,
-    PINNED_CORRECTIONS,
     NEWTON_GROWTH,
     NEWTON_SHARE,
+    PINNED_CORRECTIONS,
     STALLED_SHARE,
 )
 

@@ -6,8 +6,8 @@ recedes. The band takes the place of a jump, so that Newton's iteration and the 
 edge where it is pinned. An edge that advances takes its memory along, and one that recedes, too, at
 the distance of the band; within the band the memory stays. So a state depends on the one before it.
 
-The memory is that of the last point of a branch, and within a jump that of its beginning: an
-iteration or a flow that goes too far comes back, where a memory that followed it would pin it there.
+The memory is that of the last point of a branch, and within a jump that of its beginning. So an
+iteration or a flow that goes too far comes back; with a memory that followed it would be pinned.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def stop_at_band(theta: Array, step: Array, law: EdgeLaw) -> bool:
 
 @compiled_for_both
 def remember(held: Array, gaps: Array, band: float) -> Array:
-    """Return the memory of edges that have come to ``gaps`` from where they had the memory ``held``."""
+    """Return the memory of edges at ``gaps``, which had the memory ``held`` before they moved."""
     out = held.copy()
     for k in range(gaps.shape[0]):
         for side in range(2):
