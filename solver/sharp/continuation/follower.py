@@ -19,7 +19,7 @@ from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.descent.saddle import positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import step_limits
-from adhesis.solver.sharp.equilibrium.pinning import pinned_rates
+from adhesis.solver.sharp.equilibrium.pinning import into_band
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
@@ -116,12 +116,9 @@ class Follower:
 
     def _turned_back(self, point: Point) -> Point:
         """Return the point at which a path turns back: all its edges are pinned there at first."""
-        response = self.edges.system(point.gaps).response_before_fold(point)
-        slope = response.separation if self.edges.is_load else response.pressure
-        law, opening = self.edges.law, point.field.opening.ravel()
-        depth = np.ravel((point.held - point.gaps) * (1.0, -1.0)) / law.band
-        rate = pinned_rates(opening, response.opening, np.clip(depth, 0.0, 1.0), law)
-        return replace(point, rate=rate, slope=slope, previous=None)
+        self.edges.recall(into_band(point.held, point.gaps, self.edges.law.band))
+        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.settled)
+        return point.with_previous(None) if pinned is None else pinned
 
     def _imbalance(self, output: Point, point: Point) -> float:
         """Compute the change of energy between two points of a branch, less the work, in J/m²."""

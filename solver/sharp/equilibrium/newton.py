@@ -24,11 +24,12 @@ from adhesis.solver.sharp.field.solution import FieldModel, Solution, edge_openi
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers, choose_orders
 from adhesis.solver.sharp.tolerances import (
+    BAND_RESOLVED,
     KNOWN_TANGENT,
     MOST_CORRECTIONS,
-    PINNED_CORRECTIONS,
     NEWTON_GROWTH,
     NEWTON_SHARE,
+    PINNED_CORRECTIONS,
     STALLED_SHARE,
 )
 
@@ -99,6 +100,8 @@ def equilibrium(
     steps = 0
     most = MOST_CORRECTIONS * (1 if law.pinning == 0 else PINNED_CORRECTIONS)
     tolerance = max(law.newton_tolerance, NEWTON_SHARE * law.field_error)
+    if law.pinning > 0:
+        tolerance = min(tolerance, BAND_RESOLVED * law.band)
     while True:
         steps += 1
         state = solve(gaps, prescribed, orders, 2, model, exterior)
@@ -107,17 +110,17 @@ def equilibrium(
         residual, drift = imbalance(state, law, model.panels)
         tangent, by_edge = edge_tangent(state, drift, rules)
         step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float
-        if law.pinning > 0:
-            stop_at_band(gaps.ravel(), step, law)
+        stopped = law.pinning > 0 and stop_at_band(gaps.ravel(), step, law)
         size = np.abs(step).max()
         # The field has steps of the size of its error, where panels or modes change: an iteration
         # to and fro across one of them is at its end.
         stalled = size <= law.field_error and size > STALLED_SHARE * last
-        if size <= tolerance or stalled:
+        if not stopped and (size <= tolerance or stalled):
             _, matrix = symmetrise(state, tangent, law.overlap_limit)
             found = is_definite(matrix) or not strict
             break
-        if not strict and (size <= law.rest_step or _is_balanced(state, residual, law)):
+        at_rest = not stopped and size <= law.rest_step
+        if not strict and (at_rest or _is_balanced(state, residual, law)):
             found = True
             break
         # an edge that leaves its band, or comes to it, changes what the others do

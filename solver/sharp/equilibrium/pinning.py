@@ -6,8 +6,8 @@ recedes. The band takes the place of a jump, so that Newton's iteration and the 
 edge where it is pinned. An edge that advances takes its memory along, and one that recedes, too, at
 the distance of the band; within the band the memory stays. So a state depends on the one before it.
 
-The memory is that of the last point of a branch, and within a jump that of its beginning: an
-iteration or a flow that goes too far comes back, where a memory that followed it would pin it there.
+The memory is that of the last point of a branch, and within a jump that of its beginning. So an
+iteration or a flow that goes too far comes back; with a memory that followed it would be pinned.
 """
 
 from __future__ import annotations
@@ -60,23 +60,27 @@ def turned_back(theta: float, edge: int, residual: float, law: EdgeLaw) -> bool:
 
 
 @compiled
-def stop_at_band(theta: Array, step: Array, law: EdgeLaw) -> None:
+def stop_at_band(theta: Array, step: Array, law: EdgeLaw) -> bool:
     """Shorten steps (outward motions) that lead into the band or across it: edges stop at its end.
 
-    Steps that begin inside end where they end.
+    Steps that begin inside end where they end. Returns whether a step was shortened.
     """
+    stopped = False
     for edge in range(step.shape[0]):
         depth = depth_in_band(theta[edge], edge, law)
         after = depth - step[edge] / law.band
         if depth < -BAND_END and after > 0:
             step[edge] = depth * law.band
+            stopped = True
         elif depth > 1 + BAND_END and after < 1:
             step[edge] = (depth - 1) * law.band
+            stopped = True
+    return stopped
 
 
 @compiled_for_both
 def remember(held: Array, gaps: Array, band: float) -> Array:
-    """Return the memory of edges that have come to ``gaps`` from where they had the memory ``held``."""
+    """Return the memory of edges at ``gaps``, which had the memory ``held`` before they moved."""
     out = held.copy()
     for k in range(gaps.shape[0]):
         for side in range(2):
@@ -101,10 +105,10 @@ def way_to_motion(gaps: Array, held: Array, rate: Array, law: EdgeLaw, step: flo
     return float((left[pinned] / np.abs(inwards[pinned])).min(initial=np.inf))
 
 
-def pinned_rates(opening: Array, by_prescribed: Array, depth: Array, law: EdgeLaw) -> Array:
-    """Compute dn/dd of edges that are all pinned, from C and ∂C/∂d at fixed edges."""
-    rise_of_band = law.pinning / law.band * opening / (1 + law.pinning * depth)
-    return np.asarray(-by_prescribed / rise_of_band)
+def into_band(held: Array, gaps: Array, band: float) -> Array:
+    """Return the memory with which edges at an end of their bands are just inside."""
+    depth = np.clip((held - gaps) * (1.0, -1.0) / band, 10 * BAND_END, 1 - 10 * BAND_END)
+    return np.asarray(gaps + depth * (1.0, -1.0) * band)
 
 
 def memory_of(held: Array, gaps: Array, band: float) -> Array:

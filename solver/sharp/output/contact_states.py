@@ -133,9 +133,7 @@ class States:
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(
-            point.field, point.slope, separation, point.clearance, held=point.held
-        )
+        return self.of_field(point.field, point.slope, separation, point.clearance, held=point.held)
 
     def of_field(
         self,
