@@ -12,7 +12,7 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import place
-from adhesis.ensemble.quantities import percent, stress_text, with_unit
+from adhesis.ensemble.quantities import gamma_text, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import cell_name, failed_cells, lines_along, together
 from adhesis.ensemble.report.tables.loss_tables import least
@@ -57,7 +57,7 @@ def turning_point(data: Aggregate) -> str:
     cycle = data.campaign.cycle
     ends = sorted({cell.campaign.cycle.turning_point for cell in data.cells if cell.done})
     if cycle.turns_at_stress:
-        texts = [stress_text(end) for end in ends]
+        texts = [with_unit("mean_stress", end) for end in ends]
         what = "mean stress" if cycle.under_load else "preload"
         return f"a {what} of {' … '.join(dict.fromkeys((texts[0], texts[-1])))}"
     texts = [f"{end:g}" for end in ends]
@@ -355,7 +355,7 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
             filter(
                 None,
                 (
-                    f"H = {pair.hurst:g}, γ = {pair.lower:g} to {pair.upper:g} J/m²",
+                    f"H = {pair.hurst:g}, γ = {gamma_text(pair.lower)} to {gamma_text(pair.upper)}",
                     place(pair.others),
                 ),
             )
@@ -404,8 +404,8 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:
         verb = "falls with m2" if steps[0] < 0 else "grows with m2"
         if not (np.all(steps > 0) or np.all(steps < 0)):
             verb = "is not monotone in m2"
-        found.setdefault(verb, []).append(f"{gamma:g}")
-    parts = [f"{verb} at γ = {_listed(gammas, ', ')} J/m²" for verb, gammas in found.items()]
+        found.setdefault(verb, []).append(gamma_text(gamma))
+    parts = [f"{verb} at γ = {_listed(gammas, ', ')}" for verb, gammas in found.items()]
     rest = "; the paper's table is not monotone" if of_paper else ""
     what = "mean W~" if of_paper else "mean loss in J/m²"
     return [f"Through H, the {what} {', and '.join(parts)}{rest}."] if parts else []

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
-from adhesis.ensemble.quantities import shown_unit
+from adhesis.ensemble.quantities import shown_unit, with_unit
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
@@ -39,6 +40,13 @@ def axis_label(axis: Axis) -> tuple[str, float]:
     unit, size = shown_unit(axis.name, max(axis.values))
     label = _LABELS.get(axis.name, axis.name)
     return (f"{label} ({unit})" if unit else label), size
+
+
+def symbols(others: Sequence[tuple[str, float]]) -> str:
+    """Return :func:`place` for figures, with symbols: "h_rms = 2 µm, p̄_max = 1 kPa"."""
+    found = [(re.search(r"\$.*\$", _LABELS.get(name, "")), name, v) for name, v in others]
+    named = [(symbol[0] if symbol else name, name, v) for symbol, name, v in found]
+    return ", ".join(f"{symbol} = {with_unit(name, v)}" for symbol, name, v in named)
 
 
 def together(data: Aggregate, axis: Axis) -> set[str]:
@@ -75,7 +83,7 @@ def failed_cells(data: Aggregate) -> list[str]:
 def below(data: Aggregate, others: Sequence[tuple[str, float]]) -> str:
     """Return what stands below a figure: what its cells have in common, and which are missing."""
     failed = failed_cells(data)
-    parts = [place(others)] if others else []
+    parts = [symbols(others)] if others else []
     if failed:
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         parts.append(f"missing, as all tasks failed: {failed[0]}{more}")

@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 
-from adhesis.solver.runtime.jit import Compilation, processor, watch_compilation
+from numba.core import event
+
+from adhesis.solver.runtime.jit import Compilation, processor
 
 _FIRST_AFTER = 1.0  # s of compilation before the first message
 _BETWEEN = 10.0  # s between messages
@@ -51,4 +53,4 @@ class _CompileLogger:
 @cache
 def log_compilation() -> None:
     """Log compilation from now on until the process ends."""
-    watch_compilation(_CompileLogger()).__enter__()
+    event.register("numba:compile", Compilation(_CompileLogger()))  # type: ignore[no-untyped-call]

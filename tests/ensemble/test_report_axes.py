@@ -200,7 +200,7 @@ def test_opened_tables_and_figures_have_every_axis(file):
     names = ["hurst", "work_of_adhesion", "ratio", "max_penetration"]
     assert results.losses.index.names == names
     assert results.mechanisms.index.names == [*names, "kind"]
-    assert len(results.plot.loss_along("ratio")) == 4
+    assert len(results.plot.loss_along("ratio").axes) == 4
     with pytest.raises(ValueError, match="there are ratio, max_penetration"):
         results.plot.loss_along("young")
 

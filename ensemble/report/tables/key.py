@@ -30,11 +30,18 @@ def key_columns(
     """
     return (
         TableColumn("hurst", lambda entry: cell_of(entry).hurst, "H"),
-        TableColumn(
-            "work_of_adhesion [J/m^2]", lambda entry: cell_of(entry).work_of_adhesion, "γ (J/m²)"
-        ),
+        gamma_column(data, "", lambda entry: cell_of(entry).work_of_adhesion, "γ"),
         *axis_columns(data.further, cell_of),
     )
+
+
+def gamma_column(
+    data: Aggregate, suffix: str, value: Callable[[Any], Value], heading: str
+) -> TableColumn:
+    """Return a column of works of adhesion, for people in the unit of the campaign."""
+    unit, size = shown_unit("work_of_adhesion", max(data.works_of_adhesion))
+    name = f"work_of_adhesion{suffix} [J/m^2]"
+    return TableColumn(name, value, f"{heading} ({unit})", partial(_in_unit, size))
 
 
 def axis_columns(
