@@ -27,13 +27,13 @@ _QUOTIENT = rf"{_WORD}\s*/\s*{_WORD}(?:\^?2)?"
 class Written(float):
     """A number in its SI unit, with the unit in which it was written, for labels."""
 
+    unit: str
+
     def __new__(cls, value: float, unit: str = "") -> Written:
         """Return the number; ``unit`` is one of its quantity's."""
         made = super().__new__(cls, value)
         made.unit = unit
         return made
-
-    unit: str
 
 
 @dataclass(frozen=True, eq=False)

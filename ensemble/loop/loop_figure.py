@@ -47,7 +47,7 @@ def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) ->
     with drawn_into(ax):
         figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
         _draw(results, figure.given or figure.panels)
-        return figure.drawn
+        return figure.finish()
 
 
 def _draw(results: Sequence[LoopResult] | PathResult, panels: Sequence[Axes]) -> None:

@@ -41,7 +41,7 @@ class Plots:
             shown = self._averages().shown
             figure = draw(shown)
             say_below(figure, below(shown, common(shown)))
-            return figure.drawn
+            return figure.finish()
 
     def loss_along(self, name: str, ax: object = None) -> Figure:
         """Loss along a further axis of the campaign ("max_penetration"), with intervals.
@@ -61,7 +61,7 @@ class Plots:
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
         with drawn_into(ax):
             figure = along(axes[name])(data)
-            return figure.drawn
+            return figure.finish()
 
     def contact_against_stress(self, ax: object = None) -> Figure:
         """Contact fraction against mean stress, a panel for each H."""

@@ -159,9 +159,8 @@ class PublishedFigure(Figure):
         """The axes of its panels, row by row: those given, and its own."""
         return [*self.given, *self.axes[len(self.given) :]]
 
-    @property
-    def drawn(self) -> Figure:
-        """The figure that was drawn into: this one, or that of the axes given."""
+    def finish(self) -> Figure:
+        """Lay it out, and return the figure that was drawn into: this one, or that of the axes."""
         if not self.given:
             self.canvas.draw()  # the layout is found with the style's own sizes
             return self
