@@ -337,10 +337,15 @@ def with_unit(name: str, value: float) -> str:
     return f"{value / size:g} {unit}".rstrip()
 
 
-def in_one_unit(name: str, values: Sequence[float]) -> str:
-    """Return values, ascending, in the unit of the largest: "0.2, 0.4 kPa"."""
-    unit, size = shown_unit(name, max(values))
-    return f"{', '.join(f'{value / size:g}' for value in sorted(values))} {unit}".rstrip()
+def common_unit(name: str, values: Sequence[float]) -> tuple[str, float]:
+    """Return :func:`shown_unit` of several values: as one was written, or of the largest."""
+    return shown_unit(name, next((v for v in values if isinstance(v, Written)), max(values)))
+
+
+def in_one_unit(name: str, values: Sequence[float], between: str = ", ") -> str:
+    """Return values, ascending, in their common unit: "0.2, 0.4 kPa"."""
+    unit, size = common_unit(name, values)
+    return f"{between.join(f'{value / size:g}' for value in sorted(values))} {unit}".rstrip()
 
 
 def gamma_text(work_of_adhesion: float) -> str:

@@ -12,9 +12,15 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import place
-from adhesis.ensemble.quantities import gamma_text, percent, stress_text, with_unit
+from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.further_axes import cell_name, failed_cells, lines_along, together
+from adhesis.ensemble.report.further_axes import (
+    cell_name,
+    failed_cells,
+    lines_along,
+    short_of_preload,
+    together,
+)
 from adhesis.ensemble.report.tables.loss_tables import least
 from adhesis.ensemble.task.doubt import why_beyond
 
@@ -57,9 +63,8 @@ def turning_point(data: Aggregate) -> str:
     cycle = data.campaign.cycle
     ends = sorted({cell.campaign.cycle.turning_point for cell in data.cells if cell.done})
     if cycle.turns_at_stress:
-        texts = [with_unit("mean_stress", end) for end in ends]
         what = "mean stress" if cycle.under_load else "preload"
-        return f"a {what} of {' … '.join(dict.fromkeys((texts[0], texts[-1])))}"
+        return f"a {what} of {in_one_unit('mean_stress', sorted({ends[0], ends[-1]}), ' … ')}"
     texts = [f"{end:g}" for end in ends]
     end = " … ".join(dict.fromkeys((texts[0], texts[-1])))
     return f"{penetration_sign(data)} = {end}"
@@ -245,8 +250,7 @@ def quality(data: Aggregate) -> list[str]:
 
 def _preload(data: Aggregate) -> list[str]:
     """Report the loops whose mean stress did not reach the preload, by cell."""
-    short = [(int(np.sum(cell.values["preload_reached"] == 0)), cell) for cell in data.cells]
-    short = [(count, cell) for count, cell in short if count]
+    short = short_of_preload(data)
     if not short:
         return ["Every loop reached its preload."]
     return [
@@ -378,12 +382,10 @@ def _along(data: Aggregate, axis: Axis) -> list[str]:
         return []
     up = sum(bool(np.all(step > 0)) for step in steps)
     down = sum(bool(np.all(step < 0)) for step in steps)
-    mixed = len(steps) - up - down
-    parts = [
-        f"{verb} in {count}"
-        for verb, count in (("grows", up), ("falls", down), ("is not monotone", mixed))
-        if count
-    ]
+    flat = sum(bool(np.all(step == 0)) for step in steps)
+    verbs = {"grows": up, "falls": down, "stays the same": flat}
+    verbs["is not monotone"] = len(steps) - sum(verbs.values())
+    parts = [f"{verb} in {count}" for verb, count in verbs.items() if count]
     low, high = (with_unit(axis.name, end) for end in (min(axis.values), max(axis.values)))
     return [
         f"Along {axis.name} from {low} to {high} the mean loss in J/m² "

@@ -229,9 +229,13 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
             "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
             "little."
             + (
-                " Contact: the largest of the loop; crosses: mean at the turning point. Loss per "
-                "contact: over that largest contact area."
+                " Contact: the largest of the loop; loss per contact: over that largest area."
                 if axis.name in TURNING_POINTS
+                else ""
+            )
+            + (
+                " Crosses: mean contact at the turning point."
+                if axis.name == "max_penetration"
                 else ""
             )
             + (
@@ -240,7 +244,8 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
                 else ""
             )
             + (
-                " A line for each value of the other axis; more axes: as written below the panels."
+                " All cells of two axes: a line for each value of the other one; more axes: as "
+                "written below the panels."
                 if set(data.further) - {a for a in data.further if a.name in together(data, axis)}
                 else ""
             ),

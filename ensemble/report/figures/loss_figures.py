@@ -14,7 +14,7 @@ from adhesis.ensemble.aggregate.cells import Cell, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.interval import Estimate, estimates
-from adhesis.ensemble.quantities import shown_unit
+from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.style import (
     LINES,
@@ -267,7 +267,7 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
             ha="center",
             fontsize=6,
         )
-    unit, size = shown_unit("work_of_adhesion", cells[-1].work_of_adhesion)
+    unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     texts = [f"{cell.hurst:g}\n{cell.work_of_adhesion / size:g}" for cell in cells]
     axes.set_xticks(place, texts)
     axes.set_xlabel(rf"$H$ (upper line), $\gamma$ in {unit} (lower line)")
@@ -342,7 +342,7 @@ def pull_off(data: Aggregate) -> PublishedFigure:
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
     axes = figure.panels[0]
     hursts = spread_out(data.hursts, MOST_CURVES)
-    unit, size = shown_unit("work_of_adhesion", max(data.works_of_adhesion))
+    unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
         errorbar(
