@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 
-from numba.core import event
-
-from adhesis.solver.runtime.jit import Compilation, processor
+from adhesis.solver.runtime.jit import Compilation, processor, watch_compilation
 
 _FIRST_AFTER = 1.0  # s of compilation before the first message
 _BETWEEN = 10.0  # s between messages
@@ -51,6 +49,8 @@ class _CompileLogger:
 
 
 @cache
-def log_compilation() -> None:
-    """Log compilation from now on until the process ends."""
-    event.register("numba:compile", Compilation(_CompileLogger()))  # type: ignore[no-untyped-call]
+def log_compilation() -> AbstractContextManager[Compilation]:
+    """Log compilation until the process ends; return the context, which the cache keeps open."""
+    context = watch_compilation(_CompileLogger())
+    context.__enter__()
+    return context
