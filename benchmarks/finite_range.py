@@ -27,7 +27,7 @@ grid at a fixed mean gap, from each state to the next in small steps:
 falling like a cosine in between, with σ0 = γ/δ. Its work is γ and its mean range δ, as Dugdale's.
 Dugdale's own law, cut off at δ, pins the ends of zones between nodes. This one does not from three
 nodes in a zone on: at δ = 0.03 of its amplitude the loss of one wave is then within a hundredth of
-the exact one. Loops whose zones would take more than ``MOST_NODES`` nodes are drawn again.
+the exact one. Loops whose zones would take more than ``--most-nodes`` are drawn again.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ STATES = 800
 NODES, WEIGHTS = leggauss(40)
 SHARE = 0.5  # of the least range
 ROUNDING = 0.5  # of the range: half of the width over which the attraction falls to zero
-NODES_OF_ZONE, MOST_NODES = 4.0, 1 << 14
+NODES_OF_ZONE = 4.0
 
 
 class OnePatch:
@@ -309,7 +309,7 @@ PERIOD, HEIGHT, MODULUS = 1e-3, 1e-6, 1e6  # m, m, Pa: slopes so small that the 
 Q0 = 2 * np.pi / PERIOD
 
 
-def draw_even(rng):
+def draw_even(rng, _):
     """Draw an even profile with its crest at 0, γ, and a penetration."""
     while True:
         waves = int(rng.integers(1, 13))
@@ -324,9 +324,9 @@ def draw_even(rng):
     return np.append(0, 0.5 * HEIGHT * amplitudes).astype(complex), gamma, depth
 
 
-def draw_random(rng):
+def draw_random(rng, lowest_most):
     """Draw a profile of 4 to 40 waves with random phases, γ, and a penetration."""
-    lowest = int(rng.integers(1, 4))
+    lowest = int(rng.integers(1, lowest_most + 1))
     n = np.arange(lowest, lowest + int(np.round(3 * 12 ** rng.uniform())) + 1)
     coefficients = np.zeros(n[-1] + 1, complex)
     coefficients[n] = n ** -(rng.uniform(0.2, 0.9) + 0.5) * rng.rayleigh(size=n.size)
@@ -336,7 +336,7 @@ def draw_random(rng):
     return coefficients, float(gamma), float(rng.uniform(0.4, 0.97))
 
 
-def loss_of_even(loop, coefficients, gamma, delta, fine):
+def loss_of_even(loop, coefficients, gamma, delta, args):
     """Loss in J/m² by the closed form; None if the loop has other patches than one even one."""
     kinds = sorted(jump.kind for jump in loop.jumps if not jump.small_scale)
     raced = any(jump.raced for jump in loop.jumps)  # one edge runs ahead: no longer even
@@ -344,21 +344,22 @@ def loss_of_even(loop, coefficients, gamma, delta, fine):
         return None
     scene = OnePatch(2 * Q0 * coefficients[1:].real, gamma * Q0 / MODULUS)
     return scene.loss(
-        loop.max_penetration * loop.problem.profile.h_max * Q0, delta * Q0, int(fine * STATES)
+        loop.max_penetration * loop.problem.profile.h_max * Q0, delta * Q0, int(args.fine * STATES)
     )
 
 
-def loss_of_random(loop, coefficients, gamma, delta, fine):
+def loss_of_random(loop, coefficients, gamma, delta, args):
     """Loss in J/m² on a grid; None if zones are too short for it."""
     zone = np.pi / 4 * MODULUS * delta**2 / gamma
     nodes = next_fast_len(int(np.ceil(NODES_OF_ZONE * PERIOD / zone)), real=True)
-    if nodes > MOST_NODES:
+    if nodes > args.most_nodes or max(loop.patches) < args.patches:
         return None
-    nodes = next_fast_len(int(fine * max(nodes, 32 * len(coefficients))), real=True)
+    nodes = next_fast_len(int(args.fine * max(nodes, 32 * len(coefficients))), real=True)
     height = nodes * irfft(Q0 * coefficients, nodes)
     grid = GridLoop(height, gamma * Q0 / MODULUS, delta * Q0)
     turn = Q0 * loop.problem.separation(loop.max_penetration)
-    return grid.loss(turn, 2 / fine * delta * Q0, 0.01 / fine * loop.loss * Q0 / MODULUS)
+    step, share = 2 * delta / args.fine, 0.01 * loop.loss / args.fine
+    return grid.loss(turn, step * Q0, share * Q0 / MODULUS)
 
 
 def main() -> int:
@@ -369,24 +370,27 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first draw")
     parser.add_argument("--fine", type=float, default=1.0, help="nodes and steps, in those usual")
+    parser.add_argument("--lowest", type=int, default=3, help="largest lowest wave number drawn")
+    parser.add_argument("--patches", type=int, default=1, help="at least, of a loop that is judged")
+    parser.add_argument("--most-nodes", type=int, default=1 << 13, help="of a loop that is judged")
     args = parser.parse_args()
-    draw, judge = {
-        "even": (draw_even, loss_of_even),
-        "random": (draw_random, loss_of_random),
-    }[args.profiles]
+    is_even = args.profiles == "even"
+    draw, judge = (draw_even, loss_of_even) if is_even else (draw_random, loss_of_random)
+    accuracy, one_after_another = 1e-4 if is_even else 1e-3, np.random.default_rng(args.seed)
     found, number = 0, args.first
     worst = 0.0
     print("number  waves  patches  jumps  contact  valid  edge  touch (nm)  loss (J/m²)  off by")
     while found < args.loops:
-        coefficients, gamma, depth = draw(np.random.default_rng([args.seed, number]))
+        own = np.random.default_rng([args.seed, number])
+        coefficients, gamma, depth = draw(one_after_another if is_even else own, args.lowest)
         number += 1
         problem = Problem(Profile(PERIOD, coefficients), HalfSpace(MODULUS, 0.0), gamma)
         try:
-            loop = run_loop(make_method("sharp", problem, accuracy=1e-3), max_penetration=depth)
+            loop = run_loop(make_method("sharp", problem, accuracy=accuracy), max_penetration=depth)
         except PathError:
             continue
         ranges = [loop.valid_range, loop.edge_range, loop.touch_range]
-        loss = judge(loop, coefficients, gamma, SHARE * min(ranges), args.fine)
+        loss = judge(loop, coefficients, gamma, SHARE * min(ranges), args)
         if loss is None:
             continue
         off = loss * MODULUS / Q0 / loop.loss - 1
