@@ -49,6 +49,7 @@ from adhesis.solver.checks import (
     YOUNG,
     Bounds,
 )
+from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
 
@@ -132,6 +133,11 @@ class MaterialTable:
         "both it is pinned. By default γ",
         None,
         axis="J m-2",
+    )
+    measure: Measure = _key(  # noqa: RUF009  # a field
+        choice(*get_args(Measure)),
+        "adhesion acts on the length of the profile, or on its projection",
+        "arc",
     )
 
     @property

@@ -68,11 +68,8 @@ def execute(args: argparse.Namespace) -> int:
         cycle = cycle_of(args, half_space)
         strength = strength_of(args.work_of_adhesion, args.adhesion_range, args.strength)
         problem = Problem(
-            profile,
-            half_space,
-            args.work_of_adhesion,
-            cycle.control,
-            strength,
+            *(profile, half_space, args.work_of_adhesion, cycle.control, strength),
+            measure=args.measure,
             work_of_adhesion_open=args.work_of_adhesion_open,
         )
         cycle.check(problem)

@@ -350,5 +350,6 @@ def _result(found: xr.Dataset) -> Result:
         Control(float(about["stiffness"])),
         float(about.get("strength", math.inf)),
         work_of_adhesion_open=float(about["work_of_adhesion_open"]),
+        measure=about.get("measure", "arc"),
     )
     return kind(problem=problem, method=method, **values)

@@ -57,6 +57,7 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
         control,
         strength,
         work_of_adhesion_open=material.work_of_adhesion_open,
+        measure=material.measure,
     )
 
 

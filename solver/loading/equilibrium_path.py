@@ -290,6 +290,7 @@ class EquilibriumPath(ByValue, ResultViews):
             "work_of_adhesion_open": problem.gamma_open,
             "stiffness": finite(problem.control.stiffness),
             "strength": finite(problem.strength),
+            "measure": problem.measure,
             "full_contact_energy": problem.full_contact_energy,
             "load_steps": self.load_steps,
             **values,

@@ -146,7 +146,7 @@ class SharpMethod(Method):
             work = share * accuracy * problem.work_of_adhesion
             exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
             tolerance = min(tolerance, exact)
-        source = StressSource(profile, tolerance)
+        source = StressSource(profile, tolerance, problem.measure)
         pinning = math.sqrt(1 + problem.pinning / problem.work_of_adhesion) - 1 if critical else 0.0
         device = loading_device(problem)
         self.edges = EdgeMechanics(source, critical, tolerance, device, pinning)
