@@ -281,7 +281,7 @@ _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range touch_range position "
     "step length height_range adhesion_range tip_radius cut_off noise longest highest rise "
     "form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip "
-    "coefficient_real coefficient_imag narrowest_length",
+    "coefficient_real coefficient_imag narrowest_length receded",
     "m²": "m0",
     "1/m²": "m4",
     "m³": "power floor",
@@ -290,9 +290,9 @@ _NAMES = {
     "tension largest_interior_tension turning_stress",
     "Pa/m": "stiffness",
     "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
-    "J/m²": "work_of_adhesion loss loss_from_drops loss_error energy_drop at_stake energy_at_stake "
-    "barrier energy_change work work_gained work_spent effective_work_of_approach "
-    "effective_work_of_separation full_contact_energy",
+    "J/m²": "work_of_adhesion work_of_adhesion_open friction loss loss_from_drops loss_error "
+    "energy_drop at_stake energy_at_stake barrier energy_change work work_gained work_spent "
+    "effective_work_of_approach effective_work_of_separation full_contact_energy",
     "s": "seconds expected_seconds wall",
 }
 UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
@@ -301,7 +301,7 @@ UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 _TWO_DIGITS = 2.95  # an error below has two significant digits
 _MOST_PLACES = 9
 
-AXIS_UNITS = {"m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
+AXIS_UNITS = {"m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m", "J m-2": "J/m²"}
 """Units of the axes of a campaign for people, by their spelling in results files."""
 
 

@@ -23,7 +23,7 @@ from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
-from adhesis.solver.registry import check_nodes
+from adhesis.solver.registry import check_nodes, check_pinning
 
 # HDF5 keeps an attribute of at most 64 KiB, and the text is one.
 _LONGEST_TEXT = 60_000
@@ -266,6 +266,7 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [material] gives adhesion_range and strength: at most one of them can be "
             "given, strength = work_of_adhesion/adhesion_range"
         )
+    _check_open(source, campaign)
     n0, ratio = (_largest(campaign, name, getattr(profile, name)) for name in ("n0", "ratio"))
     if n0 * ratio > MOST_WAVES:
         raise InputError(
@@ -317,6 +318,35 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [cycle] unloading_until is {cycle.unloading_until}: with these load steps "
             f"the unloading curve has {length:.6g} values, and at most {_LONGEST_AXIS} are allowed"
         )
+
+
+def _check_open(source: str, campaign: Campaign) -> None:
+    """Check the work of adhesion of receding edges against that of advancing ones, in each cell."""
+    material, solver = campaign.material, campaign.solver
+    if material.work_of_adhesion_open is None:
+        return
+    names = [axis.name for axis in campaign.axes]
+    given = {"work_of_adhesion_open": material.work_of_adhesion_open}
+    cells = (given | dict(zip(names, cell, strict=True)) for cell in campaign.cells)
+    works = {(cell["work_of_adhesion"], cell["work_of_adhesion_open"]) for cell in cells}
+    for gamma, found in sorted(works):
+        if found < gamma or gamma == 0 < found:
+            rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
+            raise InputError(
+                f"{source}: [material] work_of_adhesion_open is {found:g}: it must be {rule}, in "
+                "every cell of the sweep (zip joins lists whose values belong together)"
+            )
+    if all(found == gamma for gamma, found in works):
+        return
+    if material.opens:
+        raise InputError(
+            f"{source}: [material] gives work_of_adhesion_open and a range or strength: at most "
+            "one of them can be given, as edges of two works of adhesion have no range"
+        )
+    try:
+        check_pinning(solver.method, solver.nodes_per_wave)
+    except ValueError as error:
+        raise InputError(f"{source}: [solver] {error}") from None
 
 
 def _check_slopes(source: str, campaign: Campaign) -> None:

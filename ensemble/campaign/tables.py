@@ -127,6 +127,13 @@ class MaterialTable:
     strength: float | None = _key(
         number_in(STRENGTH), "instead of adhesion_range, the strength in Pa", None, axis="Pa"
     )
+    work_of_adhesion_open: float | None = _key(
+        number_in(WORK_OF_ADHESION),
+        "work of adhesion in J/m² where an edge recedes, at least γ, at which it advances; between "
+        "both it is pinned. By default γ",
+        None,
+        axis="J m-2",
+    )
     measure: Measure = _key(  # noqa: RUF009  # a field
         choice(*get_args(Measure)),
         "adhesion acts on the length of the profile, or on its projection",

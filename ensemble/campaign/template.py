@@ -29,6 +29,7 @@ EXAMPLES = {
     "profile.c0": "1e-14",
     "material.adhesion_range": '"0.3 nm"',
     "material.strength": "1e8",
+    "material.work_of_adhesion_open": '"80 mJ/m2"',
     "cycle.max_stress": "200",
     "cycle.preload": '"0.5 kPa"',
     "cycle.stiffness": "1e9",

@@ -70,6 +70,7 @@ def execute(args: argparse.Namespace) -> int:
         problem = Problem(
             *(profile, half_space, args.work_of_adhesion, cycle.control, strength),
             measure=args.measure,
+            work_of_adhesion_open=args.work_of_adhesion_open,
         )
         cycle.check(problem)
     _check_film(args, cycle)

@@ -14,6 +14,7 @@ from pathlib import Path
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, STRESS, WORK_OF_ADHESION
 from adhesis.ensemble.trace.trace_arguments import (
     add_cycle_arguments,
+    add_open_argument,
     add_reading_arguments,
     add_strength_arguments,
 )
@@ -70,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in Pa, or 1MPa (likewise; with --hurst 1e6)",
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
+    add_open_argument(contact)
     add_strength_arguments(contact)
     contact.add_argument(
         "--measure",

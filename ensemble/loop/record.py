@@ -91,6 +91,7 @@ def path_summary(result: PathResult) -> str:
         f"{in_works_of_adhesion(result.work, result.problem.work_of_adhesion)}, of which "
         f"{result.energy_change:.6g} J/m² are stored"
         f"{f'; {result.loss_note}' if result.loss_note else ''}",
+        *_friction(result),
         _audit(result),
         _range(result),
     ]
@@ -128,6 +129,7 @@ def loop_summary(result: LoopResult) -> str:
             f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)} "
             f"(dimensionless {result.loss_dimensionless:.6g})"
             f"{f'; {result.loss_note}' if result.loss_note else ''}",
+            *_friction(result),
             _range(result),
             _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "
@@ -137,6 +139,12 @@ def loop_summary(result: LoopResult) -> str:
             _method(result),
         )
     )
+
+
+def _friction(result: LoopResult | PathResult) -> list[str]:
+    """The line on the friction of edges; none with one work of adhesion."""
+    text = result.friction_summary()
+    return [f"friction    {text}"] if text else []
 
 
 def _method(result: LoopResult | PathResult) -> str:

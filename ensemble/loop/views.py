@@ -141,6 +141,7 @@ def _rows_of_result(result: Result) -> list[tuple[str, str]]:
             f"{f'; {result.loss_note}' if result.loss_note else ''}",
         ),
         ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
+        *(("friction", text) for text in (result.friction_summary(),) if text),
         ("jumps", str(len(result.jumps))),
         ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),
         ("h_max", f"{problem.profile.h_max:.4g} m"),

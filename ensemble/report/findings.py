@@ -48,14 +48,29 @@ def _outcome(data: Aggregate) -> str:
             f"A loop to {turning_point(data)} and back under a weight, which falls off at {ends} "
             "(the energy of the fall is not counted), loses"
         )
+    friction = _friction(data, cells)
     if len(cells) == 1:
-        return f"{top} on average {_loss(cells[0])}."
+        return f"{top} on average {_loss(cells[0])}{friction}."
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
     return (
         f"{top}, on average over realisations, from {_loss(cells[0])} to {_loss(cells[-1])}; "
         f"{100 * min(share):.0f} to {100 * max(share):.0f} % of it is lost where edges run inside "
-        "patches."
+        f"patches{friction}."
     )
+
+
+def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
+    """Return a clause on the friction of edges; empty for one work of adhesion."""
+    if data.campaign.material.work_of_adhesion_open is None:
+        return ""
+    share = [
+        cell.estimates["friction"].mean / loss
+        for cell in cells
+        if (loss := cell.estimates["loss"].mean) > 0
+    ]
+    if not share:
+        return ""
+    return f"; {percent(*sorted({min(share), max(share)}))} is friction of receding edges"
 
 
 def turning_point(data: Aggregate) -> str:

@@ -29,6 +29,7 @@ _LABELS = {
     "poisson": r"Poisson's ratio $\nu$",
     "adhesion_range": r"range of adhesion $\delta$",
     "strength": r"strength $\sigma_\mathrm{th}$",
+    "work_of_adhesion_open": r"work of adhesion of receding edges $\gamma_\mathrm{open}$",
 }
 
 

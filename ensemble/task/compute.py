@@ -51,7 +51,13 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
     material = campaign.material
     strength = strength_of(task.work_of_adhesion, material.adhesion_range, material.strength)
     return Problem(
-        profile, half_space, task.work_of_adhesion, control, strength, measure=material.measure
+        profile,
+        half_space,
+        task.work_of_adhesion,
+        control,
+        strength,
+        work_of_adhesion_open=material.work_of_adhesion_open,
+        measure=material.measure,
     )
 
 

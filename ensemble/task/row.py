@@ -154,7 +154,7 @@ NUMBERS = (
         lambda loop: loop.loss_dimensionless,
     ),
     _task(
-        *("loss_from_drops", FLOAT, "J m-2", "sum of the energy drops at the jumps"),
+        *("loss_from_drops", FLOAT, "J m-2", "energy drops at jumps, and friction between them"),
         lambda loop: loop.loss_from_drops,
     ),
     _task(
@@ -164,6 +164,14 @@ NUMBERS = (
     _task(
         *("loss_large_scale", FLOAT, "J m-2", "energy drops of patches that come and go"),
         lambda loop: _drops(loop, small_scale=False),
+    ),
+    _task(
+        *("friction", FLOAT, "J m-2", "part of the loss that edges dissipate as they recede"),
+        lambda loop: loop.friction,
+    ),
+    _task(
+        *("gamma_open", FLOAT, "J m-2", "work of adhesion at which edges recede"),
+        lambda loop: loop.problem.gamma_open,
     ),
     _task(
         *("audit_residual", FLOAT, "1", "(loss - loss_from_drops) / loss"),

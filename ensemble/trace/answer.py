@@ -38,7 +38,7 @@ from adhesis.solver.loading.loop import check_cycle, check_preload
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.registry import METHOD_NAMES, MethodName
+from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
 from adhesis.solver.values import ByValue, finite
 
 QUANTITIES = {
@@ -307,6 +307,7 @@ def loss_of_trace(
     accuracy: float = 1e-3,
     adhesion_range: float | None = None,
     strength: float | None = None,
+    work_of_adhesion_open: float | None = None,
     quick: bool = False,
     processes: int | None = None,
     progress: bool = False,
@@ -339,6 +340,9 @@ def loss_of_trace(
     adhesion_range, strength : float, optional
         Range δ of adhesion in m, or instead the strength in Pa at which patches open from inside
         (:class:`~adhesis.Problem`).
+    work_of_adhesion_open : float, optional
+        Work of adhesion in J/m² where an edge recedes, beside a single γ; in the table of works of
+        adhesion both keep their ratio.
     quick : bool
         Without the two tables.
     processes : int, optional
@@ -387,6 +391,7 @@ def loss_of_trace(
         strength,
         at_preload=preload is not None,
         latest=latest,
+        work_of_adhesion_open=work_of_adhesion_open,
     )
     check(prepared, cycle)
     flag("quick", quick)
@@ -439,6 +444,7 @@ def make_cycle(
     *,
     at_preload: bool = False,
     latest: float | None = None,
+    work_of_adhesion_open: float | None = None,
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -452,9 +458,13 @@ def make_cycle(
     control = control or Control()
     turning = "max_stress" if control.is_load else "max_penetration"
     turning = "preload" if at_preload else turning
-    gammas, turns = default_tables(
-        _several("work_of_adhesion", work_of_adhesion), _several(turning, turning_points)
-    )
+    given = _several("work_of_adhesion", work_of_adhesion)
+    if work_of_adhesion_open is not None and len(given) > 1:
+        raise ValueError(
+            f"work_of_adhesion_open is {work_of_adhesion_open!r} beside {len(given)} works of "
+            "adhesion: give one of each (in the table both keep their ratio)"
+        )
+    gammas, turns = default_tables(given, _several(turning, turning_points))
     for name, values in (("work_of_adhesion", gammas), (turning, turns)):
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
@@ -465,7 +475,7 @@ def make_cycle(
         check_cycle(point, load_steps, control)
     cycle = Cycle(
         half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength,
-        at_preload, latest,
+        at_preload, latest, work_of_adhesion_open,
     )  # fmt: skip
     for gamma in gammas:
         cycle.strength_at(gamma)
@@ -477,8 +487,12 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        strength = cycle.strength_at(gamma)
-        Problem(profile, cycle.half_space, gamma, strength=strength)
+        strength, open_ = cycle.strength_at(gamma), cycle.open_at(gamma)
+        problem = Problem(
+            profile, cycle.half_space, gamma, strength=strength, work_of_adhesion_open=open_
+        )
+        if problem.pinning > 0:
+            check_pinning(cycle.method, None)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
@@ -679,6 +693,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "young": cycle.half_space.young,
         "poisson": cycle.half_space.poisson,
         "work_of_adhesion": cycle.works_of_adhesion[0],
+        "work_of_adhesion_open": answer.main["work_of_adhesion_open"],
         "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
         "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
         "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
@@ -687,6 +702,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "load_steps": cycle.load_steps,
         "loss": _plain(answer.loss),
         "loss_over_work_of_adhesion": answer.main["loss_over_work_of_adhesion"],
+        "friction": answer.main["friction"],
         "pull_off_stress": _plain(answer.pull_off_stress),
         "contact_fraction": _plain(answer.contact_fraction),
         "valid_range": answer.valid_range,

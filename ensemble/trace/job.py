@@ -34,6 +34,7 @@ class Job(ByValue):
     strength: float = math.inf
     at_preload: bool = False
     latest: float | None = None
+    work_of_adhesion_open: float | None = None
 
 
 def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> dict[str, Any]:
@@ -61,7 +62,14 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
 
     profile = Profile(job.period, job.coefficients)
     half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
-    problem = Problem(profile, half_space, job.work_of_adhesion, control, strength=job.strength)
+    problem = Problem(
+        profile,
+        half_space,
+        job.work_of_adhesion,
+        control,
+        strength=job.strength,
+        work_of_adhesion_open=job.work_of_adhesion_open,
+    )
     method = make_method(job.method, problem, accuracy=job.accuracy)
     turn = turn_arguments(control, job.turning_point, job.at_preload, job.latest)
     loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.quantities import LENGTH, STIFFNESS, STRESS
+from adhesis.ensemble.quantities import LENGTH, STIFFNESS, STRESS, WORK_OF_ADHESION
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--young", type=STRESS.option, required=True, metavar="E", help="in Pa, or 1MPa"
     )
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
+    add_open_argument(contact)
     add_strength_arguments(contact)
     add_cycle_arguments(contact)
     contact.add_argument(
@@ -82,6 +83,17 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         help="instead: the stiffness of a layer of this thickness, 1mm",
     )
     group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+
+
+def add_open_argument(group: argparse._ArgumentGroup) -> None:
+    """Declare the work of adhesion of an edge that recedes; ``adhesis loop`` shares it."""
+    group.add_argument(
+        "--work-of-adhesion-open",
+        type=WORK_OF_ADHESION.option,
+        metavar="G",
+        help="where an edge recedes, at least that where it advances, --work-of-adhesion; between "
+        "both it is pinned (default: the same)",
+    )
 
 
 def add_strength_arguments(group: argparse._ArgumentGroup) -> None:

@@ -21,6 +21,7 @@ from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quant
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
+from adhesis.solver.loading.equilibrium_path import friction_text
 
 
 def summary(answer: Answer) -> str:
@@ -39,6 +40,7 @@ def summary(answer: Answer) -> str:
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
         f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
+        *(f"friction    {text}" for text in _friction(answer)),
         f"scope       {_scope(answer)}",
         f"range       {_range(answer)}",
         "doubts      "
@@ -66,6 +68,14 @@ def _largest_changes(answer: Answer) -> str:
             f"{of}by “{run.name}” ({run.description}{against}): × {change.factor:.3g}{beyond}"
         )
     return "; ".join(clauses) or "no other decision about the trace could be run"
+
+
+def _friction(answer: Answer) -> list[str]:
+    """Say which part of the loop's loss is friction of edges; nothing with one work of adhesion."""
+    gamma, loop = answer.cycle.work_of_adhesion_open, answer.main
+    if gamma is None or gamma == answer.cycle.works_of_adhesion[0]:
+        return []
+    return [friction_text(gamma, loop["loss"], loop["friction"])]
 
 
 def _note(answer: Answer) -> str:
@@ -160,6 +170,7 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         images.get("spectrum"),
         "## The loop",
         images.get("loop"),
+        *(f"Friction: {text}." for text in _friction(answer)),
         f"Scope: {_scope(answer)}.",
         f"Range: {_range(answer)} (least of the loop and its variants).",
         "## How far it can be trusted",

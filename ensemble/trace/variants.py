@@ -59,6 +59,7 @@ class Cycle:
     strength: float | None = None
     at_preload: bool = False
     latest: float | None = None
+    work_of_adhesion_open: float | None = None
 
     @property
     def turn_sign(self) -> str:
@@ -85,6 +86,16 @@ class Cycle:
     def strength_at(self, work_of_adhesion: float) -> float:
         """Return the strength of the interface in Pa at a work of adhesion in J/m²."""
         return strength_of(work_of_adhesion, self.adhesion_range, self.strength)
+
+    def open_at(self, work_of_adhesion: float) -> float | None:
+        """Return the work of adhesion of receding edges at one of advancing edges, in J/m².
+
+        It is given for that of the answer; at others both keep their ratio.
+        """
+        first, given = self.works_of_adhesion[0], self.work_of_adhesion_open
+        if given is None or work_of_adhesion == first:
+            return given
+        return given / first * work_of_adhesion
 
 
 @dataclass(frozen=True)
@@ -301,6 +312,7 @@ def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
         strength=cycle.strength_at(gamma),
         at_preload=cycle.at_preload,
         latest=cycle.latest,
+        work_of_adhesion_open=cycle.open_at(gamma),
     )
 
 

@@ -130,6 +130,12 @@ class LoopResult(EquilibriumPath):
         return last - 1 in self.states_before_jumps()
 
     @property
+    def _opening_text(self) -> str:
+        """Work of adhesion at which edges recede, for a message; empty if there is one alone."""
+        found = self.problem.work_of_adhesion_open
+        return "" if found is None else f"γ_open = {found:.4g} J/m², "
+
+    @property
     def _where(self) -> str:
         """Turning point as prescribed, for a message."""
         control, point = self.problem.control, self.turning_point
@@ -242,12 +248,14 @@ class LoopResult(EquilibriumPath):
                 f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
                 f"period {profile.period:.4g} m",
                 f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
+                f"{self._opening_text}"
                 f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²"
                 f"{f' ({self.loss_note})' if self.loss_note else ''}",
+                *(f"friction   {text}" for text in (self.friction_summary(),) if text),
                 f"range      {self.range_summary()}",
                 f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
                 f"pull-off   {self.pull_off_stress:.4g} Pa, "

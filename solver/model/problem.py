@@ -100,6 +100,9 @@ class Problem(ByValue):
         Infinite by default, that of adhesion of zero range (docs/zero-range.md).
     adhesion_range : float, optional
         Instead of the strength, the range δ of adhesion in m: σ_th = γ/δ.
+    work_of_adhesion_open : float, optional
+        Work of adhesion in J/m² where an edge recedes, at least γ, which then holds where it
+        advances; between both it is pinned. None stands for γ.
     measure : {"arc", "flat"}
         γ counts for each length sqrt(1 + h'²) dx along the profile, or for each projected length
         dx. By keyword only.
@@ -125,6 +128,7 @@ class Problem(ByValue):
     control: Control = field(default_factory=Control)
     strength: float = math.inf
     adhesion_range: InitVar[float | None] = None
+    work_of_adhesion_open: float | None = None
     measure: Measure = field(default="arc", kw_only=True)
 
     def __post_init__(self, adhesion_range: float | None) -> None:
@@ -137,6 +141,34 @@ class Problem(ByValue):
         check_slope(float(np.sqrt(self.profile.m2)))
         object.__setattr__(self, "strength", strength_of(gamma, adhesion_range, self.strength))
         self._check_strength(adhesion_range)
+        self._check_open()
+
+    @property
+    def gamma_open(self) -> float:
+        """Work of adhesion of an edge that recedes, in J/m²: γ, unless another is given."""
+        found = self.work_of_adhesion_open
+        return self.work_of_adhesion if found is None else found
+
+    @property
+    def pinning(self) -> float:
+        """Work of adhesion of an edge that recedes less that of one that advances, in J/m²."""
+        return self.gamma_open - self.work_of_adhesion
+
+    def _check_open(self) -> None:
+        """Refuse a work of adhesion on opening that is the smaller one, or beside a strength."""
+        if self.work_of_adhesion_open is None:
+            return
+        gamma = self.work_of_adhesion
+        found = real("work_of_adhesion_open", self.work_of_adhesion_open, WORK_OF_ADHESION)
+        if found < gamma or gamma == 0 < found:
+            rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
+            raise ValueError(f"work_of_adhesion_open is {found:g} J/m²: it must be {rule}")
+        if found > gamma and math.isfinite(self.strength):
+            raise ValueError(
+                f"work_of_adhesion_open is {found:g} J/m² beside a strength of {self.strength:g} "
+                "Pa: give one of them, edges of two works of adhesion have no range"
+            )
+        object.__setattr__(self, "work_of_adhesion_open", found if found > gamma else None)
 
     def _check_strength(self, adhesion_range: float | None) -> None:
         """Refuse a strength at which a crack as long as the waves would have to be put."""

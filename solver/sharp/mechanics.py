@@ -11,6 +11,7 @@ from adhesis.solver.sharp.descent.gradient_flow import AT_REST, NO_FIELD, REJOIN
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
+from adhesis.solver.sharp.equilibrium.pinning import remember
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
@@ -47,7 +48,7 @@ class EdgeMechanics(EdgeProblem):
 
     def system(self, gaps: Array) -> EdgeSystem:
         """Return the system of edges by which these gaps are solved."""
-        return self._systems[len(gaps) >= self.many]
+        return self._systems[len(gaps) >= self.many and not self.pins]
 
     def uses_windows(self, gaps: Array) -> bool:
         """Whether these gaps are followed in windows."""
@@ -153,6 +154,8 @@ class EdgeMechanics(EdgeProblem):
         left, orders, rests = DESCENT_LIMIT, _ANY, 0
         begun, rested = len(gaps), np.empty((0, 2))
         while left > 0 and rests <= 2 * RESTS:
+            held = self.law_of(gaps).held
+            law = law._replace(held=held)
             end = system.descend(
                 gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds, start=start
             )
@@ -164,6 +167,7 @@ class EdgeMechanics(EdgeProblem):
             if end.event == NO_FIELD:
                 raise NoState("there is no field of these edges", prescribed)
             if end.event == VANISHED:
+                self.recall(remember(held, gaps, law.band) if self.pins else held)
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
@@ -208,7 +212,8 @@ class EdgeMechanics(EdgeProblem):
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
         minimum: the flow stands still there. A minimum draws the edge back.
         """
-        residual, _ = imbalance(self.field(gaps, prescribed).solution, self.law, self.source.panels)
+        solution = self.field(gaps, prescribed).solution
+        residual, _ = imbalance(solution, self.law_of(gaps), self.source.panels)
         e = int(np.argmax(np.abs(residual)))
         length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]

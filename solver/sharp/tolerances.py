@@ -68,6 +68,15 @@ LEAST_FAINT_FORCE = 1e-12
 MOST_CORRECTIONS = 8
 """Corrections by Newton's iteration before an equilibrium counts as lost."""
 
+PINNED_CORRECTIONS = 4
+"""Times as many with two works of adhesion, where edges begin to move and are pinned on the way."""
+BAND = 0.3
+"""Of ``EdgeLaw.field_error``: length over which the critical opening of a pinned edge rises."""
+BAND_RESOLVED = 0.03
+"""Lengths of the band; so short a correction ends Newton's iteration where edges may be pinned."""
+BAND_END = 1e-6
+"""Lengths of the band; nearer to an end of it an edge counts as there."""
+
 NEWTON_SHARE = 0.01
 """Share of ``EdgeLaw.field_error`` (a length in θ) below which a correction ends the iteration: it
 is small against the motion that the error of the field makes anyway."""

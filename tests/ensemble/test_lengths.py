@@ -94,7 +94,7 @@ def test_every_option_that_is_a_quantity_takes_a_unit() -> None:
     assert options[STRESS.option] == {"--young", "--strength", "--field-stresses"}
     # and --max-stress and --preload, lists
     assert options[STIFFNESS.option] == {"--stiffness"}
-    assert options[WORK_OF_ADHESION.option] == {"--work-of-adhesion"}
+    assert options[WORK_OF_ADHESION.option] == {"--work-of-adhesion", "--work-of-adhesion-open"}
     assert options[float] == NUMBERS
 
 

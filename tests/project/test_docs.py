@@ -100,6 +100,7 @@ TEXT = {
     "h(x) = Σ_m": "formula",
     "loss = ∮ p̄ dΔ": "formula",
     "loss = (1/λ) Σ": "formula",
+    "loss = (1/λ) (": "formula",
     "W = U + λ": "formula",
     "branch = Branch(": "pseudo-code",
 }

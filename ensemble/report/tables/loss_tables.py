@@ -65,6 +65,7 @@ def losses(data: Aggregate) -> Table:
         _estimated("loss", "sem [J/m^2]", "s.e.", number(2, unit=1e-3)),
         _estimated("loss", "ci_low [J/m^2]", "95 % from", partial(at_least_0, unit=1e-3)),
         _estimated("loss", "ci_high [J/m^2]", "to", number(unit=1e-3)),
+        *_friction_columns(data),
         TableColumn(
             "loss_over_work_of_adhesion",
             _loss_over_work_of_adhesion,
@@ -121,6 +122,21 @@ def losses(data: Aggregate) -> Table:
         _estimated("wall_time", "mean [s]"),
     )
     return make_table("Loss of one loop", columns, data.cells)
+
+
+def _friction_columns(data: Aggregate) -> tuple[TableColumn, ...]:
+    """Return the columns of the two parts of the loss; none for one work of adhesion."""
+    if data.campaign.material.work_of_adhesion_open is None:
+        return ()
+    milli = number(unit=1e-3)
+    return (
+        _estimated("friction", "mean [J/m^2]", "friction", milli),
+        TableColumn(
+            "instability_mean [J/m^2]",
+            _if_done(lambda cell: np.mean(cell.values["loss"] - cell.values["friction"])),
+            *("instability", milli),
+        ),
+    )
 
 
 def _estimated(

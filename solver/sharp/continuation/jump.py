@@ -13,7 +13,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.history import ComputedJump
 from adhesis.solver.sharp.continuation.races import MirrorCheck, RaceCheck
 from adhesis.solver.sharp.descent.track import Track
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.branch_point import NO_MEMORY, Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
@@ -135,22 +135,20 @@ class Jumps:
         """Go on with equal speeds, from a minimum that they reached, until nothing touches."""
         if isinstance(point, FullContact):
             raise point
-        return self._nucleate_until_clear(
-            point,
-            at,
-            lambda gaps, touching, before: self._relax(
-                self.nucleation.insert_seeds(gaps, touching),
-                at,
-                equal_speeds=True,
-                start=self.edges.start(before),
-            ),
-        )
+
+        def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
+            gaps, start = self.nucleation.insert_seeds(gaps, touching), self.edges.start(before)
+            self._recall(before)
+            return self._relax(gaps, at, equal_speeds=True, start=start)
+
+        return self._nucleate_until_clear(point, at, relaxed)
 
     def _end_beyond(self, at: float, start: Array, known: Point | None) -> Point | None:
         """Descend at a d next to that of an equilibrium, until nothing touches."""
 
         def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
             gaps = self.nucleation.insert_seeds(gaps, touching) if touching else gaps
+            self._recall(before)
             return self._relax(gaps, at, start=self.edges.start(before))
 
         return self._nucleate_until_clear(relaxed(start, [], known), at, relaxed)
@@ -215,11 +213,13 @@ class Jumps:
         """
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
+        self._recall(known)
         track = Track()
         start = self.edges.start(known)
         point = self._relax(gaps, at, track=track, start=start)
         if not rivals and self.races.may_occur(gaps, point, track):
             try:
+                self._recall(known)
                 rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
                 if not track.rejoined and not self._is_same_minimum(rival, point):
                     rivals.append(rival)
@@ -228,6 +228,10 @@ class Jumps:
             except NoState:
                 pass  # a comparison that does not come to rest is no failure of the path
         return point
+
+    def _recall(self, point: Point | None) -> None:
+        """Let the edges have the memory of a point; without one they advance."""
+        self.edges.recall(NO_MEMORY if point is None else point.held)
 
     def _relax(
         self,

@@ -12,7 +12,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, imbalance
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.field.dense_solver import solve, solve_again
 from adhesis.solver.sharp.field.exterior import Exterior
 from adhesis.solver.sharp.field.solution import FieldModel, Solution

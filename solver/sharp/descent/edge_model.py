@@ -26,7 +26,8 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
 from adhesis.solver.sharp.descent.edge_forces import Forces
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import critical_of
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, half_plane_opening
 
 
@@ -91,6 +92,7 @@ def model_about(
     )  # fmt: skip
     evaluate(model, law, panels)
     model.opening[:] = opening
+    evaluate_law(model, law, panels)
     return model
 
 
@@ -98,14 +100,23 @@ def model_about(
 def evaluate(model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
     """Evaluate R, C_c and the rates at the present edges, and add R to the openings."""
     theta, rate, half_plane, opening = model.theta, model.rate, model.half_plane, model.opening
-    critical, critical_rate, own = model.critical, model.critical_rate, model.own
+    own = model.own
     for e in range(theta.shape[0]):
         outwards = 1 - 2 * (e % 2)
         half_plane[e], slope = half_plane_opening(theta[e], e % 2, panels)
         opening[e] += half_plane[e]
         rate[e] = own[e] + outwards * slope
-        critical[e], drift = critical_opening(theta[e], law, panels)
-        critical_rate[e] = outwards * drift
+    evaluate_law(model, law, panels)
+
+
+@compiled
+def evaluate_law(model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
+    """Evaluate C_c and its rates at the present edges."""
+    theta, opening = model.theta, model.opening
+    critical, critical_rate = model.critical, model.critical_rate
+    for e in range(theta.shape[0]):
+        critical[e], drift = critical_of(e, theta[e], opening[e], law, panels)
+        critical_rate[e] = (1 - 2 * (e % 2)) * drift
 
 
 @compiled_sums

@@ -45,8 +45,8 @@ from adhesis.solver.sharp.descent.trajectory import (
     start_trajectory,
     update_comparison,
 )
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.equilibrium.griffith import (
-    EdgeLaw,
     edge_tangent,
     move_edges,
     raise_orders,

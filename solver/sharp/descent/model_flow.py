@@ -22,7 +22,8 @@ from adhesis.solver.sharp.descent.edge_model import (
     model_forces,
     model_hessian,
 )
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.pinning import stop_at_band
 from adhesis.solver.sharp.field.cholesky import factor_rows, padded, solve_column
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
@@ -102,6 +103,8 @@ def flow_through(
         size = implicit_step(matrix, force, longest, equal_speeds, factor, step)
         if not size > RUNNING_ENDS * law.longest_step:
             break
+        if law.pinning > 0:
+            stop_at_band(model.theta, step, law)
         share = share_within(model.motion, step, limit)
         if share < 1:
             step *= share

@@ -15,7 +15,8 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.gradient_flow import AT_REST, NO_FIELD, OUTGROWN, STEP_LIMIT
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, move_edges, step_limits
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import move_edges, step_limits
 from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
     motion_to,

@@ -11,6 +11,7 @@ from adhesis.solver.sharp.descent.edge_forces import FlowProblem, Forces
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
 from adhesis.solver.sharp.descent.saddle import QuadraticModel, step_off_saddle
 from adhesis.solver.sharp.equilibrium.griffith import symmetrise
+from adhesis.solver.sharp.equilibrium.pinning import stop_at_band
 from adhesis.solver.sharp.field.cholesky import cholesky, solve_column
 from adhesis.solver.sharp.gap.quadrature import Integers
 
@@ -26,6 +27,20 @@ def short_step(
     speeds, for comparison, edges out of equilibrium run, all at the same speed (their limit), and
     edges near equilibrium follow them by Newton's step.
     """
+    motion, curvature, tried = free_step(
+        gaps, prescribed, orders, now, tangent, limit, equal_speeds, problem
+    )
+    if problem.law.pinning > 0:
+        stop_at_band(gaps.ravel(), motion, problem.law)
+    return motion, curvature, tried
+
+
+@compiled
+def free_step(
+    gaps: Array, prescribed: float, orders: Integers, now: Forces, tangent: Array, limit: Array,
+    equal_speeds: bool, problem: FlowProblem,
+) -> tuple[Array, Array, int]:  # fmt: skip
+    """Choose a short step of edges that stop nowhere."""
     law, opening = problem.law, now.solution.opening
     curvature = hessian(np.maximum(opening, 0.0), now.residual, now.drift, tangent)
     if equal_speeds:

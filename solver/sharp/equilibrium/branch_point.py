@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import NamedTuple, Self
+
+import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.dense_solver import GapField
@@ -11,6 +14,7 @@ from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import Integers
 
 ALL_EDGES = slice(None)
+NO_MEMORY: Array = np.empty((0, 2))
 
 
 class PreviousPoint(NamedTuple):
@@ -38,6 +42,8 @@ class Point:
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     previous : PreviousPoint, optional
         The point before it on its branch.
+    held : array, shape (L, 2)
+        Memory of its edges, with two works of adhesion (``pinning``).
     """
 
     at: float
@@ -46,6 +52,7 @@ class Point:
     slope: float
     clearance: float = 0.0
     previous: PreviousPoint | None = None
+    held: Array = dataclasses.field(default_factory=lambda: NO_MEMORY)
 
     @property
     def gaps(self) -> Array:

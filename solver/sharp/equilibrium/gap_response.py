@@ -11,7 +11,8 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
 from adhesis.solver.sharp.equilibrium.edge_interaction import end_charges
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import critical_opening
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import LEFT

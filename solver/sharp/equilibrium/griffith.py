@@ -2,55 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.pinning import pinned_opening, rise, turned_back
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, measure_at
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 from adhesis.solver.sharp.tolerances import CLOSING_SHARE
-
-
-class EdgeLaw(NamedTuple):
-    """Law by which the edges move, with the tolerances of one problem; lengths in θ.
-
-    Attributes
-    ----------
-    critical : float
-        Critical opening on a flat piece.
-    newton_tolerance : float
-        A correction this small ends Newton's iteration.
-    field_error : float
-        Largest displacement of an equilibrium by the error of the field; no less than
-        ``newton_tolerance``.
-    rest_step : float
-        A descent whose steps are shorter than this is left to Newton's iteration.
-    longest_step : float
-        Longest short step of an edge in a descent.
-    smallest : float
-        Narrower patches and gaps are removed.
-    overlap_limit : float
-        An opening this far below zero is an overlap that descent cannot weigh.
-    force_error : float
-        A force C_c² - C² this small is that of rounding.
-    origin : float
-        θ of the highest crest.
-    """
-
-    critical: float
-    newton_tolerance: float
-    field_error: float
-    rest_step: float
-    longest_step: float
-    smallest: float
-    overlap_limit: float
-    force_error: float
-    origin: float
 
 
 @compiled_for_both
@@ -84,10 +47,25 @@ def total_motion(before: Array, after: Array) -> float:
 
 @compiled
 def critical_opening(theta: float, law: EdgeLaw, panels: Panels) -> tuple[float, float]:
-    """Compute C_c at θ, and its derivative."""
+    """Compute C_c at θ of an edge that advances, and its derivative."""
     measure, slope = measure_at(theta, panels)
     root = np.sqrt(measure)
     return law.critical * root, law.critical * slope / (2 * root)
+
+
+@compiled
+def critical_of(
+    edge: int, theta: float, opening: float, law: EdgeLaw, panels: Panels
+) -> tuple[float, float]:
+    """Compute C_c of an edge at θ with the opening C, and its derivative by θ."""
+    critical, drift = critical_opening(theta, law, panels)
+    if law.pinning == 0:
+        return critical, drift
+    advancing = critical
+    critical, drift = pinned_opening(theta, edge, advancing, drift, law)
+    if turned_back(theta, edge, opening - critical, law):
+        drift += rise(edge, advancing, law)
+    return critical, drift
 
 
 @compiled
@@ -98,7 +76,8 @@ def imbalance(state: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Arr
     residual = np.empty(edges)
     drift = np.empty(edges)
     for e in range(edges):
-        critical, drift[e] = critical_opening(table[e // 2, LEFT + e % 2], law, panels)
+        theta = table[e // 2, LEFT + e % 2]
+        critical, drift[e] = critical_of(e, theta, opening[e], law, panels)
         residual[e] = opening[e] - critical
     return residual, drift
 

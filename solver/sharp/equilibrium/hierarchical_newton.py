@@ -8,7 +8,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled_for_both
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, move_edges, shortest_length
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import move_edges, shortest_length
 from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
     motion_to,

@@ -12,7 +12,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import critical_opening
 from adhesis.solver.sharp.equilibrium.linear_response import (
     Flags,
     LinearResponse,

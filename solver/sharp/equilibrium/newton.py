@@ -8,14 +8,15 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.equilibrium.griffith import (
-    EdgeLaw,
     accept_correction,
     edge_tangent,
     imbalance,
     raise_orders,
     symmetrise,
 )
+from adhesis.solver.sharp.equilibrium.pinning import stop_at_band
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.exterior import Exterior
@@ -23,10 +24,12 @@ from adhesis.solver.sharp.field.solution import FieldModel, Solution, edge_openi
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers, choose_orders
 from adhesis.solver.sharp.tolerances import (
+    BAND_RESOLVED,
     KNOWN_TANGENT,
     MOST_CORRECTIONS,
     NEWTON_GROWTH,
     NEWTON_SHARE,
+    PINNED_CORRECTIONS,
     STALLED_SHARE,
 )
 
@@ -95,7 +98,10 @@ def equilibrium(
     rate: Any = np.empty(0)
     slope = np.nan
     steps = 0
+    most = MOST_CORRECTIONS * (1 if law.pinning == 0 else PINNED_CORRECTIONS)
     tolerance = max(law.newton_tolerance, NEWTON_SHARE * law.field_error)
+    if law.pinning > 0:
+        tolerance = min(tolerance, BAND_RESOLVED * law.band)
     while True:
         steps += 1
         state = solve(gaps, prescribed, orders, 2, model, exterior)
@@ -104,25 +110,30 @@ def equilibrium(
         residual, drift = imbalance(state, law, model.panels)
         tangent, by_edge = edge_tangent(state, drift, rules)
         step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float
+        stopped = law.pinning > 0 and stop_at_band(gaps.ravel(), step, law)
         size = np.abs(step).max()
         # The field has steps of the size of its error, where panels or modes change: an iteration
         # to and fro across one of them is at its end.
         stalled = size <= law.field_error and size > STALLED_SHARE * last
-        if size <= tolerance or stalled:
+        if not stopped and (size <= tolerance or stalled):
             _, matrix = symmetrise(state, tangent, law.overlap_limit)
             found = is_definite(matrix) or not strict
             break
-        if not strict and (size <= law.rest_step or _is_balanced(state, residual, law)):
+        at_rest = not stopped and size <= law.rest_step
+        if not strict and (at_rest or _is_balanced(state, residual, law)):
             found = True
             break
-        accepted, moved = accept_correction(gaps, step, travelled, reach, NEWTON_GROWTH * last)
-        if not accepted or steps == MOST_CORRECTIONS:
+        # an edge that leaves its band, or comes to it, changes what the others do
+        longest = reach if law.pinning > 0 else NEWTON_GROWTH * last
+        accepted, moved = accept_correction(gaps, step, travelled, reach, longest)
+        if not accepted or steps == most:
             break
         gaps = moved
         # The iteration converges quadratically: the next correction, and by what share the tangent
         # changes until then, are known beforehand.
         share = (size / last) ** 2
-        if last < np.inf and size * share <= tolerance and share <= KNOWN_TANGENT:
+        known = last < np.inf and size * share <= tolerance and share <= KNOWN_TANGENT
+        if known and law.pinning == 0:
             _, matrix = symmetrise(state, tangent, law.overlap_limit)
             if is_definite(matrix) or not strict:
                 steps += 1

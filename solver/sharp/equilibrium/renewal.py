@@ -12,8 +12,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.equilibrium.gap_response import linearise_gap
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.equilibrium.linear_response import (
     Flags,
     LinearResponse,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, step_limits
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import step_limits
 from adhesis.solver.sharp.equilibrium.linear_exterior import extend_window, open_window
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.field.exterior import Exterior

@@ -129,6 +129,7 @@ def locate(
         if trial in (clear, hit.at):  # there its value differs by the error of the field
             return Located(last, criterion.choose_seeds(hit_candidates), 0.0), 0.0
         point = None
+        edges.recall(last.held)
         reach = CORRECTED * edges.wave
         if many:
             point = edges.equilibrium(last.interpolate(hit, trial), trial, reach)

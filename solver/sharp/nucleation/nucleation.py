@@ -152,7 +152,7 @@ class Nucleation:
         self.searched = NONE_SEARCHED
         self._lengths = Lengths(
             max_displacement=COMPARABLE * edges.wave,
-            closing_per_motion=float(edges.critical / np.sqrt(edges.wave)),
+            closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=math.pi * edges.critical**2 / 8,  # Γ
             narrowest=float(3 * edges.smallest),
             widest=float(edges.longest_step),
@@ -272,7 +272,7 @@ class Nucleation:
                 clear, low = trial, value
             else:
                 hit, high, field, minima = trial, value, tried, there
-        touching = Point(hit, field, point.rate, float("nan"))
+        touching = Point(hit, field, point.rate, float("nan"), held=point.held)
         return Located(touching, self.choose_seeds(minima), abs(end - point.at))
 
     def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:

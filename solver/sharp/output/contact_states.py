@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,10 +12,11 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
+from adhesis.solver.sharp.equilibrium.branch_point import NO_MEMORY, Point, PreviousPoint
 from adhesis.solver.sharp.field.dense_solver import FixedEdgeResponse, GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
+from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED, SearchedGaps
 from adhesis.solver.values import with_values
@@ -45,12 +46,18 @@ class ContinuationData:
         If a path stopped at the state.
     searched : SearchedGaps
         The gaps as they were when they were last searched for touches.
+    held : array, shape (L, 2)
+        Memory of their edges, with two works of adhesion.
+    branch : {"loading", "unloading"}, optional
+        Branch on which the path stopped.
     """
 
     gaps: Array
     clearance: float
     branch_data: BranchData | None = None
     searched: SearchedGaps = NONE_SEARCHED
+    held: Array = field(default_factory=lambda: NO_MEMORY)
+    branch: Branch | None = None
 
 
 def loading_device(problem: Problem) -> LoadingDevice:
@@ -126,7 +133,7 @@ class States:
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation, point.clearance)
+        return self.of_field(point.field, point.slope, separation, point.clearance, held=point.held)
 
     def of_field(
         self,
@@ -134,6 +141,7 @@ class States:
         slope: float = float("nan"),
         separation: float | None = None,
         clearance: float = 0.0,
+        held: Array = NO_MEMORY,
     ) -> ContactState:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
@@ -156,7 +164,7 @@ class States:
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             stiffness=slope * self._stiffness_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gaps, clearance),
+            internal=ContinuationData(gaps, clearance, held=held),
         )
 
     def at_fixed_edges(
@@ -177,8 +185,26 @@ class States:
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             stiffness=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gap_field.gaps, 0.0),
+            internal=replace(state.internal, gaps=gap_field.gaps, clearance=0.0, branch_data=None),
         )
+
+    def with_receded(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
+        """Return states with the length over which edges have receded since a state before."""
+        out, total = [], before.receded
+        for state in states:
+            if before.patches:
+                lost = self._contact_measure(before.internal.gaps)
+                if state.patches:
+                    both = union_of(before.internal.gaps, state.internal.gaps)
+                    lost -= self._contact_measure(both)
+                total += max(lost, 0.0) / self.q0
+            out.append(with_values(state, receded=total))
+            before = state
+        return out
+
+    def _contact_measure(self, gaps: Array) -> float:
+        """Length along the profile, in θ, of the contact between gaps; 0 if they leave none."""
+        return self.source.contact_between(gaps)[1] if len(gaps) else 0.0
 
     def work(self, before: ContactState, after: ContactState, way: float) -> float:
         """Compute |Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""

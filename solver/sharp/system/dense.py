@@ -11,9 +11,11 @@ from adhesis.solver.sharp.descent.edge_forces import FlowProblem
 from adhesis.solver.sharp.descent.gradient_flow import Descent, descend
 from adhesis.solver.sharp.descent.track import Stage, Track
 from adhesis.solver.sharp.descent.trajectory import Comparison
-from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, total_motion
+from adhesis.solver.sharp.equilibrium.branch_point import NO_MEMORY, Point
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import total_motion
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
+from adhesis.solver.sharp.equilibrium.pinning import remember
 from adhesis.solver.sharp.field.dense_solver import (
     FixedEdgeResponse,
     respond_at_fixed_edges,
@@ -63,13 +65,16 @@ class DenseSystem(EdgeSystem):
     ) -> Point | None:
         """Iterate for the equilibrium near these gaps, by the matrix of all edges."""
         problem = self._problem
+        law = problem.law_of(gaps)
         found, at, solution, rate, slope, steps = equilibrium(
-            gaps, prescribed, reach, orders, strict, problem.law, problem.model, NO_EXTERIOR
+            gaps, prescribed, reach, orders, strict, law, problem.model, NO_EXTERIOR
         )
         problem.count.add_newton(steps)
         if not found:
             return None
-        return Point(prescribed, problem.solved(at, prescribed, solution), rate, slope)
+        held = remember(law.held, at, law.band) if problem.pins else NO_MEMORY
+        field = problem.solved(at, prescribed, solution)
+        return Point(prescribed, field, rate, slope, held=held)
 
     def descend(
         self,

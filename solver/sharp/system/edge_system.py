@@ -12,7 +12,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.descent.gradient_flow import Descent
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.field.dense_solver import FixedEdgeResponse
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem

@@ -22,7 +22,8 @@ from adhesis.solver.sharp.descent.newton_approach import Approach, approach_mini
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.edge_interaction import openings_between_edges
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, shortest_length
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import shortest_length
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
     EquilibriumOfMany,
     equilibrium_many,

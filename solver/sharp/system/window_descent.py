@@ -29,7 +29,7 @@ from adhesis.solver.sharp.descent.gradient_flow import (
 from adhesis.solver.sharp.descent.newton_approach import Approach
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.descent.trajectory import Comparison
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.gap.ends import without_small
