@@ -210,7 +210,9 @@ class Branch:
             self._output = event.point
         if event.point.at == self._target.at:
             return  # no further step is taken
-        self._predictor = Predictor(event.point)
+        # what lies before a kink predicts nothing beyond it
+        known = event.point.with_previous(None) if self._begins_to_move else event.point
+        self._predictor = Predictor(known)
         self._look_for_two_folds()
         self.steps.accept(self._free_step if self._begins_to_move else step, self._predictor)
 
