@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import io
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
@@ -78,6 +79,13 @@ def picture(png: bytes, name: str, kind: str = "") -> str:
     data = base64.b64encode(png).decode()
     shape = f'class="{kind}" ' if kind else ""
     return f'<img {shape}alt="{escape(name)}" src="data:image/png;base64,{data}">'
+
+
+def picture_of(figure: Any) -> str:
+    """Return a figure of matplotlib's as an element that holds it."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=110)
+    return picture(stream.getvalue(), "figure")
 
 
 def table_of(rows: Iterable[tuple[str, str]]) -> str:

@@ -24,7 +24,7 @@ class Panels(list["Axes"]):
 
     def _repr_html_(self) -> str:
         """Return the figure as a picture, for notebooks."""
-        from adhesis.ensemble.loop.views import picture_of
+        from adhesis.ensemble.report.html import picture_of
 
         return picture_of(self.figure)
 
