@@ -302,20 +302,6 @@ OPTIONS: dict[str, tuple[tuple[object, ...], str]] = {
     "a unit of a spectrum": ((*S, "--unit", "um"), "--unit belongs to --trace"),
     "a long period": ((*S, "--period", 1e300), "--period is 1e+300, which would be 1e+300 m: give"),
     "a short period": ((*S, "--period", 1e-300), "--period is 1e-300: "),
-    "many load steps": (
-        (*S, "--load-steps", 10**9),
-        "--load-steps is 1000000000: it must be a whole number",
-    ),
-    "many nodes": (
-        (*S, "--nodes-per-wave", 10**8),
-        "--nodes-per-wave is 100000000: it must be a whole number",
-    ),
-    "many waves": ((*S, "--n0", 10**6), "--n0 is 1000000: it must be a whole number from 1 to"),
-    "many digits": ((*S, "--ratio", 10**400), "--ratio is 1000"),
-    "accuracy": ((*S, "--accuracy", 0), "--accuracy is 0.0: it must"),
-    "Poisson's ratio": ((*S, "--poisson", 0.7), "--poisson is 0.7: it must be"),
-    "adhesion": ((*S, "--work-of-adhesion", "nan"), "--work-of-adhesion is nan: it must be"),
-    "turning point": ((*S, "--max-penetration", 2), "--max-penetration is 2.0: it must be"),
     "a delimiter": ((*H, *CONTACT, "--delimiter", ":"), "--delimiter is ':': it must be one of"),
 }
 
@@ -340,12 +326,6 @@ def test_options_are_refused_by_name(
     assert text.out == ""
     (line,) = text.err.splitlines()
     assert line.startswith(f"adhesis loop: {sentence}")
-
-
-def test_trace_has_the_bounds_of_a_campaign(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["trace", "none.csv", *map(str, CONTACT), "--plan"]
-    assert main([*words, "--load-steps", "1000000000"]) == 2
-    assert "--load-steps is 1000000000: it must be a whole number" in capsys.readouterr().err
 
 
 # ---------------------------------------------------------------------- campaign files

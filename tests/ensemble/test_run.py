@@ -6,8 +6,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from dataclasses import replace
 
@@ -18,15 +16,12 @@ import xarray
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import launch, session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
 from adhesis.ensemble.task.compute import check_task
 from tests.support.campaign_support import (
-    TESTS,
     adhesis,
     adhesis_here,
     differences,
@@ -36,7 +31,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.fake_run import fake_engine, fake_result
+from tests.support.fake_run import fake_engine
 
 
 def run(folder, *words, fake="", **changes):
@@ -74,12 +69,6 @@ def test_where_there_is_no_mpi_processes_compute_what_ranks_would(tmp_path, monk
     assert differences(out, expected) == []
     with h5py.File(out) as file:
         assert set(file["rank"][:]) == {1, 2}
-
-
-def test_the_version_is_told():
-    process = adhesis_here("--version")
-    assert process.returncode == 0
-    assert process.stdout.startswith("adhesis 0.")
 
 
 def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path):
@@ -288,14 +277,6 @@ def refused(folder, *words, **changes):
     return process.stderr
 
 
-def test_bad_campaigns_leave_nothing_behind(tmp_path):
-    assert "[profile] period is -1.0: it must be a positive" in refused(tmp_path, period="-1.0")
-    assert "realisations is 0: it must be" in refused(tmp_path, realisations="0")
-    assert "speed is unknown" in refused(tmp_path, jumps="8\nspeed = 3")
-    assert "nodes_per_wave is 4: it must be" in refused(tmp_path, nodes_per_wave="4")
-    assert "cannot be computed" in refused(tmp_path, method='"sharp"')  # it has no nodes
-
-
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
@@ -438,29 +419,6 @@ def test_status_tells_what_failed_and_why(tmp_path):
     assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)
 
 
-def test_status_of_a_large_file_loads_no_mpi(tmp_path):
-    path = write_campaign(tmp_path, realisations="5000", jumps="1", load_steps="1")
-    campaign = load_campaign(path)
-    create(tmp_path / "r.h5", campaign)
-    result = fake_result(campaign, campaign.tasks()[0])
-    with Writer(tmp_path / "r.h5") as writer:
-        for row in range(0, 20_000, 200):
-            writer.write_result(row, result)
-    code = (
-        "import sys; from adhesis.ensemble.command.main import main; "
-        "main(['status', sys.argv[1]]); "
-        "print([m for m in sys.modules if m.startswith('mpi4py')])"
-    )
-    process = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "r.h5")],
-        capture_output=True,
-        text=True,
-        env=environment(),
-    )
-    assert "20000 tasks, 100 done" in process.stdout
-    assert process.stdout.endswith("[]\n")
-
-
 @pytest.mark.parametrize(
     ("text", "seconds"),
     [
@@ -520,13 +478,6 @@ def test_a_hangup_stops_a_run_unless_it_is_ignored():
         assert signals.received is None
     finally:
         signal.signal(signal.SIGHUP, before)
-
-
-def test_the_fake_tasks_depend_on_nothing_but_the_task(tmp_path):
-    campaign = load_campaign(write_campaign(tmp_path))
-    one, two = (fake_result(campaign, campaign.tasks()[2]) for _ in range(2))
-    np.testing.assert_array_equal(one["loading_energy"], two["loading_energy"])
-    assert TESTS.is_dir()
 
 
 def test_watching_a_run_until_it_is_done(tmp_path):

@@ -28,7 +28,6 @@ from adhesis.ensemble.trace.answer import (
     COVERAGE,
     Answer,
     NoAnswer,
-    loss_of_trace,
     make_cycle,
     run_plan,
 )
@@ -540,20 +539,6 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     assert any(hint.startswith("cut_off") for hint in plan.hints)
     assert any("quick" in hint for hint in plan.hints)
     assert plan.jobs[0].name == min(plan.seconds, key=lambda name: plan.seconds[name])
-
-
-def test_what_the_solver_refuses_is_refused_before_any_loop() -> None:
-    with pytest.raises(ValueError, match="max_penetration is 1"):
-        loss_of_trace(prepared(), half_space=HALF_SPACE, work_of_adhesion=0.04, max_penetration=1.0)
-    with pytest.raises(ValueError, match="work_of_adhesion is -1"):
-        loss_of_trace(prepared(), half_space=HALF_SPACE, work_of_adhesion=-1.0)
-    options: dict[str, Any] = {"half_space": HALF_SPACE, "work_of_adhesion": 0.04}
-    with pytest.raises(ValueError, match="max_stress is missing: a path under a load must have it"):
-        loss_of_trace(prepared(), control=Control(0), **options)
-    with pytest.raises(ValueError, match="max_penetration is given: a path under a load turns at"):
-        loss_of_trace(prepared(), control=Control(0), max_penetration=0.5, **options)
-    with pytest.raises(ValueError, match="max_stress is given: it belongs to a load"):
-        loss_of_trace(prepared(), max_stress=500.0, **options)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
@@ -221,8 +220,3 @@ def test_no_variation_is_read_as_another_trace(tmp_path: Path) -> None:
     assert [wrong for _, wrong in found if wrong] == []
     # Two fifths end with another block or a checksum, or begin with a count; the rest is read.
     assert sum(read for read, _ in found) > 0.4 * VARIATIONS
-
-
-@pytest.mark.parametrize("seed", [0])
-def test_the_same_seed_writes_the_same_text(seed: int) -> None:
-    assert draw_text(seed).data == draw_text(seed).data
