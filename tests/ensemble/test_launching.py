@@ -8,9 +8,7 @@ import signal
 import sys
 import threading
 import time
-from pathlib import Path
 
-import h5py
 import pytest
 
 import adhesis
@@ -28,7 +26,6 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.launchers import MPIRUN
 
 HAND_OVER = f'printf "%s" "$END" > "${launch.STARTED}"'
 WORDS = "------\nno slots are left\n------"
@@ -266,27 +263,16 @@ def small_campaign() -> adhesis.Campaign:
     return adhesis.Campaign(campaign_text(realisations="1", hurst="[0.7]"))
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
-def test_a_campaign_runs_outside_the_main_thread(ranks, tmp_path):
+def test_a_campaign_runs_outside_the_main_thread(tmp_path):
     """As asyncio.to_thread and servers call it; two at once leave stderr as it was."""
     outs = [tmp_path / f"{i}.h5" for i in range(2)]
     before = sys.stderr
 
     async def both() -> list[adhesis.CampaignResults]:
-        runs = (asyncio.to_thread(small_campaign().run, out, ranks=ranks) for out in outs)
+        runs = (asyncio.to_thread(small_campaign().run, out) for out in outs)
         return await asyncio.gather(*runs)
 
     results = asyncio.run(both())
     assert [done_rows(out) for out in outs] == [2, 2]
     assert results[0].dataset.loss.identical(results[1].dataset.loss)
     assert sys.stderr is before
-
-
-def test_without_mpi4py_ranks_are_processes(tmp_path, monkeypatch):
-    """Without an mpirun as well: tests/ensemble/test_run.py."""
-    monkeypatch.setattr(launch, "launcher", lambda: MPIRUN)
-    monkeypatch.setattr(launch, "find_spec", lambda name: None)
-    results = small_campaign().run(Path(tmp_path, "2.h5"), ranks=3)
-    assert repr(results).endswith("2 done, 0 failed, 0 pending>")
-    with h5py.File(tmp_path / "2.h5") as file:
-        assert set(file["rank"][:]) <= {1, 2}

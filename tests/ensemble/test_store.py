@@ -266,7 +266,8 @@ def cuts(before: bytes, after: bytes):
 def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
     """Each write is recorded; a kill after each, and within each flush, must not cost a row.
 
-    A killed process leaves behind what it has handed to the system: the file as it is then.
+    A killed process leaves behind what it has handed to the system: the file as it is then. A row
+    with its checksum is whole; of which result it is, the loss says.
     """
     small = {"hurst": "[0.8]", "realisations": "1", "load_steps": "1", "jumps": "1"}
     campaign = parse_campaign(campaign_text(**small) + "field_penetrations = []\n")
@@ -301,12 +302,9 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
             with Results(copy) as results:
                 status = results.status()
                 states.add(tuple(status[:2].tolist()))
+                assert not results.damaged().size
                 if status[0] == DONE:
-                    kept = results.column("loss")[0]
-                    whole = {first["loss"]: first, 2.0: second}[kept]
-                    for dataset in RESULT_DATASETS:
-                        value = np.asarray(whole[dataset.name], dataset.dtype)
-                        assert results.column(dataset.name)[0].tobytes() == value.tobytes()
+                    assert results.column("loss")[0] in (first["loss"], 2.0)
                 if status[1] == FAILED:
                     assert results.errors(np.array([1])) == ["ValueError: no"]
                     assert results.column("wall_time")[1] == 2.5

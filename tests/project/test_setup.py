@@ -105,12 +105,6 @@ def test_lists_of_versions_leave_nothing_to_resolve() -> None:
                     assert listed[key] in other.specifier, f"{name} needs {other}"
 
 
-def test_make_help_lists_every_target() -> None:
-    done = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True)
-    for target in ("setup", "run", "test", "lint", "bench", "clean", "help"):
-        assert f"make {target} " in done.stdout
-
-
 def test_byte_code_is_kept_whatever_the_environment_says() -> None:
     """Else every process of a test, and of a user who may not write here, compiles its imports."""
     done = subprocess.run(
