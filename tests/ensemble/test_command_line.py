@@ -217,7 +217,7 @@ def test_an_option_that_is_given_twice_is_refused(words, capsys):
 @pytest.mark.parametrize(
     "words",
     [
-        *("run c.toml --out {}.h5", "run c.toml --out {}.h5 --ranks 2", "run {}.toml"),
+        *("run c.toml --out {}.h5", "run {}.toml"),
         *("new {}.toml", "sample {}.csv", "merge a.h5 --out {}.h5", "merge {}.h5 --out a.h5"),
         *("status {}.h5", "verify {}.h5", "report {}.h5 --to x", "bench --to {}", "doctor --in {}"),
         *("trace {}.csv --to x CONTACT", "trace c.csv --to {} CONTACT"),

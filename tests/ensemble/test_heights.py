@@ -68,18 +68,6 @@ def test_every_usual_text_gives_the_same_heights(kind: str, tmp_path: Path) -> N
     np.testing.assert_allclose(read_heights(path, **options), WAVE, rtol=0, atol=2e-15)
 
 
-@pytest.mark.parametrize("header", ["z (µm)", "z (μm)", "z (um)", "z / µm", "Height in microns"])
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
-def test_micrometres_are_recognised_in_every_encoding(
-    header: str, encoding: str, tmp_path: Path
-) -> None:
-    if encoding == "latin-1" and "μ" in header:
-        pytest.skip("Latin-1 has no Greek letters")
-    path = tmp_path / "a.csv"
-    path.write_bytes("\n".join([header, *(f"{1e6 * h:.9f}" for h in WAVE)]).encode(encoding))
-    np.testing.assert_allclose(read_heights(path), WAVE, rtol=0, atol=2e-15)
-
-
 def test_an_array_is_read_in_metres_or_the_unit_given(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", 1e9 * WAVE[:, None])
     np.testing.assert_allclose(read_heights(tmp_path / "a.npy", unit="nm"), WAVE, rtol=1e-12)

@@ -137,6 +137,7 @@ def test_fields_are_written_at_mean_stresses(tmp_path, capsys):
     assert found["branch"].tolist() == ["unloading"]
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     rng = np.random.default_rng(1)
     x = np.linspace(0, 1e-3, 200)
@@ -184,6 +185,7 @@ def text_of(
     return text.replace("max_penetration = 0.6", cycle)
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
     """Run, status, extend, run again, and report; each row is the loop of its preload."""
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"

@@ -71,9 +71,10 @@ def test_where_there_is_no_mpi_processes_compute_what_ranks_would(tmp_path, monk
         assert set(file["rank"][:]) == {1, 2}
 
 
-def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path):
+def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     write_campaign(tmp_path, "mine.toml")
-    assert adhesis("run", "mine.toml", fake="", cwd=tmp_path).returncode == 0
+    assert adhesis_here("run", "mine.toml", fake="").returncode == 0
     assert (tmp_path / "mine.h5").exists()
 
 
@@ -332,7 +333,7 @@ def test_an_existing_results_file_keeps_its_name(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "old.dat"
     run(tmp_path)
     (tmp_path / "r.h5").rename(out)
-    assert adhesis("run", path, "--out", out, fake="").returncode == 0
+    assert adhesis_here("run", path, "--out", out, fake="").returncode == 0
 
 
 def test_a_results_file_of_another_campaign(tmp_path):
@@ -353,7 +354,7 @@ def test_a_read_only_folder(tmp_path):
     folder = tmp_path / "locked"
     folder.mkdir(mode=0o500)
     path = write_campaign(tmp_path)
-    process = adhesis("run", path, "--out", folder / "r.h5")
+    process = adhesis_here("run", path, "--out", folder / "r.h5")
     assert process.returncode == 2
     assert "is read-only" in process.stderr
 

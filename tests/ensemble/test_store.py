@@ -385,7 +385,7 @@ def test_a_disk_that_is_too_small_is_met_before_the_first_task(tmp_path, campaig
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_leaves_nothing(campaign):
+def test_a_full_disk_leaves_nothing(tmp_path):
     """/dev/full cannot hold a file; a limit on file size fails writes in the same place."""
     code = (
         "import sys, resource, signal; sys.path[:0] = sys.argv[2:]\n"
@@ -398,18 +398,13 @@ def test_a_full_disk_leaves_nothing(campaign):
         "try:\n    create(sys.argv[1], parse_campaign(campaign_text()))\n"
         "except WriteError as error:\n    print(error, flush=True)\n"
     )
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder:
-        target = f"{folder}/r.h5"
-        run = subprocess.run(
-            [sys.executable, "-c", code, target, str(ROOT)],
-            capture_output=True,
-            text=True,
-        )
-        assert run.stdout == f"{target} cannot be written: File too large\n"
-        assert (run.returncode, run.stderr) == (0, "")  # HDF5 would crash it at its end
-        assert not os.listdir(folder)
+    target = tmp_path / "r.h5"
+    run = subprocess.run(
+        [sys.executable, "-c", code, target, str(ROOT)], capture_output=True, text=True
+    )
+    assert run.stdout == f"{target} cannot be written: File too large\n"
+    assert (run.returncode, run.stderr) == (0, "")  # HDF5 would crash it at its end
+    assert not list(tmp_path.iterdir())
 
 
 # ---------------------------------------------------------------- scale and lock

@@ -357,6 +357,7 @@ def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer:
     assert (change.run.name, change.factor) == ("noise 1", 0.0)
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_figures_of_an_earlier_page_do_not_stay_beside_a_new_one(
     spoiled_answer: Answer, tmp_path: Path
 ) -> None:
@@ -367,7 +368,7 @@ def test_figures_of_an_earlier_page_do_not_stay_beside_a_new_one(
     figures = sorted(path.name for path in tmp_path.glob("*.png"))
     assert figures == ["loop.png", "mine.png", "spectrum.png", "trace.png"]
     assert not (tmp_path / "tables.pdf").exists()
-    assert (tmp_path / "loop.png").read_bytes() != b"old"
+    assert (tmp_path / "loop.png").read_bytes() != b"old"  # figures are not drawn here
 
 
 def test_loops_that_failed_are_named_last_in_one_warning(spoiled_answer: Answer) -> None:
@@ -381,6 +382,7 @@ def test_loops_that_failed_are_named_last_in_one_warning(spoiled_answer: Answer)
     assert "“noise 2” did not end (Reason: b)" in last
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_path: Path) -> None:
     """A ridge of 9 µm on a roughness of 1 µm, pressed to half its height."""
     x = 1e-6 * np.arange(1000)
@@ -553,12 +555,10 @@ def coverage() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("number", [0, 1])
-def test_known_losses_lie_within_their_intervals(
-    number: int, coverage: ModuleType, tmp_path: Path
-) -> None:
-    """Two cases of the benchmark with fewer waves; all of it: benchmarks/trace_coverage.py."""
-    row = coverage.judged(coverage.case(number, waves=40), tmp_path)
+@pytest.mark.usefixtures("quick_figures")
+def test_known_losses_lie_within_their_intervals(coverage: ModuleType, tmp_path: Path) -> None:
+    """A case of the benchmark with fewer waves; all of it: benchmarks/trace_coverage.py."""
+    row = coverage.judged(coverage.case(1, waves=40), tmp_path)
     assert row["loss"]["covered"], row
     assert answers.QUANTITIES.keys() <= row.keys()
 
