@@ -317,10 +317,7 @@ def test_a_cell_that_is_new_is_tried_before_the_file_grows(tmp_path):
 
 
 def test_bad_options(tmp_path):
-    assert "--redo is 'some'" in refused(tmp_path, "--redo", "some")
-    assert "--hurst needs --redo" in refused(tmp_path, "--hurst", "0.7")
-    assert "walltime is '3 weeks'" in refused(tmp_path, "--walltime", "3 weeks")
-    assert "--max-failures is '-1'" in refused(tmp_path, "--max-failures", "-1")
+    """Of single options: test_command_line.py."""
     assert "no folder" in refused(tmp_path, "--out", tmp_path / "none" / "r.h5")
     assert "is a directory" in refused(tmp_path, "--out", tmp_path)
     sentence = "the name of a new results file must end in .h5"

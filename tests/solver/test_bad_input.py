@@ -415,8 +415,9 @@ CASES = [
 @pytest.mark.parametrize(("call", "end"), CASES, ids=[call for call, _ in CASES])
 def test_bad_input_is_refused_in_one_sentence(call: str, end: str) -> None:
     error, sentence = end.split(": ", 1)
-    with pytest.raises(eval(error)) as caught:
-        eval(call)
+    names = {**{name: getattr(adhesis, name) for name in adhesis.__all__}, **globals()}
+    with pytest.raises(eval(error, names)) as caught:
+        eval(call, names)
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
     assert "--" not in str(caught.value)
