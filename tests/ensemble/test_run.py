@@ -88,40 +88,29 @@ def test_a_finished_campaign_computes_nothing_again(tmp_path):
     assert out.read_bytes() == before
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The fake campaign, run to its end at once."""
+    return run(tmp_path_factory.mktemp("whole"))[1]
+
+
 @pytest.mark.parametrize(
-    ("number", "name"), [(signal.SIGUSR1, "SIGUSR1"), (signal.SIGINT, "Ctrl-C (SIGINT)")]
+    ("number", "name"),
+    [(signal.SIGUSR1, "SIGUSR1"), (signal.SIGINT, "Ctrl-C (SIGINT)"), (signal.SIGKILL, "")],
 )
-def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, number, name):
+def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, whole, number, name):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = start("run", path, "--out", out, fake="hold=2")
     wait_until(lambda: done_rows(out) >= 2)
     process.send_signal(number)
     _, errors = process.communicate(timeout=150)  # the task would go on for ever
-    assert process.returncode == 75
-    assert f"stopped early: {name} received" in errors
+    assert process.returncode == (75 if name else -signal.SIGKILL)
+    assert not name or f"stopped early: {name} received" in errors
     kept = done_rows(out)
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}")
     assert process.returncode == 0
     assert len(log.read_text().splitlines()) == 8 - kept
-    (tmp_path / "whole").mkdir()
-    _, whole = run(tmp_path / "whole")
-    assert differences(out, whole) == []
-
-
-def test_a_killed_run_resumes_with_the_same_bits(tmp_path):
-    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, fake="hold=3")
-    wait_until(lambda: done_rows(out) >= 3)
-    process.kill()
-    process.communicate()
-    kept = done_rows(out)
-    log = tmp_path / "log"
-    process, _ = run(tmp_path, fake=f"log={log}")
-    assert process.returncode == 0
-    assert len(log.read_text().splitlines()) == 8 - kept
-    (tmp_path / "whole").mkdir()
-    _, whole = run(tmp_path / "whole")
     assert differences(out, whole) == []
 
 
@@ -172,7 +161,7 @@ def test_a_campaign_on_further_axes(tmp_path):
     assert "cannot grow by profile.ratio: the bins of its spectra would change" in process.stderr
 
 
-def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path):
+def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path, whole):
     process, out = run(tmp_path, fake="fail=0.7:*:1")
     assert process.returncode == 1
     assert "failed: H = 0.7, γ = 0.01 J/m², realisation 1: FloatingPointError" in process.stderr
@@ -188,8 +177,6 @@ def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path):
     assert log.read_text() == "0.7:0.04:1\n"
     process, _ = run(tmp_path, "--redo", "failed")
     assert process.returncode == 0
-    (tmp_path / "whole").mkdir()
-    _, whole = run(tmp_path / "whole")
     assert differences(out, whole) == []
 
 
