@@ -249,6 +249,18 @@ def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
     assert line.startswith("adhesis trace: unrecognized arguments: --speed (")
 
 
+def required(name: str) -> list[str]:
+    """Return words with all that a command requires."""
+    words = []
+    for action in parser_of(name)._actions:
+        value = str(next(iter(action.choices))) if action.choices else "1"
+        if action.option_strings and action.required:
+            words += [action.option_strings[-1], value]
+        elif not action.option_strings and action.nargs not in ("?", "*"):
+            words.append(value)
+    return words
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_refuses_what_it_cannot_read(name, capsys):
     """An unknown option, a missing value, an empty one, and a text in place of a number."""
@@ -266,14 +278,6 @@ def test_every_option_refuses_what_it_cannot_read(name, capsys):
             many = "9" * 5000
             assert len(refused(capsys, [name, option, many])) < 250
             assert f"{option} is '1.5': it must be" in refused(capsys, [name, option, "1.5"])
-
-
-def required(name: str) -> list[str]:
-    words = []
-    for action in parser_of(name)._actions:
-        if action.required:
-            words += [*action.option_strings[-1:], (action.choices or ["1"])[0]]
-    return words
 
 
 @pytest.mark.parametrize("words", [["speed"], ["--speed"], ["Run"], ["-n", "3"], ["", "run"]])
@@ -297,24 +301,15 @@ def test_the_parser_keeps_the_names_and_values_of_its_options(capsys):
 # ---------------------------------------------------------------------- help
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", [*COMMANDS, ""])
 def test_help_ends_with_two_examples_that_are_understood(name, capsys):
-    assert main([name, "--help"]) == 0
+    assert main([*filter(None, [name]), "--help"]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[-3] == "examples:"
     for line in shown[-2:]:
         program, command, *words = shlex.split(line)
-        assert (program, command) == ("adhesis", name)
-        parser_of(name).parse(words)
-
-
-def test_the_overview_ends_with_two_examples_that_are_understood(capsys):
-    assert main(["--help"]) == 0
-    shown = capsys.readouterr().out.splitlines()
-    assert shown[-3] == "examples:"
-    for line in shown[-2:]:
-        _, name, *words = shlex.split(line)
-        parser_of(name).parse(words)
+        assert (program, command) == ("adhesis", name or command)
+        parser_of(command).parse(words)
 
 
 def test_help_of_the_methods_names_them_all(capsys):
@@ -464,23 +459,11 @@ def test_ranks_are_bounded_by_cores_and_nodes():
 # ---------------------------------------------------------------------- abbreviations
 
 
-def filled(parser: argparse.ArgumentParser) -> list[str]:
-    """Return words with all that a command requires."""
-    words = []
-    for action in parser._actions:
-        value = str(next(iter(action.choices))) if action.choices else "1"
-        if action.option_strings and action.required:
-            words += [action.option_strings[0], value]
-        elif not action.option_strings and action.nargs not in ("?", "*"):
-            words.append(value)
-    return words
-
-
 @pytest.mark.parametrize("name", COMMANDS)
 def test_no_option_can_be_abbreviated(name, capsys):
     """What passes options on, as the batch scripts do, knows them by their whole names."""
     parser = parser_of(name)
-    words, options = filled(parser), set(parser._option_string_actions)
+    words, options = required(name), set(parser._option_string_actions)
     parser.parse(words)
     short = {o[:end] for o in options if o.startswith("--") for end in range(3, len(o))} - options
     assert short

@@ -48,6 +48,14 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
 FIGURES = ["cut-off.png", "loop.png", "spectrum.png", "tables.png", "trace.png"]
 
 
+def only(plan: Plan, *names: str) -> Plan:
+    """Return the plan with these runs alone."""
+    runs = tuple(run for run in plan.runs if run.name in names)
+    return dataclasses.replace(
+        plan, runs=runs, jobs=tuple(job for job in plan.jobs if job.name in names)
+    )
+
+
 def prepared() -> Prepared:
     heights = PROFILE.at(X) + 1e-3 * X + 5e-9 * np.random.default_rng(0).standard_normal(N)
     return prepare_trace(Trace(heights, LENGTH / N, "t.txt"))
@@ -170,12 +178,7 @@ def test_a_preload_is_the_turning_point_of_a_trace() -> None:
     """Under a load to 300 Pa, with the table of a third and two thirds of it."""
     cycle = make_cycle(HALF_SPACE, 0.005, 300.0, 4, "auto", 1e-2, Control(0.0))
     plan = make_plan(prepared(), cycle, processes=0)
-    kept = {"answer", "p̄ 100", "p̄ 200"}
-    plan = dataclasses.replace(
-        plan,
-        runs=tuple(run for run in plan.runs if run.name in kept),
-        jobs=tuple(job for job in plan.jobs if job.name in kept),
-    )
+    plan = only(plan, "answer", "p̄ 100", "p̄ 200")
     answer = run_plan(prepared(), cycle, plan)
     for name, stress in (("answer", 300), ("p̄ 100", 100), ("p̄ 200", 200)):
         found = answer.result(name)
@@ -232,10 +235,7 @@ def small_plan() -> tuple[Prepared, Any, Plan]:
     trace = prepared()
     cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3)
     plan = make_plan(trace, cycle, quick=True, processes=0)
-    kept = {"answer", "blend 10 %", "noise 1"}
-    runs = tuple(run for run in plan.runs if run.name in kept)
-    jobs = tuple(job for job in plan.jobs if job.name in kept)
-    return trace, cycle, dataclasses.replace(plan, runs=runs, jobs=jobs)
+    return trace, cycle, only(plan, "answer", "blend 10 %", "noise 1")
 
 
 def spoiled(plan: Plan, name: str) -> Plan:
@@ -390,12 +390,7 @@ def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_pat
     trace = prepare_trace(Trace(z, 1e-6, "t.txt"))
     cycle = make_cycle(HALF_SPACE, 0.001, 0.5, 4, "auto", 1e-2)
     plan = make_plan(trace, cycle, quick=True, processes=0)
-    kept = {"answer", "without single features"}
-    plan = dataclasses.replace(
-        plan,
-        runs=tuple(run for run in plan.runs if run.name in kept),
-        jobs=tuple(job for job in plan.jobs if job.name in kept),
-    )
+    plan = only(plan, "answer", "without single features")
     answer = run_plan(trace, cycle, plan)
     assert answer.warnings[0].startswith("a single crest at 640 µm stands")
     assert answer.warnings[1].startswith("one crest at 640 µm carries all contact")
@@ -452,12 +447,7 @@ def test_unphysical_input_is_doubted_and_zero_range_comes_first() -> None:
     trace, cycle, plan = small_plan()
     hard = dataclasses.replace(cycle, works_of_adhesion=(30.0,))
     plan = make_plan(trace, hard, quick=True, processes=0)
-    kept = {"answer"}
-    plan = dataclasses.replace(
-        plan,
-        runs=tuple(run for run in plan.runs if run.name in kept),
-        jobs=tuple(job for job in plan.jobs if job.name in kept),
-    )
+    plan = only(plan, "answer")
     found = run_plan(trace, hard, plan)
     assert found.pull_off_stress.value > 0.3 * 1e6
     assert any("of Young's modulus: small strain does not hold" in text for text in found.warnings)
