@@ -292,6 +292,9 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
         writer.reset([0, 1])
         writer.write_result(0, second)
         writer.write_result(1, fake_result(campaign, tasks[1]))
+    Results(path).close()
+    # the bytes beside the rows have their checksum at every moment: attributes are compared once
+    monkeypatch.setattr(Results, "_check_attributes", lambda _: None)
     copy, seen, states = tmp_path / "copy.h5", set(), set()
     for before, after in itertools.pairwise(moments):
         for content in cuts(before, after):
