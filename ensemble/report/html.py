@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
@@ -82,10 +81,8 @@ def picture(png: bytes, name: str, kind: str = "") -> str:
 
 
 def picture_of(figure: Any) -> str:
-    """Return a figure of matplotlib's as an element that holds it."""
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=110)
-    return picture(stream.getvalue(), "figure")
+    """Return a figure as a picture in HTML."""
+    return picture(figure._repr_png_(), "figure")
 
 
 def table_of(rows: Iterable[tuple[str, str]]) -> str:

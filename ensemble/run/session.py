@@ -17,7 +17,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
-from adhesis.ensemble.quantities import percent
+from adhesis.ensemble.quantities import duration, percent
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
@@ -181,6 +181,11 @@ class Summary:
     def pending(self) -> int:
         """Tasks still to do."""
         return self.total - self.done - self.failed
+
+    def __str__(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        now = f"{self.computed} computed in {duration(self.seconds)}"
+        return f"{self.done} of {self.total} tasks done{failed}; {now}"
 
 
 def run_campaign(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import parameter
-from adhesis.ensemble.quantities import duration, length_text
+from adhesis.ensemble.quantities import duration, length_text, stress_text
 from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.job import Job
 from adhesis.ensemble.trace.prepare import Prepared
@@ -75,9 +75,9 @@ class Cycle:
             held = "a fixed separation"
             if not self.control.is_fixed:
                 held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
-            return f"a preload of {point:g} Pa at {held}"
+            return f"a preload of {stress_text(point, 4)} at {held}"
         if self.control.is_load:
-            return f"p̄ = {point:g} Pa"
+            return f"p̄ = {stress_text(point, 4)}"
         if self.control.is_fixed:
             return f"Δ/h_max = {point:g}"
         return f"u_tot/h_max = {point:g} of a stiffness of {self.control.stiffness:.4g} Pa/m"

@@ -204,7 +204,7 @@ FACTORS: dict[str, tuple[str, object, float]] = {
     "a curve that contradicts its loss": ("mean_stress", ..., 2.0),
     "one state of the curve": ("mean_stress", 3, 1.001),
     "no numbers": ("mean_stress", ..., np.nan),
-    "a penetration": ("penetration", 2, 1.001),
+    "a penetration": ("penetration", 3, 1.01),
     "a drop": ("jump_energy_drop", 0, 2.0),
     "heights": ("coefficient_real", ..., 2.0),
     "infinite heights": ("coefficient_real", ..., np.inf),

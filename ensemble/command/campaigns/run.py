@@ -31,7 +31,7 @@ from adhesis.ensemble.exit_codes import (
     TOO_FEW_RESOURCES,
     WRITE_FAILED,
 )
-from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration
+from adhesis.ensemble.quantities import WORK_OF_ADHESION
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
@@ -257,11 +257,7 @@ def _report_end(
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
-    failed = f", {summary.failed} failed" if summary.failed else ""
-    say(
-        f"{path}: {summary.done} of {summary.total} tasks done{failed}; "
-        f"{summary.computed} computed in {duration(summary.seconds)}"
-    )
+    say(f"{path}: {summary}")
     if summary.failed:
         say(f"why they failed, and what to do: adhesis status {path}")
     for line in precision_lines(summary.precisions):
