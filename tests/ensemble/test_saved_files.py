@@ -207,7 +207,7 @@ FACTORS: dict[str, tuple[str, object, float]] = {
     "a penetration": ("penetration", 3, 1.01),
     "a drop": ("jump_energy_drop", 0, 2.0),
     "heights": ("coefficient_real", ..., 2.0),
-    "infinite heights": ("coefficient_real", ..., np.inf),
+    "infinite heights": ("coefficient_real", 1, np.inf),
 }
 ATTRIBUTES: dict[str, object] = {
     "loss": 1.0,
