@@ -24,11 +24,14 @@ class Rule:
         Returns the value as it will be used; ValueError if it breaks the rule.
     quantity : Quantity, optional
         Of the number, or of each one of a list, if it may have a unit.
+    bounds : Bounds, optional
+        Of the number, or of each one of a list.
     """
 
     text: str
     read: Callable[[object], Any]
     quantity: Quantity | None = None
+    bounds: Bounds | None = None
 
     def __call__(self, where: str, value: object) -> Any:
         """Return the value as it will be used.
@@ -69,7 +72,7 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
         return Written(number, value.unit) if isinstance(value, Written) else number
 
     example = "" if quantity is None else f', or a {quantity.name} as "{quantity.example}"'
-    return Rule(bounds.text + example, read, quantity)
+    return Rule(bounds.text + example, read, quantity, bounds)
 
 
 def positive_number(unit: str) -> Rule:
@@ -114,7 +117,8 @@ def list_of(rule: Rule, *, may_be_empty: bool = False) -> Rule:
             raise ValueError
         return values
 
-    return Rule(f"a list of different values, each {rule.text}", read, rule.quantity)
+    text = f"a list of different values, each {rule.text}"
+    return Rule(text, read, rule.quantity, rule.bounds)
 
 
 def list_of_names() -> Rule:

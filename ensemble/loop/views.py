@@ -85,7 +85,7 @@ def save(result: Result, path: str | os.PathLike[str]) -> None:
 def page(shown: Any) -> str:
     """Return the numbers of an object with their units, and its figure if it has one, as HTML."""
     from adhesis.ensemble.loop.loop_figure import draw_shape
-    from adhesis.ensemble.report.html import table_of
+    from adhesis.ensemble.report.html import picture_of, table_of
 
     if isinstance(shown, LoopResult | PathResult):
         return table_of(_rows_of_result(shown)) + picture_of(plot(shown))
@@ -102,7 +102,7 @@ def trace_summary(answer: Answer) -> str:
 
 def trace_page(answer: Answer) -> str:
     """Return the summary of a trace's answer and the figure of its loop as HTML."""
-    from adhesis.ensemble.report.html import table_of
+    from adhesis.ensemble.report.html import picture_of, table_of
     from adhesis.ensemble.trace.figures import draw_loop
 
     rows = [line.split(maxsplit=1) for line in str(answer).splitlines()]
@@ -183,13 +183,6 @@ def _rows(shown: Any) -> list[tuple[str, str]]:
         if not (value is None or (isinstance(value, tuple) and not value) or name in drawn)
     }
     return [(name, f"{text} {UNITS.get(name, '')}".rstrip()) for name, text in texts.items()]
-
-
-def picture_of(figure: Any) -> str:
-    """Return a figure as a picture in HTML."""
-    from adhesis.ensemble.report.html import picture
-
-    return picture(figure._repr_png_(), "figure")
 
 
 @contextmanager

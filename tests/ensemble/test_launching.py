@@ -90,7 +90,7 @@ def test_a_rank_hands_over_what_its_starter_reads(here, tmp_path, monkeypatch, c
 
 
 def test_every_line_of_a_rank_is_marked_once(monkeypatch, capfd):
-    monkeypatch.setenv(launch.STARTED, "/nowhere")
+    monkeypatch.setenv(launch.STARTED, "/dev/null/no-file")
     raw = streams._Stderr(2, "w", closefd=False)
     assert [raw.write(data) for data in (b"one\ntw", b"o\n", b"th\rree\n\n")] == [6, 2, 8]
     assert capfd.readouterr().err == "\x1eone\n\x1etwo\n\x1eth\rree\n\x1e\n"
@@ -199,7 +199,9 @@ def test_a_signal_before_the_ranks_have_met_ends_the_launcher(numbers, code, lau
 
 SITES = [
     {"OMPI_MCA_pml": "nosuch"},
-    {"OMPI_MCA_orte_default_hostfile": "/none", "PRTE_MCA_prte_default_hostfile": "/none"},
+    dict.fromkeys(
+        ("OMPI_MCA_orte_default_hostfile", "PRTE_MCA_prte_default_hostfile"), "/dev/null/no-file"
+    ),
     {"OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1"},
 ]
 

@@ -33,6 +33,7 @@ from tests.support import synthetic_results
 from tests.support.campaign_support import (
     MPIRUN,
     adhesis,
+    adhesis_here,
     campaign_text,
     differences,
     done_rows,
@@ -238,7 +239,7 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity)
         assert (group["quantity"], group["met"]) == (steered, True)
         assert str(known) in shown
     before = out.read_bytes()
-    again = adhesis("run", path, "--out", out, fake="")
+    again = adhesis_here("run", path, "--out", out, fake="")
     assert out.read_bytes() == before
     assert precision_lines(summary.precisions)[1] in again.stderr.splitlines()
 
@@ -342,6 +343,6 @@ def test_what_a_stop_may_be(tmp_path):
     assert phrase == "stop.quantity is 'loss' here and 'loss_dimensionless' there"
     path = tmp_path / "c.toml"
     path.write_text(text())
-    process = adhesis("run", path, "--part", "1/2", "--out", tmp_path / "p.h5")
+    process = adhesis_here("run", path, "--part", "1/2", "--out", tmp_path / "p.h5")
     assert process.returncode == 2
     assert "its batches are decided on whole cells" in process.stderr

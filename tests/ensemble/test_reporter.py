@@ -5,9 +5,7 @@ from __future__ import annotations
 import io
 import time
 
-import pytest
-
-from adhesis.ensemble.reporter import StatusLine, ticking
+from adhesis.ensemble.reporter import ticking
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 
 
@@ -54,33 +52,6 @@ def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(mo
 class _Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
-
-
-@pytest.mark.parametrize(
-    ("stream", "expected"),
-    [
-        (
-            _Terminal(),
-            ["", "\x1b[Kstep 0", "\x1b[Kstep 1", "\x1b[Kstep 2", "\x1b[K" + 79 * "x" + "\n"],
-        ),
-        (io.StringIO(), ["step 2\n" + 200 * "x" + "\n"]),
-    ],
-    ids=["terminal", "file"],
-)
-def test_a_line_is_rewritten_on_a_terminal_and_written_anew_elsewhere(
-    stream: io.StringIO, expected: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr("sys.stderr", stream)
-    monkeypatch.setenv("COLUMNS", "80")
-    line = StatusLine(every=5.0)
-    for step in range(3):
-        now[0] = 2.6 * step
-        line.show(lambda step=step: f"step {step}")  # type: ignore[misc]
-    line.show(lambda: 200 * "x", last=True)
-    assert line.seconds == 5.2
-    assert stream.getvalue().split("\r") == expected
 
 
 def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> None:

@@ -223,11 +223,6 @@ def test_no_variation_is_read_as_another_trace(tmp_path: Path) -> None:
     assert sum(read for read, _ in found) > 0.4 * VARIATIONS
 
 
-@pytest.mark.parametrize("seed", [0])
-def test_the_same_seed_writes_the_same_text(seed: int) -> None:
-    assert draw_text(seed).data == draw_text(seed).data
-
-
 def column_text(seed: int) -> tuple[list[str], dict[str, object]]:
     """Draw the heights of a single column that nothing else stands in, and its options."""
     text = draw_text(seed)

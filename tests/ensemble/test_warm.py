@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -197,17 +196,6 @@ def test_compiling_that_takes_a_while_is_reported_and_a_moment_is_not(places, co
     lines.clear()
     compile_for(0.5, lambda: ensemble_warm.warm_up(["sharp", "grid"], lines.append))
     assert lines == []
-
-
-def test_more_functions_than_estimated_are_counted_alone(compile_for, monkeypatch):
-    """As after an update of the source, whose marks say that all is compiled."""
-    lines: list[str] = []
-    for estimate, first in ((0, ": once"), (5, ": about 5 functions, once")):
-        lines.clear()
-        monkeypatch.setattr(ensemble_warm, "functions_of", lambda *_, n=estimate, **__: n)
-        compile_for(32.0, lambda: ensemble_warm.warm_up(["sharp", "grid"], lines.append))
-        assert lines[0].endswith(first)
-        assert re.fullmatch(r"compiling: \d+ functions so far in \d+ s", lines[1])
 
 
 @pytest.mark.parametrize("quiet", [False, True])
