@@ -16,9 +16,10 @@ from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
+from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.variants import Cycle, Plan, Run, default_tables, make_plan
+from adhesis.ensemble.trace.variants import Plan, Run, default_tables, make_plan
 from adhesis.solver import views
 from adhesis.solver.checks import (
     ACCURACY,
@@ -41,11 +42,8 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.registry import METHOD_NAMES, MethodName
 from adhesis.solver.values import ByValue, finite
 
-QUANTITIES = {
-    "loss": "J/m²",
-    "pull_off_stress": "Pa",
-    "contact_fraction": "",
-}
+QUANTITIES = ("loss", "pull_off_stress", "contact_fraction")
+"""Numbers of the answer that have doubts, in J/m², in Pa, and dimensionless."""
 
 # A doubt counts with the root mean square change of its variants; the interval is so many times
 # the root of their sum of squares. Measured on profiles of known loss: docs/measured-profile.md.
@@ -94,7 +92,7 @@ class NoAnswer(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Uncertain:
     """A number of the answer.
 
     Attributes
@@ -143,7 +141,7 @@ class Answer(ByValue):
 
     Attributes
     ----------
-    loss, pull_off_stress, contact_fraction : Quantity
+    loss, pull_off_stress, contact_fraction : Uncertain
     results : dict
         Numbers of each loop by name (:func:`adhesis.ensemble.trace.job.run`); a text if it
         failed.
@@ -156,9 +154,9 @@ class Answer(ByValue):
     cycle: Cycle
     plan: Plan
     results: dict[str, Result | str]
-    loss: Quantity
-    pull_off_stress: Quantity
-    contact_fraction: Quantity
+    loss: Uncertain
+    pull_off_stress: Uncertain
+    contact_fraction: Uncertain
     warnings: tuple[str, ...]
     seconds: float = field(compare=False)
 
@@ -491,7 +489,7 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
     main = results.get("answer")
     if not isinstance(main, dict):
         raise NoAnswer(f"the loop could not be run to its end: {main}")
-    bare = {name: Quantity(float(main[name]), 0.0, {}) for name in QUANTITIES}
+    bare = {name: Uncertain(float(main[name]), 0.0, {}) for name in QUANTITIES}
     draft = Answer(prepared, cycle, plan, results, warnings=(), seconds=0.0, **bare)
     quantities = {name: _quantity(draft, name) for name in QUANTITIES}
     return Answer(
@@ -515,7 +513,7 @@ def _several(name: str, value: Several) -> Sequence[float]:
 # ---------------------------------------------------------------------- doubts
 
 
-def _quantity(answer: Answer, name: str) -> Quantity:
+def _quantity(answer: Answer, name: str) -> Uncertain:
     value = float(answer.main[name])
     doubts = {}
     neighbours = _neighbours(answer)
@@ -534,7 +532,7 @@ def _quantity(answer: Answer, name: str) -> Quantity:
         numerics = abs(answer.main["audit_residual"]) if error is None else abs(error) / abs(value)
         doubts["numerics"] = float(numerics)
     spread = float(np.sqrt(sum(d * d for d in doubts.values())))
-    return Quantity(value, abs(value) * max(LEAST, COVERAGE * spread), doubts)
+    return Uncertain(value, abs(value) * max(LEAST, COVERAGE * spread), doubts)
 
 
 def _cut_offs(answer: Answer) -> dict[float, str]:
@@ -554,7 +552,7 @@ def _neighbours(answer: Answer) -> list[str]:
     return [name for factor, name in names.items() if factor < 1 or factor in longer]
 
 
-def _warnings(answer: Answer, loss: Quantity) -> list[str]:
+def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     """Return what is doubtful: what changes the answer most first, loops that failed last."""
     found = [*answer.main["preload_warnings"], *_one_patch(answer), *_not_converged(answer)]
     if loss.relative > 0.5:
@@ -682,10 +680,10 @@ def document(answer: Answer) -> dict[str, Any]:
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
         "preload": cycle.turning_points[0] if cycle.at_preload else None,
         "load_steps": cycle.load_steps,
-        "loss": _plain(answer.loss),
+        "loss": asdict(answer.loss),
         "loss_over_work_of_adhesion": answer.main["loss_over_work_of_adhesion"],
-        "pull_off_stress": _plain(answer.pull_off_stress),
-        "contact_fraction": _plain(answer.contact_fraction),
+        "pull_off_stress": asdict(answer.pull_off_stress),
+        "contact_fraction": asdict(answer.contact_fraction),
         "valid_range": answer.valid_range,
         "edge_range": answer.edge_range,
         "touch_range": answer.touch_range,
@@ -705,12 +703,4 @@ def document(answer: Answer) -> dict[str, Any]:
         ],
         "warnings": list(answer.warnings),
         "seconds": answer.seconds,
-    }
-
-
-def _plain(quantity: Quantity) -> dict[str, Any]:
-    return {
-        "value": quantity.value,
-        "uncertainty": quantity.uncertainty,
-        "doubts": quantity.doubts,
     }

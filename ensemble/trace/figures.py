@@ -22,10 +22,10 @@ from adhesis.ensemble.report.figures.style import (
     style,
 )
 from adhesis.ensemble.trace.answer import Answer
+from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.page_files import FIGURES
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
-from adhesis.ensemble.trace.variants import Cycle
 from adhesis.solver.model.measured_profile import trace_spectrum
 from adhesis.solver.model.profile import Array
 

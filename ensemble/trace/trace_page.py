@@ -17,7 +17,7 @@ from adhesis.ensemble.quantities import (
     with_error,
 )
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
+from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Uncertain, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
@@ -121,7 +121,7 @@ def write_all(answer: Answer, folder: Path) -> Path:
 # ---------------------------------------------------------------------- content
 
 
-def _value(quantity: Quantity, by: float, unit: str, most: float = math.inf) -> str:
+def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) -> str:
     """Return a quantity that is not negative, with its interval."""
     unit = f" {unit}" if unit else ""
     known = with_error(by * quantity.value, by * quantity.uncertainty, 0.0, most)

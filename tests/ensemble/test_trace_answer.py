@@ -225,7 +225,7 @@ def test_the_command_passes_control_and_turning_points(
 def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
     cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3, Control(1e9))
     plan = make_plan(prepared(), cycle, quick=True, processes=0)
-    assert {job.stiffness for job in plan.jobs} == {1e9}
+    assert {job.cycle.control.stiffness for job in plan.jobs} == {1e9}
     assert cycle.turn(0.3) == "u_tot/h_max = 0.3 of a stiffness of 1e+09 Pa/m"
 
 
@@ -242,7 +242,7 @@ def small_plan() -> tuple[Prepared, Any, Plan]:
 def spoiled(plan: Plan, name: str) -> Plan:
     """The same plan, with a loop that cannot be run."""
     jobs = tuple(
-        dataclasses.replace(job, method="nonsense") if job.name == name else job
+        dataclasses.replace(job, turning_point=2.0) if job.name == name else job
         for job in plan.jobs
     )
     return dataclasses.replace(plan, jobs=jobs)
@@ -532,7 +532,7 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     found = prepare_trace(trace)
     plan = make_plan(found, make_cycle(HALF_SPACE, 0.001, 0.9, 40, "auto", 1e-3), processes=2)
     assert plan.waves == pytest.approx(0.95 * n / 5, rel=0.01)
-    sizes = {job.name: job.coefficients.size - 1 for job in plan.jobs}
+    sizes = {job.name: job.profile.highest_harmonic for job in plan.jobs}
     assert sizes["taper 5 %"] < 8000 < sizes["answer"]
     reference = {run.name: run.reference for run in plan.runs}
     assert reference["taper 5 %"] == "cut-off × 4"
