@@ -16,14 +16,34 @@ _MOST_FAILURES_SHOWN = 5
 
 @dataclass
 class Counts:
-    """Numbers of tasks that a run has to do and has done."""
+    """Numbers of tasks of a run.
+
+    Attributes
+    ----------
+    total, done, failed : int
+        In the results file, or the part of it that is asked for.
+    computed, failed_now : int
+        Of these, by this run.
+    doubtful : int
+        Losses, of those computed now, whose own checks say that they are wrong
+        (:mod:`adhesis.ensemble.task.doubt`).
+    beyond_limit : int
+        Losses, of those computed now, that are those of the zero-range limit alone
+        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`).
+    """
 
     total: int
-    done_before: int
     done: int = 0
     failed: int = 0
+    computed: int = 0
+    failed_now: int = 0
     doubtful: int = 0
     beyond_limit: int = 0
+
+    @property
+    def pending(self) -> int:
+        """Tasks still to do."""
+        return self.total - self.done - self.failed
 
 
 def _interval(elapsed: float) -> float:
@@ -84,12 +104,12 @@ class ProgressLine:
 
     def _text(self) -> str:
         c = self._counts
-        parts = [f"{c.done_before + c.done} of {c.total} tasks done"]
-        if c.failed:
-            parts.append(f"{c.failed} failed")
-        if c.done:
+        parts = [f"{c.done} of {c.total} tasks done"]
+        if c.failed_now:
+            parts.append(f"{c.failed_now} failed")
+        if c.computed:
             parts.append(f"{duration(self._line.seconds)} so far")
         left = self._time_left()
-        if left is not None and c.done_before + c.done + c.failed < c.total:
+        if left is not None and c.pending:
             parts.append(f"about {duration(left)} left")
         return ", ".join(parts)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, S
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, Self, TextIO
+from typing import Any, TextIO
 
 import h5py
 
@@ -40,52 +40,10 @@ from adhesis.ensemble.run.ranks import MpiChannel, OneRank, one_a_node_first, to
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.ensemble.task.compute import Runner, check_task, methods_of
-from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
+from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
 from adhesis.solver.loading.loop import Progress
-
-
-@dataclass(frozen=True)
-class RowSummary:
-    """Numbers of a row that a worker wrote, for the master.
-
-    Attributes
-    ----------
-    loss, loss_error : float
-        In J/m².
-    audit_residual : float
-    doubtful : bool
-        See :mod:`adhesis.ensemble.task.doubt`.
-    steered : float
-        The quantity of ``[stop]``.
-    beyond_limit : bool
-        See :func:`adhesis.ensemble.task.doubt.beyond_zero_range`.
-    """
-
-    loss: float
-    audit_residual: float
-    loss_error: float
-    doubtful: bool
-    steered: float
-    beyond_limit: bool
-
-
-class RowWriter(Protocol):
-    """Destination of rows: :class:`adhesis.ensemble.results.write.Writer`."""
-
-    def write_result(self, row: int, result: Row, rank: int = 0) -> None:
-        """Write the row of a task that was computed."""
-
-    def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> None:
-        """Write the row of a task that failed."""
-
-    def mark(self, rows: Iterable[int], *, needed: bool) -> None:
-        """Mark rows without a result as to be computed, or as not needed."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: Any) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -113,7 +71,7 @@ class Engine:
 
     compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
     check: Callable[[Campaign, Task], None] = check_task
-    writer: Callable[[Path, Any, Callable[[int], str]], RowWriter] = Writer
+    writer: Callable[[Path, Any, Callable[[int], str]], Writer] = Writer
     all_write: bool = bool(h5py.get_config().mpi)
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
     methods: Callable[[Campaign, Iterable[Task]], Collection[str]] = methods_of
@@ -148,39 +106,21 @@ class Options:
     processes: int = 0
 
 
-@dataclass(frozen=True)
-class Summary:
-    """Result of a run: tasks by status in the file, and what it did itself.
+@dataclass
+class Summary(Counts):
+    """Result of a run: its counts, and how it ended.
 
     Attributes
     ----------
-    doubtful : int
-        Losses, of those computed now, whose own checks say that they are wrong
-        (:mod:`adhesis.ensemble.task.doubt`).
-    beyond_limit : int
-        Losses, of those computed now, that are those of the zero-range limit alone
-        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`).
     stopped : str or None
         Why it stopped before the last task.
     precisions : tuple of (str, Precision)
         With ``[stop]``: name of every cell, and how well the mean of its quantity is known.
     """
 
-    total: int
-    done: int
-    failed: int
-    computed: int
-    failed_now: int
-    seconds: float
-    doubtful: int
-    beyond_limit: int
-    stopped: str | None
+    seconds: float = 0.0
+    stopped: str | None = None
     precisions: tuple[tuple[str, Precision], ...] = ()
-
-    @property
-    def pending(self) -> int:
-        """Tasks still to do."""
-        return self.total - self.done - self.failed
 
 
 def run_campaign(
@@ -309,7 +249,7 @@ class _Session:
         self,
         campaign: Campaign,
         plan: Plan,
-        writer: RowWriter | None,
+        writer: Writer | None,
         options: Options,
         signals: StopSignals,
         engine: Engine,
@@ -323,7 +263,7 @@ class _Session:
         self._signals = signals
         self._started = time.monotonic()
         total = plan.done + plan.failed + len(plan.rows)
-        self._counts = Counts(total=total, done_before=plan.done)
+        self._counts = Counts(total, plan.done, plan.failed)
         self._groups: Mapping[int, Group] = {
             row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
         }
@@ -380,19 +320,11 @@ class _Session:
             progress.close()
 
     def summary(self, stopped: str | None) -> Summary:
-        done = self._plan.done + self._counts.done
-        failed = self._plan.failed + self._counts.failed
         batches = self._plan.batches
         return Summary(
-            total=self._counts.total,
-            done=done,
-            failed=failed,
-            computed=self._counts.done,
-            failed_now=self._counts.failed,
+            **vars(self._counts),
             seconds=time.monotonic() - self._started,
-            doubtful=self._counts.doubtful,
-            beyond_limit=self._counts.beyond_limit,
-            stopped=stopped if done + failed < self._counts.total else None,
+            stopped=stopped if self._counts.pending else None,
             precisions=() if batches is None else tuple(batches.precisions),
         )
 
@@ -406,45 +338,38 @@ class _Session:
         return self._compute(row, check_and_show)
 
     def _write(self, outcome: Outcome) -> Outcome:
+        """Write a row; of its numbers the master gets those by which it is judged."""
         assert self._writer is not None
-        if outcome.error is None:
-            self._writer.write_result(outcome.task, outcome.result, outcome.rank)
-        else:
-            self._writer.write_failure(outcome.task, outcome.error, outcome.seconds, outcome.rank)
-        summary = self._summarise(outcome.result, self._plan.tasks[outcome.task])
-        return replace(outcome, result=summary)
-
-    def _summarise(self, row: Row | None, task: Task) -> RowSummary | None:
-        if row is None:
-            return None
-        values = {**row, "work_of_adhesion": task.work_of_adhesion}
-        return RowSummary(
-            loss=float(row["loss"]),
-            audit_residual=float(row["audit_residual"]),
-            loss_error=float(row["loss_error"]),
-            doubtful=bool(doubtful(values, self._campaign.solver.accuracy)),
-            steered=float(row[self._campaign.stop.quantity]),
-            beyond_limit=bool(beyond_zero_range(values)),
-        )
+        task, rank = outcome.task, outcome.rank
+        if outcome.error is not None:
+            self._writer.write_failure(task, outcome.error, outcome.seconds, rank)
+            return outcome
+        self._writer.write_result(task, outcome.result, rank)
+        gamma = self._plan.tasks[task].work_of_adhesion
+        row = {**outcome.result, "work_of_adhesion": gamma}
+        judged = (*OF_DOUBT, self._campaign.stop.quantity)
+        return replace(outcome, result={name: row[name] for name in judged})
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
-        if outcome.error is None:
-            self._counts.done += 1
-            written: RowSummary = outcome.result
-            self._counts.beyond_limit += written.beyond_limit
-            if written.doubtful:
-                self._counts.doubtful += 1
-                what = str(self._plan.tasks[outcome.task])
-                share = 100 * written.loss_error / (abs(written.loss) or 1.0)
+        counts, what, row = self._counts, str(self._plan.tasks[outcome.task]), outcome.result
+        if outcome.error is not None:
+            counts.failed += 1
+            counts.failed_now += 1
+            progress.failure(what, outcome.error)
+        else:
+            counts.done += 1
+            counts.computed += 1
+            counts.beyond_limit += bool(beyond_zero_range(row))
+            if doubtful(row, self._campaign.solver.accuracy):
+                counts.doubtful += 1
+                share = 100 * row["loss_error"] / (abs(row["loss"]) or 1.0)
                 progress.doubt(
-                    f"{what}: audit residual {percent(written.audit_residual)}, "
+                    f"{what}: audit residual {percent(row['audit_residual'])}, "
                     f"estimated error {share:.2g} %"
                 )
-        else:
-            self._counts.failed += 1
-            progress.failure(str(self._plan.tasks[outcome.task]), outcome.error)
         if self._plan.batches is not None:
-            value = math.nan if outcome.error is not None else outcome.result.steered
+            steered = self._campaign.stop.quantity
+            value = math.nan if outcome.error is not None else float(row[steered])
             further, spare = self._plan.batches.finished(outcome.task, value)
             assert self._writer is not None
             self._writer.mark(spare, needed=False)
@@ -472,8 +397,8 @@ class _Session:
         if left is not None and left <= 0:
             return "the walltime ends"
         most = self._options.max_failures
-        if most is not None and self._counts.failed >= most:
-            return f"{self._counts.failed} tasks failed (the limit is --max-failures {most})"
+        if most is not None and self._counts.failed_now >= most:
+            return f"{self._counts.failed_now} tasks failed (the limit is --max-failures {most})"
         return None
 
     def _time_left(self) -> float | None:

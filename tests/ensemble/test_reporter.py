@@ -41,7 +41,7 @@ def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(mo
 
     now, log = [0.0], Log()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    progress = ProgressLine(Counts(total=10, done_before=0), lambda: None, log)
+    progress = ProgressLine(Counts(total=10), lambda: None, log)
     while now[0] < 36000.0:
         progress.tick()
         now[0] += 0.5
@@ -86,12 +86,14 @@ def test_a_line_is_rewritten_on_a_terminal_and_written_anew_elsewhere(
 def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> None:
     now, stream = [0.0], _Terminal()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    counts = Counts(total=3, done_before=1)
+    counts = Counts(total=3, done=1)
     progress = ProgressLine(counts, lambda: None, stream)
     progress.tick()
     progress.tick()  # too early
     progress.failure("H = 0.8", "diverged")
-    counts.done, counts.failed, now[0] = 1, 1, 2.0
+    counts.done = 2
+    counts.computed = counts.failed = counts.failed_now = 1
+    now[0] = 2.0
     progress.tick()
     progress.close()
     progress.close()
