@@ -17,10 +17,9 @@ from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, 
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
     FieldStates,
+    document,
     fields_at_stresses,
     loop_summary,
-    loops_document,
-    path_document,
     path_summary,
     write_npz,
 )
@@ -92,10 +91,10 @@ def execute(args: argparse.Namespace) -> int:
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
-            document = _document(results, warnings)
+            numbers = document(results, warnings)
             seed = (args.seed or 0) if source is None else None
-            document["provenance"] = provenance(args.words, source, seed, document)
-            write_json(args.json, document)
+            numbers["provenance"] = provenance(args.words, source, seed, numbers)
+            write_json(args.json, numbers)
     if args.csv is not None:
         from adhesis.ensemble.loop.saved import write_csv  # loads pandas
 
@@ -350,14 +349,6 @@ def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[floa
 
 
 # ---------------------------------------------------------------------- output
-
-
-def _document(
-    results: tuple[LoopResult, ...] | PathResult, warnings: Sequence[str]
-) -> dict[str, Any]:
-    if isinstance(results, PathResult):
-        return path_document(results, warnings)
-    return loops_document(results, warnings)
 
 
 def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:

@@ -54,22 +54,20 @@ def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
     return document | {"states": [dict(zip(columns, row, strict=True)) for row in rows]}
 
 
-def loops_document(results: Sequence[LoopResult], warnings: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the JSON document of loops with ascending turning points.
+def document(
+    results: Sequence[LoopResult] | PathResult, warnings: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Return the JSON document of a path, or of loops with ascending turning points.
 
-    That of the last one, and where there are several all of them, in order, as ``turns``.
-    ``warnings`` of the input stand before those of each loop.
+    That of the last loop, and where there are several all of them, in order, as ``turns``. The keys
+    of a path are those of a loop where they mean the same. ``warnings`` of the input stand before
+    those of each result.
     """
-    documents = [loop_document(result) for result in results]
-    for document in documents:
-        document["warnings"] = [*warnings, *document["warnings"]]
+    several = [results] if isinstance(results, PathResult) else results
+    documents = [loop_document(result) for result in several]
+    for one in documents:
+        one["warnings"] = [*warnings, *one["warnings"]]
     return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})
-
-
-def path_document(result: PathResult, warnings: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the JSON document of a path; the keys are those of a loop where they mean the same."""
-    document = loop_document(result)
-    return document | {"warnings": [*warnings, *document["warnings"]]}
 
 
 def _displacement(result: LoopResult | PathResult) -> dict[str, Any]:
