@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,8 @@ from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
-    FieldStates,
     document,
+    fields_at_penetrations,
     fields_at_stresses,
     loop_summary,
     path_summary,
@@ -78,13 +78,15 @@ def execute(args: argparse.Namespace) -> int:
     wanted = [*penetrations, *stresses]
     nodes = _field_nodes(args, method, wanted) if wanted else 0
     warm_missing([method.name], quiet=args.quiet, many_gaps=False)
-    picked = FieldStates(method, penetrations)
+    fields: dict[str, Any] = {}
     try:
-        results = _run(args, method, cycle, picked.visit if penetrations else None)
-        fields = picked.collect(nodes) if penetrations else {}
-        if stresses:
-            assert isinstance(results, tuple)
-            fields = fields_at_stresses(results[0], stresses, nodes)
+        results = _run(args, method, cycle)
+        if wanted:
+            assert isinstance(results, tuple)  # fields are those of one loop
+            if penetrations:
+                fields = fields_at_penetrations(results[0], method, penetrations, nodes)
+            else:
+                fields = fields_at_stresses(results[0], stresses, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return 1
@@ -128,10 +130,7 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _run(
-    args: argparse.Namespace,
-    method: Method,
-    cycle: Cycle,
-    on_state: Callable[[Branch, ContactState], None] | None,
+    args: argparse.Namespace, method: Method, cycle: Cycle
 ) -> tuple[LoopResult, ...] | PathResult:
     step = cycle.top(method.problem) / cycle.load_steps
     progress = None if args.quiet else _progress(step, cycle.control.is_load)
@@ -142,17 +141,13 @@ def _run(
             load_steps=cycle.load_steps,
             out=cycle.out,
             progress=progress,
-            on_state=on_state,
         )
     points, turns = cycle.turning_points, cycle.turns
     if len(points) > 1:
         turn = turns.arguments(points, cycle.control)
         return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turn)
     turn = turns.arguments(points[0], cycle.control)
-    loop = run_loop(
-        method, load_steps=cycle.load_steps, progress=progress, on_state=on_state, **turn
-    )
-    return (loop,)
+    return (run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn),)
 
 
 # ---------------------------------------------------------------------- input
