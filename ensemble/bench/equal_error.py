@@ -15,23 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.ensemble.bench.measure import Measured, Measurement, Run, measure
-from adhesis.ensemble.bench.scenes import FULL, GROWTH, QUICK, WARM_UP, Scene
+from adhesis.ensemble.bench.scenes import FULL, GROWTH, WARM_UP, Scene
 from adhesis.ensemble.bench.tamaas import has_tamaas
-
-__all__ = [
-    "FULL",
-    "GROWTH",
-    "QUICK",
-    "Exponent",
-    "Line",
-    "Quotient",
-    "Ratio",
-    "Reference",
-    "benchmark",
-    "exponents",
-    "growth",
-    "ratios",
-]
 
 # Doubling the nodes multiplies the time of a grid run by up to this factor.
 _COST_OF_DOUBLING = 4.0
