@@ -22,7 +22,7 @@ def log(text: str) -> None:
 
 @contextmanager
 def ticking(
-    task: Callable[[], str] | str, write: Callable[[str], None] = log, every: float = _EVERY
+    task: Callable[[], str], write: Callable[[str], None] = log, every: float = _EVERY
 ) -> Iterator[None]:
     """Log at intervals which task is under way, and for how long.
 
@@ -30,8 +30,8 @@ def ticking(
 
     Parameters
     ----------
-    task : str or callable
-        Description of the task, or a callable that returns it; it is called by another thread.
+    task : callable
+        Returns the description of the task; it is called by another thread.
     write : callable
         Takes a line.
     every : float
@@ -42,8 +42,7 @@ def ticking(
 
     def lines() -> None:
         while not over.wait(every):
-            text = task if isinstance(task, str) else task()
-            write(f"{text} ({time.monotonic() - started:.0f} s)")
+            write(f"{task()} ({time.monotonic() - started:.0f} s)")
 
     thread = threading.Thread(target=lines, daemon=True)
     thread.start()
@@ -147,10 +146,35 @@ def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
     columns = [TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
     if remaining:
         columns += [TextColumn("left:"), TimeRemainingColumn()]
-    with Progress(*columns, console=Console(stderr=True)) as progress:
+    console = Console(stderr=True)
+    # what a command prints meanwhile belongs to stdout, which may be a pipe
+    with Progress(*columns, console=console, redirect_stdout=False) as progress:
         task: Any = progress.add_task(what, total=1.0)
 
         def show(done: float | None, total: float | None, text: str = "") -> None:
             progress.update(task, description=text or what, completed=done, total=total)
 
         yield show
+
+
+@contextmanager
+def following(what: str) -> Iterator[Bar]:
+    """Show how far a command is: a bar on a terminal, lines at intervals elsewhere.
+
+    Parameters
+    ----------
+    what : str
+        Description, until another text is given.
+    """
+    if sys.stderr.isatty():
+        with bar(what) as show:
+            yield show
+        return
+    shown = what
+
+    def keep(done: float | None, total: float | None, text: str = "") -> None:
+        nonlocal shown
+        shown = text or (what if total is None else f"{what}: {done:g} of {total:g}")
+
+    with ticking(lambda: shown):
+        yield keep

@@ -25,7 +25,7 @@ from adhesis.ensemble.loop.record import (
 )
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.reporter import StatusLine, ticking
+from adhesis.ensemble.reporter import StatusLine, following
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -358,15 +358,8 @@ def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool)
     from adhesis.ensemble.loop.film import film_of
 
     result = results if isinstance(results, PathResult) else results[0]
-    done = ""
-
-    def progress(number: int, total: int, what: str = "computed") -> None:
-        nonlocal done
-        done = f"film: {number} of {total} frames {what}"
-
-    with nullcontext() if quiet else ticking(lambda: done):
-        film = film_of(result, progress=progress)
-        film.save(path, progress=lambda number, total: progress(number, total, "drawn"))
+    with nullcontext() if quiet else following("frames of the film") as show:
+        film_of(result, progress=show).save(path, progress=show)
 
 
 # ---------------------------------------------------------------------- progress

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+import sys
 import time
 
 import pytest
 
-from adhesis.ensemble.reporter import StatusLine, ticking
+from adhesis.ensemble.reporter import StatusLine, following, ticking
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 
 
@@ -22,9 +23,20 @@ def test_what_takes_long_is_told_and_what_is_over_is_not() -> None:
     assert said[0] == "0 of 2 (0 s)"
     assert said[1].startswith("1 of 2")
     reported = len(said)
-    with ticking("no sooner than it is due", said.append, every=60.0):
+    with ticking(lambda: "no sooner than it is due", said.append, every=60.0):
         pass
     assert len(said) == reported
+
+
+def test_what_is_printed_beside_a_bar_goes_to_stdout(capsys, monkeypatch) -> None:
+    terminal = _Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    with following("claims") as show:
+        show(1, 2, "the first claim")
+        print("the first claim holds")
+    assert capsys.readouterr().out == "the first claim holds\n"
+    assert "the first claim" in terminal.getvalue()
 
 
 def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(monkeypatch) -> None:
