@@ -34,7 +34,7 @@ from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
 from adhesis.ensemble.run.launch import described_signal
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
-from adhesis.ensemble.run.processes import Processes, Work
+from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, one_a_node_first, together
 from adhesis.ensemble.run.schedule import Schedule
@@ -290,8 +290,12 @@ class _Session:
             if comm.size > 1:
                 channel = MpiChannel(comm)
             elif self._options.processes and self._plan.rows:
-                work = Work(self._compute, limits.task_seconds, limits.report_interval)
-                channel = stack.enter_context(Processes(self._options.processes, work))
+                channel = stack.enter_context(
+                    Processes(
+                        *(self._options.processes, self._compute),
+                        *(limits.task_seconds, limits.report_interval),
+                    )
+                )
             else:
                 channel = OwnWorker(self._compute_here, self._write, self._limits)
                 own_rows = True

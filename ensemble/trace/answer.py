@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -273,14 +274,24 @@ class Answer(ByValue):
             return (changes[0], *others[:1])
         return tuple(changes[:1])
 
-    def group(self, name: str) -> list[tuple[str, str, Result]]:
-        """Name, words and numbers of the loops of one doubt or table that came to their end."""
-        rows = []
-        for run in self.plan.runs:
-            found = self.result(run.name)
-            if run.group == name and found is not None:
-                rows.append((run.name, run.description, found))
-        return rows
+    def group(self, name: str) -> list[tuple[Run, Result]]:
+        """Loops of one doubt or table that came to their end, and their numbers."""
+        found = ((run, self.result(run.name)) for run in self.plan.runs if run.group == name)
+        return [(run, numbers) for run, numbers in found if numbers is not None]
+
+    @property
+    def works_of_adhesion(self) -> list[tuple[float, Result]]:
+        """Works of adhesion in J/m², ascending, and the numbers of their loops."""
+        first = (self.cycle.works_of_adhesion[0], self.main)
+        others = [(run.work_of_adhesion or 0.0, r) for run, r in self.group("work of adhesion")]
+        return sorted([first, *others], key=itemgetter(0))
+
+    @property
+    def turning_points(self) -> list[tuple[float, Result]]:
+        """Turning points, ascending, and the numbers of their loops."""
+        first = (self.cycle.turning_points[0], self.main)
+        others = [(run.turning_point or 0.0, r) for run, r in self.group("turning point")]
+        return sorted([first, *others], key=itemgetter(0))
 
     def change(self, name: str, quantity: str = "loss") -> float | None:
         """Relative change of a quantity in one loop against the loop that it is compared with."""
@@ -537,9 +548,9 @@ def _quantity(answer: Answer, name: str) -> Uncertain:
 
 def _cut_offs(answer: Answer) -> dict[float, str]:
     """Return the names of the loops that ended by their shortest wave over the answer's."""
-    names = [run.name for run in answer.plan.runs if run.group == "cut-off"]
-    ended = [name for name in names if answer.result(name) is not None]
-    return {1.0: "answer"} | {float(name.split("×")[1]): name for name in ended}
+    ended = [run for run, _ in answer.group("cut-off")]
+    at = answer.prepared.cut_off
+    return {1.0: "answer"} | {run.changes["cut_off"] / at: run.name for run in ended}
 
 
 def _neighbours(answer: Answer) -> list[str]:

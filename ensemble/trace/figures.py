@@ -209,8 +209,7 @@ def _loop(answer: Answer) -> tuple[Figure, str]:
 def _cut_off(answer: Answer) -> tuple[Figure, str] | None:
     prepared = answer.prepared
     rows = [(prepared.cut_off, answer.main["loss"])]
-    for name, _, found in answer.group("cut-off"):
-        rows.append((float(name.split("×")[1]) * prepared.cut_off, found["loss"]))
+    rows += [(run.changes["cut_off"], found["loss"]) for run, found in answer.group("cut-off")]
     if len(rows) < 3:
         return None
     rows.sort()
@@ -245,11 +244,7 @@ def _plain_log(axes: Axes) -> None:
 
 
 def _tables(answer: Answer) -> tuple[Figure, str] | None:
-    cycle = answer.cycle
-    gammas = [(cycle.works_of_adhesion[0], answer.main)]
-    gammas += [(float(n.split()[1]), r) for n, _, r in answer.group("work of adhesion")]
-    turns = [(cycle.turning_points[0], answer.main)]
-    turns += [(float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    gammas, turns = answer.works_of_adhesion, answer.turning_points
     if len(gammas) + len(turns) < 4:
         return None
     figure = new_figure(3, 2, TWO_COLUMNS, 4.4, sharex="col")
@@ -261,7 +256,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
     )
     for line, (key, by, label, quantity) in enumerate(rows):
         top = 0.0
-        for column, points in enumerate((sorted(gammas, key=_first), sorted(turns, key=_first))):
+        for column, points in enumerate((gammas, turns)):
             axes: Axes = panels[line, column]
             x = [point[0] for point in points]
             y = np.array([by * point[1][key] for point in points])
@@ -273,7 +268,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             axes.set_ylim(0, top)
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    panels[2, 1].set_xlabel("turning point " + _turn_label(cycle))
+    panels[2, 1].set_xlabel("turning point " + _turn_label(answer.cycle))
     return figure, (
         "Bars: the relative uncertainty of the answer; at the other points it is assumed to be "
         "the same."
@@ -286,7 +281,3 @@ def _turn_label(cycle: Cycle) -> str:
     if cycle.control.is_load:
         return r"$\bar p$ (Pa)"
     return r"$\Delta/h_{\max}$" if cycle.control.is_fixed else r"$u_\mathrm{tot}/h_{\max}$"
-
-
-def _first(point: tuple[float, Any]) -> float:
-    return point[0]

@@ -231,9 +231,8 @@ def _variant_rows(answer: Answer) -> list[list[str]]:
 def _sweep_rows(answer: Answer) -> list[list[str]]:
     cycle = answer.cycle
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
-    rows = [(gamma, point, answer.main)]
-    rows += [(float(n.split()[1]), point, r) for n, _, r in answer.group("work of adhesion")]
-    rows += [(gamma, float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    rows = [(g, point, numbers) for g, numbers in answer.works_of_adhesion]
+    rows += [(gamma, d, numbers) for d, numbers in answer.turning_points if d != point]
     head = ["γ, J/m²", cycle.turn_sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
     return [
         head,

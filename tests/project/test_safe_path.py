@@ -14,7 +14,6 @@ import pytest
 
 from adhesis.ensemble.doctor import examine
 from adhesis.ensemble.run import launch
-from adhesis.ensemble.run.processes import Work
 from adhesis.ensemble.trace.job import Cycle, Job
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.solver.model.half_space import HalfSpace
@@ -107,7 +106,7 @@ def test_a_worker_ends_with_its_parent_even_if_that_is_killed():
     try:
         worker = json.loads(parent.stdout.readline())
         with os.fdopen(os.dup(ours), "wb") as jobs:
-            pickle.dump(Work(divmod), jobs)
+            pickle.dump((divmod, None, 10.0), jobs)
             pickle.dump((False, ("task", 0)), jobs)
         while (message := pickle.load(parent.stdout))[0] == "alive":
             pass

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -32,6 +31,7 @@ from adhesis.ensemble.exit_codes import (
     WRITE_FAILED,
 )
 from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration
+from adhesis.ensemble.reporter import log
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
@@ -223,21 +223,18 @@ def _run(
         processes=processes,
     )
 
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
     if processes:
         workers = counted(processes, "worker")
-        say(f"without MPI (mpirun and mpi4py): {workers} as processes of this machine")
+        log(f"without MPI (mpirun and mpi4py): {workers} as processes of this machine")
     try:
-        summary = run_campaign(campaign, path, comm, options, say, engine)
+        summary = run_campaign(campaign, path, comm, options, log, engine)
     except Unresponsive as error:
         # Nobody can be waited for: what is in flight is lost, the results file is sound.
         text = f"adhesis run: {error}; what was done is kept, run the same command again to resume"
         _end_job(comm, RESUME, text)
         return RESUME
     if comm.rank == 0:
-        _report_end(campaign, path, summary, say)
+        _report_end(campaign, path, summary)
     return _code(summary, options)
 
 
@@ -250,33 +247,31 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
-def _report_end(
-    campaign: Campaign, path: Path, summary: Summary, say: Callable[[str], None]
-) -> None:
+def _report_end(campaign: Campaign, path: Path, summary: Summary) -> None:
     """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
     failed = f", {summary.failed} failed" if summary.failed else ""
-    say(
+    log(
         f"{path}: {summary.done} of {summary.total} tasks done{failed}; "
         f"{summary.computed} computed in {duration(summary.seconds)}"
     )
     if summary.failed:
-        say(f"why they failed, and what to do: adhesis status {path}")
+        log(f"why they failed, and what to do: adhesis status {path}")
     for line in precision_lines(summary.precisions):
-        say(line)
+        log(line)
     if summary.doubtful:
-        say(
+        log(
             f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
             f"more than {100 * campaign.solver.accuracy:g} %, the accuracy asked for "
             f"(adhesis status {path})"
         )
     if summary.beyond_limit:
         why = why_beyond(campaign.material.opens)
-        say(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
+        log(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
     if summary.stopped:
-        say(
+        log(
             f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "
             "run the same command again to resume"
         )
@@ -300,15 +295,12 @@ def _tell_price(
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
 
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
     def prepare(tasks: Tasks) -> None:
         from adhesis.ensemble.warm import warm_up  # loads the compiler
 
         for task in tasks:
             engine.check(campaign, task)
-        warm_up(engine.methods(campaign, tasks), say)
+        warm_up(engine.methods(campaign, tasks), log)
 
     heard = time.monotonic()
 
@@ -316,7 +308,7 @@ def _tell_price(
         nonlocal heard
         if time.monotonic() > heard + _PAUSE:
             heard = time.monotonic()
-            say(f"pilot loop: {task}: {seconds:.3g} s")
+            log(f"pilot loop: {task}: {seconds:.3g} s")
 
     estimate = price(
         *(campaign, path, part),
