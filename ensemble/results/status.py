@@ -182,8 +182,8 @@ def _groups(
         return {
             "quantity": now.quantity,
             "relative_error": finite(now.relative_error),
-            "interval_low": finite(now.low),
-            "interval_high": finite(now.high),
+            "interval_low": finite(now.estimate.low),
+            "interval_high": finite(now.estimate.high),
             "wanted_relative_error": now.wanted,
             "met": now.met,
             "precision": str(now),
