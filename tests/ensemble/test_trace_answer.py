@@ -295,7 +295,8 @@ def with_losses(
     runs = []
     for name in losses:
         group = "answer" if name == "answer" else "cut-off" if "cut-off" in name else "noise"
-        runs.append(Run(name, group, ""))
+        factor = name.partition("× ")[2] if group == "cut-off" else ""
+        runs.append(Run(name, group, "", {"cut_off": float(factor) * 10e-6} if factor else {}))
     results = {
         name: answer.main | {"loss": loss, "range_warnings": [], "strain_warnings": [], "races": 0}
         for name, loss in losses.items()
