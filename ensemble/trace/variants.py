@@ -21,7 +21,7 @@ from adhesis.solver.model.profile import Profile
 from adhesis.solver.values import ByValue
 
 # Longer profiles are compared at a coarser cut-off when a doubt is measured.
-_MAX_WAVES_OF_VARIANTS = 8000
+_MAX_WAVES_OF_VARIANTS, _LONGEST_CUT_OFF = 8000, 16
 # A plan of more seconds gets hints, down to this number of waves.
 _SECONDS_TO_HINT, _MIN_WAVES = 120.0, 50
 
@@ -144,75 +144,43 @@ def _doubts(prepared: Prepared) -> list[Run]:
     cut, step = prepared.cut_off, prepared.step
     length = prepared.filled.size * step
     runs = [Run("answer", "answer", "the loop")]
-
-    def cut_off(factor: float) -> None:
-        runs.append(
-            Run(
-                f"cut-off × {factor:.3g}",
-                "cut-off",
-                f"waves down to {length_text(factor * cut)}",
-                {"cut_off": factor * cut},
-            )
-        )
-
-    for factor in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0)):
-        if factor * cut <= length / 4:
-            cut_off(factor)
-    if cut / math.sqrt(2.0) >= 2.5 * step:
-        cut_off(1 / math.sqrt(2.0))
-
     # On long traces the other doubts are measured with fewer waves, all else being equal.
     factor = 1.0
-    while length / (factor * cut) > _MAX_WAVES_OF_VARIANTS and 2 * factor in (2.0, 4.0, 8.0, 16.0):
+    while length / (factor * cut) > _MAX_WAVES_OF_VARIANTS and factor < _LONGEST_CUT_OFF:
         factor *= 2
+    base = {} if factor == 1 else {"cut_off": factor * cut}
     reference = "answer" if factor == 1 else f"cut-off × {factor:.3g}"
 
     def variant(name: str, group: str, description: str, **changes: Any) -> None:
-        kept = {} if factor == 1 else {"cut_off": factor * cut}
-        runs.append(Run(name, group, description, kept | changes, reference))
+        runs.append(Run(name, group, description, base | changes, reference))
 
+    for longer in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0), 1 / math.sqrt(2.0)):
+        if longer * cut <= length / 4 if longer > 1 else longer * cut >= 2.5 * step:
+            name, described = (
+                f"cut-off × {longer:.3g}",
+                f"waves down to {length_text(longer * cut)}",
+            )
+            runs.append(Run(name, "cut-off", described, {"cut_off": longer * cut}))
     variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
     for part in (0.05, 0.1):
-        variant(
-            f"taper {100 * part:.0f} %",
-            "continuation",
-            f"both ends faded to the mean over {100 * part:.0f} %",
-            continuation="taper",
-            part=part,
-        )
+        faded = f"both ends faded to the mean over {100 * part:.0f} %"
+        name = f"taper {100 * part:.0f} %"
+        variant(name, "continuation", faded, continuation="taper", part=part)
     if 2 * factor * cut <= length / 4:
-        runs.append(
-            Run(
-                "mirror",
-                "mirror",
-                "trace and mirror image, twice as long a period",
-                {"continuation": "mirror", "cut_off": 2 * factor * cut},
-                f"cut-off × {2 * factor:.3g}",
-            )
-        )
-    variant(
-        f"degree {prepared.degree + 1}", "form", "one degree more off", degree=prepared.degree + 1
-    )
-    if prepared.degree > 1 and not prepared.form_is_sure:
-        less = prepared.degree - 1
-        variant(f"degree {less}", "form", "one degree less off", degree=less)
+        described = "trace and mirror image, twice as long a period"
+        changes = {"continuation": "mirror", "cut_off": 2 * factor * cut}
+        runs.append(Run("mirror", "mirror", described, changes, f"cut-off × {2 * factor:.3g}"))
+    degree = prepared.degree
+    variant(f"degree {degree + 1}", "form", "one degree more off", degree=degree + 1)
+    if degree > 1 and not prepared.form_is_sure:
+        variant(f"degree {degree - 1}", "form", "one degree less off", degree=degree - 1)
     if prepared.features:
-        variant(
-            WITHOUT_FEATURES,
-            "single features",
-            f"{single_features_text(prepared.features)} bridged by straight lines",
-            without_features=True,
-        )
+        bridged = f"{single_features_text(prepared.features)} bridged by straight lines"
+        variant(WITHOUT_FEATURES, "single features", bridged, without_features=True)
     if prepared.spectrum.noise > 0:
+        described = "white noise of the instrument's size added"
         for seed in (1, 2) if factor == 1 else (1,):
-            runs.append(
-                Run(
-                    f"noise {seed}",
-                    "noise",
-                    "white noise of the instrument's size added",
-                    {"noise_seed": seed},
-                )
-            )
+            runs.append(Run(f"noise {seed}", "noise", described, {"noise_seed": seed}))
     return runs
 
 
@@ -222,18 +190,11 @@ def _tables(cycle: Cycle) -> list[Run]:
     sign = "p̄" if cycle.control.is_load else "Δ" if cycle.control.is_fixed else "u"
     sign = "preload" if cycle.at_preload else sign
     for gamma in gammas[1:]:
-        runs.append(
-            Run(f"γ {gamma:g}", "work of adhesion", f"γ = {gamma:g} J/m²", work_of_adhesion=gamma)
-        )
+        name, described = f"γ {gamma:g}", f"γ = {gamma:g} J/m²"
+        runs.append(Run(name, "work of adhesion", described, work_of_adhesion=gamma))
     for point in turns[1:]:
-        runs.append(
-            Run(
-                f"{sign} {point:g}",
-                "turning point",
-                f"turning at {cycle.turn(point)}",
-                turning_point=point,
-            )
-        )
+        name, described = f"{sign} {point:g}", f"turning at {cycle.turn(point)}"
+        runs.append(Run(name, "turning point", described, turning_point=point))
     return runs
 
 
