@@ -163,48 +163,38 @@ def _groups(
         np.stack([column[name] for name in axes]), axis=1, return_inverse=True
     )
     group_of = group_of.ravel()
-    size = points.shape[1]
-    done = state == DONE
     count = {
-        name: np.bincount(group_of[state == code], minlength=size) for name, code in _CODES.items()
+        name: np.bincount(group_of[state == code], minlength=points.shape[1])
+        for name, code in _CODES.items()
     }
-
-    rows = np.flatnonzero(done)
+    rows = np.flatnonzero(state == DONE)
     rows = rows[np.argsort(group_of[rows], kind="stable")]
-    rows_of = np.split(rows, np.cumsum(count["done"])[:-1])
-
-    def known(rows: NDArray[np.intp], finished: bool) -> dict[str, Any]:
-        """Return the precision of the steered quantity of a cell, and the wanted one."""
-        if stop.relative_error is None:
-            return {}
-        values = column[stop.quantity][rows]
-        now = precision(values, stop.relative_error, stop.quantity, finished=finished)
-        return {
-            "quantity": now.quantity,
-            "relative_error": finite(now.relative_error),
-            "interval_low": finite(now.estimate.low),
-            "interval_high": finite(now.estimate.high),
-            "wanted_relative_error": now.wanted,
-            "met": now.met,
-            "precision": str(now),
-        }
-
     groups = []
-    for i, rows in enumerate(rows_of):
-        values = np.array([column[name][rows] for name in _AVERAGED])
+    for i, rows_of in enumerate(np.split(rows, np.cumsum(count["done"])[:-1])):
+        values = np.array([column[name][rows_of] for name in _AVERAGED])
         seconds, loss, scaled = estimates(values, with_interval=False)
-        groups.append(
-            {
-                **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
-                **{name: int(cells[i]) for name, cells in count.items()},
-                "mean_seconds": finite(seconds.mean),
-                "loss": finite(loss.mean),
-                "loss_standard_error": finite(loss.sem),
-                "loss_dimensionless": finite(scaled.mean),
-                "loss_dimensionless_standard_error": finite(scaled.sem),
-                **known(rows, not count["pending"][i]),
+        group = {
+            **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
+            **{name: int(cells[i]) for name, cells in count.items()},
+            "mean_seconds": finite(seconds.mean),
+            "loss": finite(loss.mean),
+            "loss_standard_error": finite(loss.sem),
+            "loss_dimensionless": finite(scaled.mean),
+            "loss_dimensionless_standard_error": finite(scaled.sem),
+        }
+        if stop.relative_error is not None:
+            steered, finished = column[stop.quantity][rows_of], not count["pending"][i]
+            now = precision(steered, stop.relative_error, stop.quantity, finished=finished)
+            group |= {
+                "quantity": now.quantity,
+                "relative_error": finite(now.relative_error),
+                "interval_low": finite(now.estimate.low),
+                "interval_high": finite(now.estimate.high),
+                "wanted_relative_error": now.wanted,
+                "met": now.met,
+                "precision": str(now),
             }
-        )
+        groups.append(group)
     return groups
 
 
