@@ -192,9 +192,9 @@ def _read_table(
     known = {f.name: f for f in fields(kind)}
     for key in entries:
         if key not in known:
-            names = ", ".join(known)
+            names, spelt = ", ".join(known), key if key.isidentifier() else shown(key)
             raise InputError(
-                f"{source}: [{name}] {_spelt(key)} is unknown; the keys of [{name}] are {names}"
+                f"{source}: [{name}] {spelt} is unknown; the keys of [{name}] are {names}"
             )
     values = {}
     for key, value in entries.items():
@@ -213,10 +213,6 @@ def _read_table(
                 f"it must be {entry.metadata['rule'].text}"
             )
     return kind(**values)
-
-
-def _spelt(key: str) -> str:
-    return key if key.isidentifier() else shown(key)
 
 
 def _check_zip(

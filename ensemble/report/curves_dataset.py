@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import xarray as xr
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.mean_curves import QUANTILES
-from adhesis.ensemble.outputs import write_netcdf
 from adhesis.solver.method import BRANCHES
 
 # curve -> (unit, what it is)
@@ -80,11 +78,6 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
                 about = _about(unit, f"{text}, {what} on {branch}")
                 out[f"{base}_{part}"] = ((*key_dims, *dims), values, about)
     return out
-
-
-def write_curves(data: Aggregate, path: Path) -> None:
-    """Write :func:`curves_dataset` as NetCDF 4, replacing a file that is there."""
-    write_netcdf(path, curves_dataset(data))
 
 
 def _about(unit: str, text: str) -> dict[str, str]:

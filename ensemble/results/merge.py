@@ -127,7 +127,8 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         doubts = [doubt for file in opened for doubt in file.doubts()]
         sources = _assign(opened, campaign, status, there)
         if there is None:
-            create(out, campaign, versions=_versions(opened[0]))
+            known = opened[0].attributes.items()
+            create(out, campaign, versions={k: v for k, v in known if k not in _NOT_VERSIONS})
         else:
             there.close()
         _copy(sources, out)
@@ -138,11 +139,6 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         taken=sum(int(source.taken.sum()) for source in sources),
         doubts=tuple(doubts),
     )
-
-
-def _versions(results: Results) -> dict[str, str]:
-    """Return what computed a file, of its root attributes."""
-    return {k: v for k, v in results.attributes.items() if k not in _NOT_VERSIONS}
 
 
 def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:

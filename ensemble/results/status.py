@@ -173,7 +173,7 @@ def _groups(
     for i, rows_of in enumerate(np.split(rows, np.cumsum(count["done"])[:-1])):
         values = np.array([column[name][rows_of] for name in _AVERAGED])
         seconds, loss, scaled = estimates(values, with_interval=False)
-        group = {
+        group: dict[str, Any] = {
             **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
             **{name: int(cells[i]) for name, cells in count.items()},
             "mean_seconds": finite(seconds.mean),
@@ -216,7 +216,11 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         )
     groups = status["groups"]
     if len(groups) <= _MOST_GROUPS_SHOWN:
-        further = {name: _heading(name, status["axis_units"][name]) for name in status["axes"][2:]}
+        units = status["axis_units"]
+        further = {
+            name: name if units[name] == "1" else f"{name} in {AXIS_UNITS[units[name]]}"
+            for name in status["axes"][2:]
+        }
         names = "".join(f"{heading}  " for heading in further.values())
         loss = "loss W~ ± standard error of the mean"
         lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  {loss}"]
@@ -238,11 +242,6 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"])]
     return printable("\n".join(lines))
-
-
-def _heading(name: str, unit: str) -> str:
-    """Return "max_stress in Pa", or the name alone of a dimensionless key."""
-    return name if unit == "1" else f"{name} in {AXIS_UNITS[unit]}"
 
 
 def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:

@@ -222,16 +222,12 @@ def prepare(
                 wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
                 writer.mark(sorted(wanted), needed=True)
     grown = f", {len(plan.tasks) - before} of them new" if difference.grown else ""
+    planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
-        f"{path}: {plan.done} of {_planned(plan)} tasks done, {len(plan.rows)} to do{grown}"
+        f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
         + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
     )
     return plan
-
-
-def _planned(plan: Plan) -> int:
-    """Tasks that are computed or to be so; with ``[stop]`` more may follow."""
-    return plan.done + plan.failed + len(plan.rows)
 
 
 def _check_path(path: Path) -> None:
