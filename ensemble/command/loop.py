@@ -69,13 +69,11 @@ def execute(args: argparse.Namespace) -> int:
         problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control, strength)
         cycle.check(problem)
     _check_film(args, cycle)
-    penetrations = _field_penetrations(args, cycle)
-    stresses = _field_stresses(args, cycle)
+    wanted, at_stresses = _wanted_fields(args, cycle)
     with refused_as_input(vars(args)):
         method = make_method(
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
-    wanted = [*penetrations, *stresses]
     nodes = _field_nodes(args, method, wanted) if wanted else 0
     warm_missing([method.name], quiet=args.quiet, many_gaps=False)
     fields: dict[str, Any] = {}
@@ -83,10 +81,10 @@ def execute(args: argparse.Namespace) -> int:
         results = _run(args, method, cycle)
         if wanted:
             assert isinstance(results, tuple)  # fields are those of one loop
-            if penetrations:
-                fields = fields_at_penetrations(results[0], method, penetrations, nodes)
+            if at_stresses:
+                fields = fields_at_stresses(results[0], wanted, nodes)
             else:
-                fields = fields_at_stresses(results[0], stresses, nodes)
+                fields = fields_at_penetrations(results[0], method, wanted, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return 1
@@ -276,54 +274,37 @@ def _self_affine(args: argparse.Namespace) -> Profile:
     )
 
 
-def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
-    """Penetrations of the fields; empty if none are wanted there."""
+def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float], bool]:
+    """Return where fields are wanted, and whether these are mean stresses in Pa; else Δ/h_max."""
     if args.fields is None:
         for name in ("field_penetrations", "field_stresses", "field_nodes"):
             if getattr(args, name) is not None:
                 option = "--" + name.replace("_", "-")
                 raise InputError(f"{option} needs --fields, the file to which fields are written")
-        return []
+        return [], False
     if cycle.is_path or len(cycle.turning_points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
-    if args.field_stresses is not None:
-        if args.field_penetrations is not None:
-            raise InputError(
-                "--field-penetrations and --field-stresses are given: give one of them"
-            )
-        return []
-    if not cycle.control.is_fixed or cycle.turns.are_preloads:
-        if cycle.turns.are_preloads and args.field_penetrations is None:
-            return []
+    penetrations, stresses = args.field_penetrations, args.field_stresses
+    if penetrations is not None and stresses is not None:
+        raise InputError("--field-penetrations and --field-stresses are given: give one of them")
+    at_preload, (top,) = cycle.turns.are_preloads, cycle.turning_points
+    at_stresses = stresses is not None or (at_preload and penetrations is None)
+    if not at_stresses and (at_preload or not cycle.control.is_fixed):
         raise InputError(
             "--fields at penetrations belongs to one loop that turns at --max-penetration at fixed "
             "separation: give --field-stresses, as 5kPa 10kPa, instead"
         )
-    (top,) = cycle.turning_points
-    if args.field_penetrations is None:
-        return [part * top for part in _FIELD_PARTS]
-    wanted = [float(value) for value in args.field_penetrations]
+    wanted = stresses if at_stresses else penetrations
+    if wanted is None:
+        return [part * top for part in _FIELD_PARTS], at_stresses
     for value in wanted:
-        if not (np.isfinite(value) and value <= top):
+        if at_stresses and not np.isfinite(value):
+            raise InputError(f"--field-stresses holds {value}: it must be a finite number, in Pa")
+        if not at_stresses and not (np.isfinite(value) and value <= top):
             raise InputError(
                 f"--field-penetrations holds {value}: the loop goes no deeper than {top:g}"
             )
-    return list(dict.fromkeys(wanted))
-
-
-def _field_stresses(args: argparse.Namespace, cycle: Cycle) -> list[float]:
-    """Mean stresses of the fields in Pa; empty if none are wanted there."""
-    if args.fields is None or args.field_penetrations is not None:
-        return []
-    if args.field_stresses is None:
-        if not cycle.turns.are_preloads:
-            return []
-        return [part * cycle.turning_points[0] for part in _FIELD_PARTS]
-    wanted = [float(value) for value in args.field_stresses]
-    for value in wanted:
-        if not np.isfinite(value):
-            raise InputError(f"--field-stresses holds {value}: it must be a finite number, in Pa")
-    return list(dict.fromkeys(wanted))
+    return list(dict.fromkeys(wanted)), at_stresses
 
 
 def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[float]) -> int:
