@@ -14,10 +14,11 @@ import argparse
 import os
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.command.streams import OutputError, write_line
 from adhesis.ensemble.errors import InputError, WriteError, lack
 from adhesis.ensemble.exit_codes import (
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
+_MOST = 2**31 - 1
+_NUMBER = within(0, _MOST, "a number that is not negative")
+_WHOLE = within(0, _MOST, "a whole number that is not negative", int)
 EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
@@ -57,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--ranks",
+        type=within(1, _MOST, "a whole number of at least 1", int),
         metavar="N",
         help="start N ranks here, without MPI as processes (one more than cores is right: rank 0 "
         "only waits)",
@@ -79,8 +84,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--max-failures",
+        type=_WHOLE,
         metavar="N",
-        default="20",
+        default=20,
         help="stop after so many failed tasks; 0: never (default: 20)",
     )
     parser.add_argument(
@@ -88,16 +94,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WHICH",
         help="compute tasks again: those that failed (failed), or done ones too (all)",
     )
-    for name, text in (
-        ("--hurst", "with --redo: only tasks of this H; may be repeated"),
-        ("--work-of-adhesion", "with --redo: only tasks of this γ in J/m²; may be repeated"),
-        ("--realisation", "with --redo: only this realisation; may be repeated"),
+    gamma = WORK_OF_ADHESION.option
+    for name, kind, text in (
+        ("--hurst", _NUMBER, "with --redo: only tasks of this H; may be repeated"),
+        ("--work-of-adhesion", gamma, "with --redo: only tasks of this γ in J/m²; may be repeated"),
+        ("--realisation", _WHOLE, "with --redo: only this realisation; may be repeated"),
     ):
-        parser.add_argument(name, metavar="VALUE", action="append", default=[], help=text)
+        parser.add_argument(
+            name, type=kind, metavar="VALUE", action="append", default=[], help=text
+        )
     parser.add_argument(
         "--patience",
+        type=_NUMBER,
         metavar="SECONDS",
-        default="10",
+        default=10.0,
         help="how long to wait for another run to let go of FILE.h5 (default: 10)",
     )
 
@@ -158,11 +168,11 @@ def _ranks(args: argparse.Namespace) -> int:
     from adhesis.ensemble.run.ranks import launched
     from adhesis.solver.checks import counted
 
-    ranks = int(_number("--ranks", args.ranks, int, least=1))
+    ranks: int = args.ranks
     most = launch.largest_number_of_ranks()
     if ranks > most:
         raise InputError(
-            f"--ranks is {args.ranks!r}: at most {most} are started here, on "
+            f"--ranks is {ranks}: at most {most} are started here, on "
             f"{counted(launch.cores(), 'core')}; more ranks than cores compute no faster"
         )
     if launched()[0] > 1:
@@ -213,13 +223,12 @@ def _run(
         return _tell_price(campaign, path, args, engine) if comm.rank == 0 else DONE
     if args.part and not args.out:
         raise InputError("--part needs --out: every part has a results file of its own")
-    most = _number("--max-failures", args.max_failures, int)
     options = Options(
         part=Part.parse(args.part) if args.part else WHOLE,
         redo=_selection(args),
-        max_failures=int(most) or None,
+        max_failures=args.max_failures or None,
         deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),
-        patience=_number("--patience", args.patience),
+        patience=args.patience,
         processes=processes,
     )
 
@@ -323,10 +332,6 @@ def _tell_price(
 def _selection(args: argparse.Namespace) -> Any:
     from adhesis.ensemble.run.plan import Selection
 
-    hurst = tuple(_number("--hurst", v) for v in args.hurst)
-    read = WORK_OF_ADHESION.read
-    gamma = tuple(_number("--work-of-adhesion", v, read) for v in args.work_of_adhesion)
-    realisation = tuple(int(_number("--realisation", v, int)) for v in args.realisation)
     if args.redo is None:
         for name in ("hurst", "work_of_adhesion", "realisation"):
             if getattr(args, name):
@@ -335,21 +340,5 @@ def _selection(args: argparse.Namespace) -> Any:
         return None
     if args.redo not in ("failed", "all"):
         raise InputError(f"--redo is {args.redo!r}: it must be failed or all")
-    return Selection(args.redo, hurst, gamma, realisation)
-
-
-def _number(
-    option: str, text: str, read: Callable[[str], float] = float, *, least: int = 0
-) -> float:
-    """Return the number that is given for an option."""
-    try:
-        value = read(text)
-    except InputError as error:
-        raise InputError(f"{option} {error}") from None
-    except ValueError:
-        value = -1
-    if not least <= value < 2**31:
-        kind = "whole number" if read is int else "number"
-        rule = f"of at least {least}" if least else "that is not negative"
-        raise InputError(f"{option} is {text!r}: it must be a {kind} {rule}")
-    return value
+    chosen = (args.hurst, args.work_of_adhesion, args.realisation)
+    return Selection(args.redo, *map(tuple, chosen))
