@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from adhesis.ensemble.quantities import shown_unit
 from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     ONE_COLUMN,
@@ -58,12 +59,10 @@ def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
     return drawn
 
 
-def _scale(size: float) -> tuple[float, str]:
-    """Return the unit for a length of this size: its factor and name."""
-    for factor, name in ((1e3, "mm"), (1e6, "µm"), (1e9, "nm")):
-        if size * factor >= 1:
-            return factor, name
-    return 1e9, "nm"
+def _scale(name: str, size: float) -> tuple[float, str]:
+    """Return the unit of a quantity of this size: its factor and name."""
+    unit, in_si = shown_unit(name, size)
+    return 1 / in_si, unit
 
 
 def _thinned(x: Any, y: Any) -> tuple[Array, Array]:
@@ -83,10 +82,10 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     heights = prepared.trace.heights
     level, profile = prepared.level(), prepared.profile()
     x = prepared.start + prepared.step * np.arange(level.size)
-    by_x, unit_x = _scale(prepared.trace.length)
+    by_x, unit_x = _scale("length", prepared.trace.length)
     figure = new_figure(2, 1, TWO_COLUMNS, 3.3, sharex=True)
     above, below = figure.axes
-    by_z, unit_z = _scale(prepared.trace.height_range)
+    by_z, unit_z = _scale("height_range", prepared.trace.height_range)
     measured = prepared.step * np.arange(heights.size)
     above.plot(by_x * measured, by_z * heights, color=_GREY, lw=0.7)
     fit = prepared.filled - level
@@ -105,7 +104,7 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     marked = _mark(figure.axes, by_x, prepared)
     above.set(ylabel=f"measured ({unit_z})")
     above.legend(loc="best")
-    by_z, unit_z = _scale(float(np.ptp(level)))
+    by_z, unit_z = _scale("height_range", float(np.ptp(level)))
     below.plot(*_thinned(by_x * x, by_z * level), color=_GREY, lw=0.7, label="level")
     n = max(4 * profile.highest_harmonic, 2000) + 1
     used = profile.heights(n)
@@ -189,8 +188,7 @@ def _loop(answer: Answer) -> tuple[Figure, str]:
     depth = np.array(states["penetration"])
     stress = np.array(states["mean_stress"])
     contact = np.array(states["contact_fraction"])
-    big = float(np.abs(stress).max())
-    by, unit = (1e-6, "MPa") if big > 2e6 else (1e-3, "kPa") if big > 2e2 else (1.0, "Pa")
+    by, unit = _scale("mean_stress", float(np.abs(stress).max()))
     figure = new_figure(1, 2, TWO_COLUMNS, 2.5)
     left, right = figure.axes
     for name, colour in (("loading", _BLUE), ("unloading", _ORANGE)):
