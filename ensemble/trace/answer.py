@@ -36,7 +36,7 @@ from adhesis.solver.checks import (
     row,
     whole,
 )
-from adhesis.solver.loading.loop import check_cycle, check_preload
+from adhesis.solver.loading.loop import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
@@ -372,18 +372,19 @@ def loss_of_trace(
     """
     control = Control() if control is None else control
     instance("control", control, Control, "Control(stiffness), for a load Control(0)")
+    turns: Any = preload
     latest = None
     if preload is None:
-        turns = _turns(control, max_penetration, max_stress)
-    else:
-        turns = preload
-        if max_stress is not None:
-            raise ValueError(
-                "preload and max_stress are given: a machine turns at a preload, a weight "
-                "(control=Control(0)) at max_stress"
-            )
-        if max_penetration is not None:
-            latest = real("max_penetration", max_penetration)
+        if max_penetration is None and max_stress is None and not control.is_load:
+            max_penetration = MAX_PENETRATION
+        turns = turning_of(control, max_penetration, max_stress)
+    elif max_stress is not None:
+        raise ValueError(
+            "preload and max_stress are given: a machine turns at a preload, a weight "
+            "(control=Control(0)) at max_stress"
+        )
+    elif max_penetration is not None:
+        latest = real("max_penetration", max_penetration)
     cycle = make_cycle(
         half_space,
         work_of_adhesion,
@@ -414,25 +415,6 @@ def loss_of_trace(
                 watch(loops)
 
         return run_plan(prepared, cycle, plan, both)
-
-
-def _turns(
-    control: Control, max_penetration: Several | None, max_stress: Several | None
-) -> Several:
-    """Return the turning points that belong to a control."""
-    if control.is_load:
-        if max_penetration is not None:
-            raise ValueError("max_penetration is given: a path under a load turns at max_stress")
-        if max_stress is None:
-            raise ValueError("max_stress is missing: a path under a load must have it, in Pa")
-        return max_stress
-    if max_stress is not None:
-        raise ValueError(
-            "max_stress is given: it belongs to a load, that of a weight: a weight or a machine? "
-            "For a weight give control=Control(0); for a machine, which turns at that mean stress, "
-            "give preload instead of max_stress"
-        )
-    return MAX_PENETRATION if max_penetration is None else max_penetration
 
 
 def make_cycle(
