@@ -332,13 +332,12 @@ def _tell_price(
 def _selection(args: argparse.Namespace) -> Any:
     from adhesis.ensemble.run.plan import Selection
 
+    values = {name: getattr(args, name) for name in ("hurst", "work_of_adhesion", "realisation")}
     if args.redo is None:
-        for name in ("hurst", "work_of_adhesion", "realisation"):
-            if getattr(args, name):
-                option = "--" + name.replace("_", "-")
-                raise InputError(f"{option} needs --redo: it chooses the tasks to compute again")
+        for name in filter(values.get, values):
+            option = "--" + name.replace("_", "-")
+            raise InputError(f"{option} needs --redo: it chooses the tasks to compute again")
         return None
     if args.redo not in ("failed", "all"):
         raise InputError(f"--redo is {args.redo!r}: it must be failed or all")
-    chosen = (args.hurst, args.work_of_adhesion, args.realisation)
-    return Selection(args.redo, *map(tuple, chosen))
+    return Selection(args.redo, values)
