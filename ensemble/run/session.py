@@ -242,25 +242,20 @@ class _Computing:
         return self.compute(self.campaign, self.tasks[row], lambda *_: check())
 
 
+@dataclass(eq=False)
 class _Session:
     """One rank's part of a run."""
 
-    def __init__(
-        self,
-        campaign: Campaign,
-        plan: Plan,
-        writer: Writer | None,
-        options: Options,
-        signals: StopSignals,
-        engine: Engine,
-        stream: TextIO | None = None,
-    ) -> None:
-        self._stream = stream
-        self._campaign = campaign
-        self._plan = plan
-        self._writer = writer
-        self._options = options
-        self._signals = signals
+    campaign: Campaign
+    plan: Plan
+    writer: Writer | None
+    options: Options
+    signals: StopSignals
+    engine: Engine
+    stream: TextIO | None = None
+
+    def __post_init__(self) -> None:
+        campaign, plan, options, engine = self.campaign, self.plan, self.options, self.engine
         self._started = time.monotonic()
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Counts(total, plan.done, plan.failed)
@@ -289,10 +284,10 @@ class _Session:
             channel: Channel
             if comm.size > 1:
                 channel = MpiChannel(comm)
-            elif self._options.processes and self._plan.rows:
+            elif self.options.processes and self.plan.rows:
                 channel = stack.enter_context(
                     Processes(
-                        *(self._options.processes, self._compute),
+                        *(self.options.processes, self._compute),
                         *(limits.task_seconds, limits.report_interval),
                     )
                 )
@@ -310,9 +305,9 @@ class _Session:
         progress = self._progress = ProgressLine(
             self._counts,
             lambda: self._estimate(
-                *(schedule, master.in_flight / self._campaign.branch_loops, len(channel.workers))
+                *(schedule, master.in_flight / self.campaign.branch_loops, len(channel.workers))
             ),
-            self._stream,
+            self.stream,
         )
         master = Master(
             *(channel, schedule, self._groups, collect, self._limits, progress.tick),
@@ -324,7 +319,7 @@ class _Session:
             progress.close()
 
     def summary(self, stopped: str | None) -> Summary:
-        batches = self._plan.batches
+        batches = self.plan.batches
         return Summary(
             **vars(self._counts),
             seconds=time.monotonic() - self._started,
@@ -343,19 +338,19 @@ class _Session:
 
     def _write(self, outcome: Outcome) -> Outcome:
         """Write a row; of its numbers the master gets those by which it is judged."""
-        assert self._writer is not None
+        assert self.writer is not None
         task, rank = outcome.task, outcome.rank
         if outcome.error is not None:
-            self._writer.write_failure(task, outcome.error, outcome.seconds, rank)
+            self.writer.write_failure(task, outcome.error, outcome.seconds, rank)
             return outcome
-        self._writer.write_result(task, outcome.result, rank)
-        gamma = self._plan.tasks[task].work_of_adhesion
+        self.writer.write_result(task, outcome.result, rank)
+        gamma = self.plan.tasks[task].work_of_adhesion
         row = {**outcome.result, "work_of_adhesion": gamma}
-        judged = (*OF_DOUBT, self._campaign.stop.quantity)
+        judged = (*OF_DOUBT, self.campaign.stop.quantity)
         return replace(outcome, result={name: row[name] for name in judged})
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
-        counts, what, row = self._counts, str(self._plan.tasks[outcome.task]), outcome.result
+        counts, what, row = self._counts, str(self.plan.tasks[outcome.task]), outcome.result
         if outcome.error is not None:
             counts.failed += 1
             counts.failed_now += 1
@@ -364,49 +359,49 @@ class _Session:
             counts.done += 1
             counts.computed += 1
             counts.beyond_limit += bool(beyond_zero_range(row))
-            if doubtful(row, self._campaign.solver.accuracy):
+            if doubtful(row, self.campaign.solver.accuracy):
                 counts.doubtful += 1
                 share = 100 * row["loss_error"] / (abs(row["loss"]) or 1.0)
                 progress.doubt(
                     f"{what}: audit residual {percent(row['audit_residual'])}, "
                     f"estimated error {share:.2g} %"
                 )
-        if self._plan.batches is not None:
-            steered = self._campaign.stop.quantity
+        if self.plan.batches is not None:
+            steered = self.campaign.stop.quantity
             value = math.nan if outcome.error is not None else float(row[steered])
-            further, spare = self._plan.batches.finished(outcome.task, value)
-            assert self._writer is not None
-            self._writer.mark(spare, needed=False)
+            further, spare = self.plan.batches.finished(outcome.task, value)
+            assert self.writer is not None
+            self.writer.mark(spare, needed=False)
             self._counts.total += len(further)
             schedule.add(self._units.form(further))
         progress.tick()
 
     def _schedule(self) -> Schedule:
-        tasks = self._plan.tasks
+        tasks = self.plan.tasks
         priors: dict[Hashable, float] = {
             self._groups[row]: prior(task) for row, task in enumerate(tasks)
         }
         rounds = {row: task.realisation for row, task in enumerate(tasks)}
-        first = self._units.form(self._plan.rows)
+        first = self._units.form(self.plan.rows)
         schedule = Schedule(first, self._groups, priors, rounds)
-        for group, (seconds, count) in self._plan.times.items():
+        for group, (seconds, count) in self.plan.times.items():
             # of loops that share a loading branch the time is that of all of them
-            schedule.measured(group, seconds, max(1, round(count / self._campaign.branch_loops)))
+            schedule.measured(group, seconds, max(1, round(count / self.campaign.branch_loops)))
         return schedule
 
     def _stop(self) -> str | None:
-        if self._signals.received is not None:
-            return f"{described_signal(self._signals.received)} received"
+        if self.signals.received is not None:
+            return f"{described_signal(self.signals.received)} received"
         left = self._time_left()
         if left is not None and left <= 0:
             return "the walltime ends"
-        most = self._options.max_failures
+        most = self.options.max_failures
         if most is not None and self._counts.failed_now >= most:
             return f"{self._counts.failed_now} tasks failed (the limit is --max-failures {most})"
         return None
 
     def _time_left(self) -> float | None:
-        deadline = self._options.deadline
+        deadline = self.options.deadline
         return None if deadline is None else deadline.at - time.time()
 
     @staticmethod
