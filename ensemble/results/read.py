@@ -220,16 +220,6 @@ class Results:
         """Number of tasks."""
         return int(self._file["task"].shape[0])
 
-    @property
-    def loading_penetration(self) -> NDArray[np.float64]:
-        """Δ/h_max of the loading curves."""
-        return self.column("loading_penetration")
-
-    @property
-    def unloading_penetration(self) -> NDArray[np.float64]:
-        """Δ/h_max of the unloading curves, descending."""
-        return self.column("unloading_penetration")
-
     def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Return a dataset, or some rows of it.
 
