@@ -52,7 +52,7 @@ def _interval(elapsed: float) -> float:
     return min(max(first, elapsed / _LINES_AT_LEAST), most)
 
 
-class ProgressLine:
+class ProgressLine(StatusLine):
     """Report the progress of a run, on rank 0.
 
     Parameters
@@ -70,15 +70,15 @@ class ProgressLine:
         time_left: Callable[[], float | None],
         stream: TextIO | None = None,
     ) -> None:
+        super().__init__(_interval, stream, at_once=True)
         self._counts = counts
         self._time_left = time_left
-        self._line = StatusLine(_interval, stream, at_once=True)
         self._failures_shown = 0
         self._doubts_shown = 0
 
     def tick(self) -> None:
         """Report, if it is time to."""
-        self._line.show(self._text)
+        self.show(self._text)
 
     def failure(self, what: str, error: str) -> None:
         """Report a failed task: the first ones each, then only their number."""
@@ -94,13 +94,9 @@ class ProgressLine:
             self.say(f"doubtful loss: {what}")
         self._doubts_shown += 1
 
-    def say(self, text: str) -> None:
-        """Write a line of its own."""
-        self._line.say(text)
-
-    def close(self) -> None:
+    def end(self) -> None:
         """Show the last state and end the line on a terminal."""
-        self._line.close(self._text)
+        self.close(self._text)
 
     def _text(self) -> str:
         c = self._counts
@@ -108,7 +104,7 @@ class ProgressLine:
         if c.failed_now:
             parts.append(f"{c.failed_now} failed")
         if c.computed:
-            parts.append(f"{duration(self._line.seconds)} so far")
+            parts.append(f"{duration(self.seconds)} so far")
         left = self._time_left()
         if left is not None and c.pending:
             parts.append(f"about {duration(left)} left")

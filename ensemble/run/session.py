@@ -316,7 +316,7 @@ class _Session:
         try:
             return master.run()
         finally:
-            progress.close()
+            progress.end()
 
     def summary(self, stopped: str | None) -> Summary:
         batches = self.plan.batches

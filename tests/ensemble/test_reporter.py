@@ -107,8 +107,8 @@ def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> 
     counts.computed = counts.failed = counts.failed_now = 1
     now[0] = 2.0
     progress.tick()
-    progress.close()
-    progress.close()
+    progress.end()
+    progress.end()
     first, last = "1 of 3 tasks done", "2 of 3 tasks done, 1 failed, 2.0 s so far"
     shown = stream.getvalue().replace("\r\x1b[K", "|")
     assert shown == f"|{first}|failed: H = 0.8: diverged\n|{last}|{last}\n"
