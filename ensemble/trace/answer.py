@@ -21,21 +21,7 @@ from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Plan, Run, default_tables, make_plan
-from adhesis.solver import views
-from adhesis.solver.checks import (
-    ACCURACY,
-    FULL_PENETRATION,
-    Bounds,
-    choice,
-    counted,
-    flag,
-    function,
-    instance,
-    number_of,
-    real,
-    row,
-    whole,
-)
+from adhesis.solver import checks, views
 from adhesis.solver.loading.loop import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -53,7 +39,7 @@ COVERAGE = 2.0
 LEAST = 0.02
 
 _NOT_CONVERGED = 0.10
-_PROCESSES = Bounds(0, 4096, whole=True)
+_PROCESSES = checks.Bounds(0, 4096, whole=True)
 DOUBTS = {
     "cut-off": "the shortest wave kept",
     "continuation": "how the period is closed",
@@ -165,7 +151,8 @@ class Answer(ByValue):
         """One line: the loss with its uncertainty, and the warnings counted."""
         return (
             f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty, 0.0)} J/m², "
-            f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
+            f"{checks.counted(len(self.plan.runs), 'loop')}, "
+            f"{checks.counted(len(self.warnings), 'warning')})"
         )
 
     def __str__(self) -> str:
@@ -371,7 +358,7 @@ def loss_of_trace(
     docs/measured-profile.md, "The answer and its doubts"
     """
     control = Control() if control is None else control
-    instance("control", control, Control, "Control(stiffness), for a load Control(0)")
+    checks.instance("control", control, Control, "Control(stiffness), for a load Control(0)")
     turns: Any = preload
     latest = None
     if preload is None:
@@ -384,7 +371,7 @@ def loss_of_trace(
             "(control=Control(0)) at max_stress"
         )
     elif max_penetration is not None:
-        latest = real("max_penetration", max_penetration)
+        latest = checks.real("max_penetration", max_penetration)
     cycle = make_cycle(
         half_space,
         work_of_adhesion,
@@ -399,12 +386,12 @@ def loss_of_trace(
         latest=latest,
     )
     check(prepared, cycle)
-    flag("quick", quick)
-    function("watch", watch)
+    checks.flag("quick", quick)
+    checks.function("watch", watch)
     if processes is not None:
-        processes = whole("processes", processes, _PROCESSES)
+        processes = checks.whole("processes", processes, _PROCESSES)
     plan = make_plan(prepared, cycle, quick=quick, processes=processes)
-    if not flag("progress", progress):
+    if not checks.flag("progress", progress):
         return run_plan(prepared, cycle, plan, watch)
     with bar("loops") as shown:
 
@@ -438,8 +425,8 @@ def make_cycle(
     TypeError, ValueError
         What the solver would refuse of them.
     """
-    choice("method", method, METHOD_NAMES)
-    real("accuracy", accuracy, ACCURACY)
+    checks.choice("method", method, METHOD_NAMES)
+    checks.real("accuracy", accuracy, checks.ACCURACY)
     control = control or Control()
     turning = "max_stress" if control.is_load else "max_penetration"
     turning = "preload" if at_preload else turning
@@ -452,7 +439,7 @@ def make_cycle(
     for point in turns:
         if at_preload:
             check_preload(point, control)
-            point = FULL_PENETRATION if latest is None else latest
+            point = checks.FULL_PENETRATION if latest is None else latest
         check_cycle(point, load_steps, control)
     cycle = Cycle(
         half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength,
@@ -465,7 +452,7 @@ def make_cycle(
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
     """Refuse a prepared trace that the solver would refuse, before any work."""
-    instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
+    checks.instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
         strength = cycle.strength_at(gamma)
@@ -498,9 +485,9 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
 
 def _several(name: str, value: Several) -> Sequence[float]:
     """Return one number as a row of one; its bounds are checked later."""
-    if number_of(value) is not None:
-        return (real(name, value),)
-    return tuple(row(name, value, entry="value").tolist())
+    if checks.number_of(value) is not None:
+        return (checks.real(name, value),)
+    return tuple(checks.row(name, value, entry="value").tolist())
 
 
 # ---------------------------------------------------------------------- doubts
@@ -559,8 +546,8 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     races = answer.main["races"]
     if races:
         found.append(
-            f"{counted(round(races), 'jump')} would have ended elsewhere under another rule of "
-            f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
+            f"{checks.counted(round(races), 'jump')} would have ended elsewhere under another rule "
+            f"of descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
     for run in answer.plan.runs:
         of_run = answer.result(run.name) if run.name != "answer" else None
@@ -622,15 +609,16 @@ def run_rows(answer: Answer) -> list[dict[str, Any]]:
     runs = []
     for run in plan.runs:
         found = answer.results.get(run.name)
-        row: dict[str, Any] = {"name": run.name, "group": run.group, "said": run.description}
-        row["reference"] = run.reference
-        row["expected_seconds"] = plan.seconds[run.name]
+        entry: dict[str, Any] = {
+            **{"name": run.name, "group": run.group, "said": run.description},
+            **{"reference": run.reference, "expected_seconds": plan.seconds[run.name]},
+        }
         if isinstance(found, dict):
-            row |= {key: value for key, value in found.items() if key != "states"}
-            row["loss_change"] = answer.change(run.name)
+            entry |= {key: value for key, value in found.items() if key != "states"}
+            entry["loss_change"] = answer.change(run.name)
         else:
-            row["failed"] = found
-        runs.append(row)
+            entry["failed"] = found
+        runs.append(entry)
     return runs
 
 
