@@ -397,6 +397,8 @@ class Worker:
 class OwnWorker:
     """Channel of a master whose own process works: on a task each time it looks for a message.
 
+    Both ends of it are this object: the worker alone looks for urgent messages.
+
     Parameters
     ----------
     compute, deliver : callable
@@ -405,35 +407,21 @@ class OwnWorker:
 
     def __init__(self, compute: Compute, deliver: Deliver, limits: Limits) -> None:
         self.rank = MASTER
-        self.workers: Sequence[int] = (MASTER,)
-        self._boxes: dict[bool, deque[Message]] = {False: deque(), True: deque()}
-        self._answers = _Answers(self._boxes[True])
-        self._worker = Worker(self._answers, compute, deliver, limits)
+        self.workers: Sequence[int] = (MASTER + 1,)
+        self._tasks: deque[Message] = deque()
+        self._urgent: deque[Message] = deque()
+        self._answers: deque[Message] = deque()
+        self._worker = Worker(self, compute, deliver, limits)
 
     def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
-        """Keep a message for the worker."""
-        self._boxes[urgent].append(message)
+        """Keep a message for the other end."""
+        box = self._urgent if urgent else self._tasks
+        (self._answers if to == MASTER else box).append(message)
 
     def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
-        """Return what the worker has sent; if there is nothing, let it work."""
-        if not self._answers.sent and self._boxes[False]:
-            self._worker.act(self._boxes[False].popleft())
-        return (MASTER, self._answers.sent.popleft()) if self._answers.sent else None
-
-
-class _Answers:
-    """The same channel as the worker sees it."""
-
-    def __init__(self, urgent: deque[Message]) -> None:
-        self.rank = MASTER
-        self.workers: Sequence[int] = ()
-        self.sent: deque[Message] = deque()
-        self._urgent = urgent
-
-    def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
-        """Keep a message for the master."""
-        self.sent.append(message)
-
-    def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
-        """Return the next urgent message; others are brought by the master."""
-        return (MASTER, self._urgent.popleft()) if urgent and self._urgent else None
+        """Return what the other end has sent; if there is nothing, let the worker work."""
+        if urgent:
+            return (MASTER, self._urgent.popleft()) if self._urgent else None
+        if not self._answers and self._tasks:
+            self._worker.act(self._tasks.popleft())
+        return (self.workers[0], self._answers.popleft()) if self._answers else None
