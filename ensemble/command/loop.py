@@ -135,16 +135,15 @@ def _run(
     if cycle.is_path:
         return run_path(
             method,
-            cycle.turning_points,
+            cycle.points,
             load_steps=cycle.load_steps,
             out=cycle.out,
             progress=progress,
         )
-    points, turns = cycle.turning_points, cycle.turns
-    if len(points) > 1:
-        turn = turns.arguments(points, cycle.control)
+    if len(cycle.points) > 1:
+        turn = cycle.arguments(cycle.points)
         return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turn)
-    turn = turns.arguments(points[0], cycle.control)
+    turn = cycle.arguments(cycle.points[0])
     return (run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn),)
 
 
@@ -200,11 +199,11 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
     """Refuse a film that cannot be made, before the loop is run."""
     if args.film is None:
         return
-    if not cycle.is_path and len(cycle.turning_points) > 1:
+    if not cycle.is_path and len(cycle.points) > 1:
         name = "--max-stress" if cycle.control.is_load else "--max-penetration"
-        name = "--preload" if cycle.turns.are_preloads else name
+        name = "--preload" if cycle.are_preloads else name
         raise InputError(
-            f"--film is given with {len(cycle.turning_points)} turning points: a film shows one "
+            f"--film is given with {len(cycle.points)} turning points: a film shows one "
             f"loop, so give {name} one value"
         )
     from adhesis.ensemble.loop.film import check_film
@@ -282,12 +281,12 @@ def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float],
                 option = "--" + name.replace("_", "-")
                 raise InputError(f"{option} needs --fields, the file to which fields are written")
         return [], False
-    if cycle.is_path or len(cycle.turning_points) > 1:
+    if cycle.is_path or len(cycle.points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
     penetrations, stresses = args.field_penetrations, args.field_stresses
     if penetrations is not None and stresses is not None:
         raise InputError("--field-penetrations and --field-stresses are given: give one of them")
-    at_preload, (top,) = cycle.turns.are_preloads, cycle.turning_points
+    at_preload, (top,) = cycle.are_preloads, cycle.points
     at_stresses = stresses is not None or (at_preload and penetrations is None)
     if not at_stresses and (at_preload or not cycle.control.is_fixed):
         raise InputError(
