@@ -12,7 +12,6 @@ import errno
 import json
 import os
 import re
-import shutil
 import stat
 import sys
 import tempfile
@@ -304,6 +303,7 @@ def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(dir=folder, prefix=".writing-"))
+    spare = os.open(staging, os.O_RDONLY)  # to empty it by, where no more files may be opened
     try:
         yield staging
         written = sorted(staging.iterdir())
@@ -312,7 +312,11 @@ def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
         for name in set(names) - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        os.close(spare)
+        with suppress(OSError):  # shutil.rmtree opens several files
+            for path in staging.iterdir():
+                path.unlink()
+            staging.rmdir()
 
 
 def _umask() -> int:

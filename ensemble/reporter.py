@@ -8,10 +8,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol, TextIO
+from typing import Protocol, TextIO
+
+from adhesis.ensemble.quantities import duration
 
 _EVERY = 10.0  # s
 _LIVE = 0.1  # s between two states of a line on a terminal
+_CELLS = 24  # of a full bar
 _REWRITE = "\r\x1b[K"
 
 
@@ -125,7 +128,7 @@ class Bar(Protocol):
 
 @contextmanager
 def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
-    """Show a bar on stderr, or in the notebook.
+    """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals and a last one.
 
     Parameters
     ----------
@@ -134,27 +137,25 @@ def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
     remaining : bool
         Whether the time that is left is estimated, from the pace so far.
     """
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    line = StatusLine(_EVERY)
+    shown = what
 
-    columns = [TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
-    if remaining:
-        columns += [TextColumn("left:"), TimeRemainingColumn()]
-    console = Console(stderr=True)
-    # what a command prints meanwhile belongs to stdout, which may be a pipe
-    with Progress(*columns, console=console, redirect_stdout=False) as progress:
-        task: Any = progress.add_task(what, total=1.0)
+    def show(done: float | None, total: float | None, text: str = "") -> None:
+        nonlocal shown
+        parts = [text or what]
+        share = done / total if done is not None and total else None
+        if share is not None:
+            parts.append(f"[{'#' * round(_CELLS * share):.<{_CELLS}}]")
+        parts.append(duration(line.seconds))
+        if remaining and share and share < 1:
+            parts.append(f"about {duration(line.seconds * (1 / share - 1))} left")
+        shown = "  ".join(parts)
+        line.show(lambda: shown)
 
-        def show(done: float | None, total: float | None, text: str = "") -> None:
-            progress.update(task, description=text or what, completed=done, total=total)
-
+    try:
         yield show
+    finally:
+        line.show(lambda: shown, last=True)
 
 
 @contextmanager

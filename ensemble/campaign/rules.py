@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from adhesis.ensemble.errors import InputError, UnitError
-from adhesis.ensemble.quantities import QUANTITIES, Quantity
+from adhesis.ensemble.quantities import QUANTITIES, Quantity, Written
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds
 
@@ -65,7 +65,8 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
         kinds = int if bounds.whole else int | float
         if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError
-        return (checks.whole if bounds.whole else checks.real)("", value, bounds)
+        number = (checks.whole if bounds.whole else checks.real)("", value, bounds)
+        return Written(number, value.unit) if isinstance(value, Written) else number
 
     example = "" if quantity is None else f', or a {quantity.name} as "{quantity.example}"'
     return Rule(bounds.text + example, read, quantity)

@@ -47,6 +47,7 @@ from adhesis.solver.checks import (
     YOUNG,
     Bounds,
 )
+from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
 
@@ -125,6 +126,11 @@ class MaterialTable:
     )
     strength: float | None = _key(
         number_in(STRENGTH), "instead of adhesion_range, the strength in Pa", None, axis="Pa"
+    )
+    measure: Measure = _key(  # noqa: RUF009  # a field
+        choice(*get_args(Measure)),
+        "adhesion acts on the length of the profile, or on its projection",
+        "arc",
     )
 
     @property

@@ -66,7 +66,10 @@ def execute(args: argparse.Namespace) -> int:
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
         strength = strength_of(args.work_of_adhesion, args.adhesion_range, args.strength)
-        problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control, strength)
+        problem = Problem(
+            *(profile, half_space, args.work_of_adhesion, cycle.control, strength),
+            measure=args.measure,
+        )
         cycle.check(problem)
     _check_film(args, cycle)
     wanted, at_stresses = _wanted_fields(args, cycle)

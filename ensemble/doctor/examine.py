@@ -16,7 +16,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.run.launch import (
+    check_file_size_limit,
     cores,
     end_with_parent,
     launch_environment,
@@ -128,30 +130,32 @@ class _Probe:
 
 
 def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
-    with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
-        command = [*launch, *python("-m", "adhesis.ensemble.doctor.probe", scratch)]
+    try:
         if launch:
-            command.append("together")
-        failure = _failure_of(command, python_environment(launch_environment(_RANKS)))
-        reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
-        return _Probe([report for report in reports if report], failure)
+            check_file_size_limit()
+        with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
+            command = [*launch, *python("-m", "adhesis.ensemble.doctor.probe", scratch)]
+            if launch:
+                command.append("together")
+            failure = _failure_of(command, python_environment(launch_environment(_RANKS)))
+            reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
+            return _Probe([report for report in reports if report], failure)
+    except (OSError, WriteError) as error:
+        return _Probe([], f"cannot be started: {error}")
 
 
 def _failure_of(command: list[str], env: dict[str, str]) -> str:
     """Run a command to its end or the time limit; return its failure, empty if there is none."""
-    try:
-        process = subprocess.Popen(
-            command,
-            env=env,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            preexec_fn=end_with_parent,
-        )
-    except OSError as error:
-        return str(error)
+    process = subprocess.Popen(
+        command,
+        env=env,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        preexec_fn=end_with_parent,
+    )
     try:
         output, _ = process.communicate(timeout=_TIME_LIMIT)
     except subprocess.TimeoutExpired:

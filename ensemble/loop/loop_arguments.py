@@ -70,6 +70,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in Pa, or 1MPa (likewise; with --hurst 1e6)",
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
+    contact.add_argument(
+        "--measure",
+        default="arc",
+        metavar="NAME",
+        help="adhesion acts on the length of the profile (arc, default) or its projection (flat)",
+    )
     add_cycle_arguments(contact)
     contact.add_argument(
         "--path",

@@ -102,7 +102,7 @@ def path_summary(result: PathResult) -> str:
             f"minor loop  {part.start:g}, {part.turn:g}, {part.start:g}: {part.loss:.6g} J/m² "
             f"(drops {part.loss_from_drops:.6g}), {end}"
         )
-    lines.append(f"method      {result.method.name}, {result.seconds:.1f} s")
+    lines.append(_method(result))
     return "\n".join(lines)
 
 
@@ -132,9 +132,14 @@ def loop_summary(result: LoopResult) -> str:
             f"{counted(result.races, 'jump')} raced, {result.energy_at_stake:.3g} J/m² at stake",
             f"jumps       {kinds}",
             f"pull-off    mean tension {result.pull_off_stress + 0.0:.6g} Pa",
-            f"method      {result.method.name}, {result.seconds:.1f} s",
+            _method(result),
         )
     )
+
+
+def _method(result: LoopResult | PathResult) -> str:
+    measure = "" if result.problem.measure == "arc" else f"{result.problem.measure} measure, "
+    return f"method      {result.method.name}, {measure}{result.seconds:.1f} s"
 
 
 def _range(result: LoopResult | PathResult) -> str:

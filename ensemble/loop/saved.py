@@ -345,5 +345,6 @@ def _result(found: xr.Dataset) -> Result:
         float(about["work_of_adhesion"]),
         Control(float(about["stiffness"])),
         float(about.get("strength", math.inf)),
+        measure=about.get("measure", "arc"),
     )
     return kind(problem=problem, method=method, **values)

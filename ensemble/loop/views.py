@@ -5,7 +5,6 @@ The mechanics find this module by :data:`adhesis.solver.views.maker`. A call loa
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -189,9 +188,7 @@ def picture_of(figure: Any) -> str:
     """Return a figure as a picture in HTML."""
     from adhesis.ensemble.report.html import picture
 
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=110)
-    return picture(stream.getvalue(), "figure")
+    return picture(figure._repr_png_(), "figure")
 
 
 @contextmanager

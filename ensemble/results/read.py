@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, lack
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import check_head
@@ -347,6 +347,8 @@ def _damage(path: Path) -> Iterator[None]:
     except PermissionError as error:
         raise InputError(f"{path} cannot be read: permission denied") from error
     except Exception as error:  # h5py raises nearly every kind over damaged bytes
+        if isinstance(error, OSError) and lack(error):
+            raise  # too many open files, say: nothing is wrong with this one
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
             raise InputError(f"{path} cannot be read: {os.strerror(error.errno)}") from error
         raise InputError(

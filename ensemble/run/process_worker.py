@@ -13,6 +13,8 @@ import threading
 from collections.abc import Sequence
 from typing import BinaryIO
 
+from adhesis.ensemble.errors import lack
+from adhesis.ensemble.exit_codes import TOO_FEW_RESOURCES
 from adhesis.ensemble.run.dispatch import MASTER, Limits, Message, Worker
 from adhesis.ensemble.run.launch import end_with_parent
 
@@ -70,4 +72,10 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except Exception as failure:
+        if not (sentence := lack(failure)):
+            raise
+        print(sentence, file=sys.stderr)
+        sys.exit(TOO_FEW_RESOURCES)

@@ -17,7 +17,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
-from adhesis.ensemble.quantities import percent
+from adhesis.ensemble.quantities import duration, percent
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
@@ -121,6 +121,11 @@ class Summary(Counts):
     seconds: float = 0.0
     stopped: str | None = None
     precisions: tuple[tuple[str, Precision], ...] = ()
+
+    def __str__(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        now = f"{self.computed} computed in {duration(self.seconds)}"
+        return f"{self.done} of {self.total} tasks done{failed}; {now}"
 
 
 def run_campaign(

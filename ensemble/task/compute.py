@@ -50,7 +50,9 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
         control = Control() if stiffness is None else Control(stiffness)
     material = campaign.material
     strength = strength_of(task.work_of_adhesion, material.adhesion_range, material.strength)
-    return Problem(profile, half_space, task.work_of_adhesion, control, strength)
+    return Problem(
+        profile, half_space, task.work_of_adhesion, control, strength, measure=material.measure
+    )
 
 
 def check_task(campaign: Campaign, task: Task) -> None:

@@ -549,10 +549,13 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
             f"{checks.counted(round(races), 'jump')} would have ended elsewhere under another rule "
             f"of descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
-    for run in answer.plan.runs:
-        of_run = answer.result(run.name) if run.name != "answer" else None
-        for text in of_run["preload_warnings"] if of_run is not None else ():
-            found.append(f"the loop “{run.name}”: {text}")
+    others = [(r.name, answer.result(r.name)) for r in answer.plan.runs if r.name != "answer"]
+    short = [f"“{name}”" for name, of in others if of is not None and of["preload_warnings"]]
+    if short:
+        found.append(
+            f"{len(short)} of {checks.counted(len(others), 'other loop')} did not turn at the "
+            f"preload: {', '.join(short)}; their turning points are in trace.json"
+        )
     failed = []
     for run in answer.plan.runs:
         text = answer.results.get(run.name)

@@ -188,13 +188,13 @@ def _loop(answer: Answer) -> tuple[Figure, str]:
     depth = np.array(states["penetration"])
     stress = np.array(states["mean_stress"])
     contact = np.array(states["contact_fraction"])
-    by, unit = _scale("mean_stress", float(np.abs(stress).max()))
+    unit, size = shown_unit("mean_stress", float(np.abs(stress).max()))
     figure = new_figure(1, 2, TWO_COLUMNS, 2.5)
     left, right = figure.axes
     for name, colour in (("loading", _BLUE), ("unloading", _ORANGE)):
         rows = branch == name
         line = LINE_OF_BRANCH[name]
-        left.plot(depth[rows], by * stress[rows], ls=line, color=colour, label=name)
+        left.plot(depth[rows], stress[rows] / size, ls=line, color=colour, label=name)
         right.plot(depth[rows], contact[rows], ls=line, color=colour, label=name)
     left.axhline(0, color="0.5", lw=0.5)
     left.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel=rf"mean stress $\bar p$ ({unit})")
@@ -242,7 +242,12 @@ def _plain_log(axes: Axes) -> None:
 
 
 def _tables(answer: Answer) -> tuple[Figure, str] | None:
+    cycle = answer.cycle
     gammas, turns = answer.works_of_adhesion, answer.turning_points
+    unit, size = "", 1.0
+    if cycle.at_preload or cycle.control.is_load:
+        unit, size = shown_unit("preload", cycle.turning_points[0])
+        turns = [(turn / size, row) for turn, row in turns]
     if len(gammas) + len(turns) < 4:
         return None
     figure = new_figure(3, 2, TWO_COLUMNS, 4.4, sharex="col")
@@ -266,16 +271,16 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             axes.set_ylim(0, top)
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    panels[2, 1].set_xlabel("turning point " + _turn_label(answer.cycle))
+    panels[2, 1].set_xlabel("turning point: " + _turn_label(cycle, unit))
     return figure, (
         "Bars: the relative uncertainty of the answer; at the other points it is assumed to be "
         "the same."
     )
 
 
-def _turn_label(cycle: Cycle) -> str:
+def _turn_label(cycle: Cycle, unit: str) -> str:
     if cycle.at_preload:
-        return "preload (Pa)"
+        return f"preload ({unit})"
     if cycle.control.is_load:
-        return r"$\bar p$ (Pa)"
+        return rf"$\bar p$ ({unit})"
     return r"$\Delta/h_{\max}$" if cycle.control.is_fixed else r"$u_\mathrm{tot}/h_{\max}$"

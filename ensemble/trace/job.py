@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from adhesis.ensemble.quantities import stress_text
 from adhesis.solver.loading.loop import run_loop, turn_arguments
 from adhesis.solver.loading.loop_result import strain_warnings
 from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
@@ -52,9 +53,9 @@ class Cycle:
             held = "a fixed separation"
             if not self.control.is_fixed:
                 held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
-            return f"a preload of {point:g} Pa at {held}"
+            return f"a preload of {stress_text(point, 4)} at {held}"
         if self.control.is_load:
-            return f"p̄ = {point:g} Pa"
+            return f"p̄ = {stress_text(point, 4)}"
         if self.control.is_fixed:
             return f"Δ/h_max = {point:g}"
         return f"u_tot/h_max = {point:g} of a stiffness of {self.control.stiffness:.4g} Pa/m"

@@ -55,7 +55,7 @@ class Lattice:
             elastic,
             EdgeCompliance(elastic.kernel()),
             profile.heights(n),
-            problem.work_of_adhesion * np.sqrt(1 + profile.slopes(n) ** 2),
+            problem.toughness(profile.slopes(n)),
             problem.control,
             profile.h_max,
             round(profile.highest_point[0] / elastic.dx) % n,

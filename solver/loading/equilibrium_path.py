@@ -267,6 +267,7 @@ class EquilibriumPath(ByValue, ResultViews):
             "work_of_adhesion": gamma,
             "stiffness": finite(problem.control.stiffness),
             "strength": finite(problem.strength),
+            "measure": problem.measure,
             "full_contact_energy": problem.full_contact_energy,
             "load_steps": self.load_steps,
             **values,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import InitVar, dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from adhesis.solver.checks import (
     RMS_SLOPE,
     STRENGTH,
     WORK_OF_ADHESION,
+    choice,
     instance,
     plain,
     real,
@@ -22,8 +23,11 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.control import Control, Value
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.jump import Branch
-from adhesis.solver.model.profile import Profile
+from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
+
+Measure = Literal["arc", "flat"]
+"""Length on which adhesion acts: that of the profile, or its projection."""
 
 LONGEST_GRIFFITH_CRACK = 0.25
 """Length of the longest Griffith crack that may open a patch, in shortest waves."""
@@ -80,7 +84,7 @@ def strength_of(
 class Problem(ByValue):
     """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
 
-    Immutable; two problems are equal if all five parts are.
+    Immutable; two problems are equal if all parts are.
 
     Parameters
     ----------
@@ -96,6 +100,9 @@ class Problem(ByValue):
         Infinite by default, that of adhesion of zero range (docs/zero-range.md).
     adhesion_range : float, optional
         Instead of the strength, the range δ of adhesion in m: σ_th = γ/δ.
+    measure : {"arc", "flat"}
+        γ counts for each length sqrt(1 + h'²) dx along the profile, or for each projected length
+        dx. By keyword only.
 
     Raises
     ------
@@ -118,6 +125,7 @@ class Problem(ByValue):
     control: Control = field(default_factory=Control)
     strength: float = math.inf
     adhesion_range: InitVar[float | None] = None
+    measure: Measure = field(default="arc", kw_only=True)
 
     def __post_init__(self, adhesion_range: float | None) -> None:
         instance("profile", self.profile, Profile, "single_wave or profile_from_heights")
@@ -125,6 +133,7 @@ class Problem(ByValue):
         gamma = real("work_of_adhesion", self.work_of_adhesion, WORK_OF_ADHESION)
         object.__setattr__(self, "work_of_adhesion", gamma)
         instance("control", self.control, Control, "Control(stiffness), for a load Control(0)")
+        choice("measure", self.measure, get_args(Measure))
         check_slope(float(np.sqrt(self.profile.m2)))
         object.__setattr__(self, "strength", strength_of(gamma, adhesion_range, self.strength))
         self._check_strength(adhesion_range)
@@ -145,6 +154,11 @@ class Problem(ByValue):
             f"{self.critical_crack:.3g} m long, exceeds a quarter of the shortest wave, and edges "
             "of zero range do not describe it"
         )
+
+    def toughness(self, slope: Array) -> Array:
+        """Compute the work of adhesion for each projected length, in J/m², at slopes h'."""
+        stretch = np.sqrt(1 + slope**2) if self.measure == "arc" else np.ones_like(slope)
+        return np.asarray(self.work_of_adhesion * stretch)
 
     @property
     def critical_crack(self) -> float:

@@ -146,7 +146,7 @@ class SharpMethod(Method):
             work = share * accuracy * problem.work_of_adhesion
             exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
             tolerance = min(tolerance, exact)
-        source = StressSource(profile, tolerance)
+        source = StressSource(profile, tolerance, problem.measure)
         self.edges = EdgeMechanics(source, critical, tolerance, loading_device(problem))
         self.states = States(problem, source, self.edges.count)
         finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)

@@ -212,6 +212,22 @@ def test_the_time_limit_may_change():
     assert compare(one, two) == compare(one, one)
 
 
+def test_another_measure_is_another_campaign():
+    """Also beside a file that was written before there was the key."""
+    old = parse_campaign(campaign_text())
+    text = campaign_text()
+    assert "measure" not in text
+    new = parse_campaign(text.replace("[material]", '[material]\nmeasure = "flat"'))
+    changes = compare(old, new)
+    assert changes.other == ("material.measure is 'flat' here and 'arc' there",)
+    assert not changes.grown
+    assert [make_problem(one, one.tasks()[0]).measure for one in (old, new)] == ["arc", "flat"]
+    with pytest.raises(
+        InputError, match=r"measure is .projected.: it must be one of .arc., .flat."
+    ):
+        parse_campaign(text.replace("[material]", '[material]\nmeasure = "projected"'))
+
+
 def test_growth_and_other_changes_are_told_apart():
     old = parse_campaign(campaign_text())
     grown = parse_campaign(

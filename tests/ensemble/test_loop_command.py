@@ -497,6 +497,20 @@ def test_the_strength_of_the_interface_is_an_option_and_stands_in_the_json(
     assert "--strength is 0.0001 Pa: it must be at least" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("exact_method")
+def test_the_measure_is_an_option_and_is_stated(wave_file, tmp_path, capsys):
+    out = tmp_path / "loop.json"
+    steps = ("--max-penetration", 0.8, "--load-steps", 2, "--json", out)
+    assert run(*wave_words(wave_file, *steps, "--measure", "flat")) == 0
+    assert json.loads(out.read_text())["measure"] == "flat"
+    assert ", flat measure, " in capsys.readouterr().out
+    assert run(*wave_words(wave_file, *steps)) == 0
+    assert json.loads(out.read_text())["measure"] == "arc"
+    assert "measure, " not in capsys.readouterr().out
+    line = refused(capsys, *wave_words(wave_file, *steps, "--measure", "projected"))
+    assert "--measure is 'projected': it must be one of arc, flat" in line
+
+
 def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(capsys):
     words = ("--hurst", 0.8, "--n0", 4, "--ratio", 4, "--load-steps", 2, "--young", 1e6, "--quiet")
     assert run(*words) == 0

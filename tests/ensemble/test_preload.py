@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,10 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     scene = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.002, "load_steps": 8}
     answer = adhesis.loss_of_trace(prepared, **scene, preload=300.0, quick=True, processes=0)
     assert answer.loss.value == document["loss"]["value"]
+    far = adhesis.loss_of_trace(prepared, **scene, preload=1e9, quick=True, processes=0)
+    (others,) = (text for text in far.warnings if "did not turn at the preload" in text)
+    count = len(far.plan.runs) - 1
+    assert others.startswith(f"{count} of {count} other loops did not turn at the preload: “")
     with pytest.raises(ValueError, match="a weight or a machine"):
         adhesis.loss_of_trace(prepared, **scene, max_stress=300.0)
     with pytest.raises(ValueError, match="preload and max_stress are given"):
@@ -223,9 +228,20 @@ def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
     folder = tmp_path / "report"
     assert main(["report", str(out), "--to", str(folder)]) == 0
     page = (folder / "report.md").read_text()
-    assert "preload of 100 Pa … 400 Pa" in page
+    assert "preload of 0.1 … 0.4 kPa" in page
     assert "Every loop reached its preload." in page
     assert (folder / "loss_along_preload.png").exists()
+
+
+def test_loops_short_of_their_preload_are_counted_below_the_figures(tmp_path):
+    """They turned at one depth, whatever the preload, which the figure would seem to deny."""
+    text = re.sub(r"preload = .*", "preload = [1e8, 2e8]", text_of(realisations="1"))
+    results = adhesis.Campaign(text).run(tmp_path / "c.h5")
+    assert results.plot.loss_along("preload").get_supxlabel() == (
+        "2 of 2 loops did not reach their preload"
+    )
+    said = " ".join(findings.agreement(results.averages))
+    assert "Along preload from 100 MPa to 200 MPa the mean loss in J/m² stays the same in 1" in said
 
 
 def test_a_runner_has_the_bits_of_single_tasks_and_keeps_fields_at_mean_stresses():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import random
@@ -69,6 +70,15 @@ def test_what_was_loaded_is_saved_as_the_same_file(content: bytes, tmp_path: Pat
     assert twice == once
     assert twice.method == once.method
     assert twice.to_xarray().identical(once.to_xarray())
+
+
+def test_the_measure_is_loaded_as_it_was_saved(tmp_path: Path) -> None:
+    flat = dataclasses.replace(PROBLEM, measure="flat", adhesion_range=None)
+    loop = adhesis.run_loop(ExactWave(flat), max_penetration=0.6, load_steps=6)
+    loop.save(tmp_path / "loop.nc")
+    found = adhesis.load(tmp_path / "loop.nc")
+    assert found == loop
+    assert found.problem.measure == "flat"
 
 
 def test_a_bit_that_is_flipped_is_found(content: bytes, tmp_path: Path) -> None:

@@ -59,8 +59,6 @@ NOT_RUN = {
     "adhesis run my.toml --part 3/20 --out part3.h5": "tests/ensemble/test_merge.py",
     "adhesis merge part*.h5 --out all.h5": "as before; a shell knows the names",
     "export ADHESIS=PATH/.venv/bin/adhesis": "a place of the reader's",
-    "python benchmarks/endurance.py empty": "a quiet machine; test_mpi.py runs it short",
-    "python benchmarks/endurance.py campaign jobs/example.toml": "as before",
     "python benchmarks/endurance.py campaign jobs/paper.toml --out paper.h5": "takes minutes",
     "make study": "minutes",
     "python -m study page": "make study",

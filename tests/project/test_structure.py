@@ -42,8 +42,6 @@ FIGURES = {
     "adhesis.ensemble.loop.loop_figure",
     "adhesis.ensemble.loop.film",
     "adhesis.ensemble.bench.bench_figure",
-    "adhesis.ensemble.report.figures.along",
-    "adhesis.ensemble.report.figures.catalogue",
     "adhesis.ensemble.report.figures.shapes_and_spectra",
     "adhesis.ensemble.report.figures.loops",
     "adhesis.ensemble.report.figures.loss_figures",

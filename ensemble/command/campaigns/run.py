@@ -31,7 +31,7 @@ from adhesis.ensemble.exit_codes import (
     TOO_FEW_RESOURCES,
     WRITE_FAILED,
 )
-from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration
+from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import log
 
 if TYPE_CHECKING:
@@ -261,11 +261,7 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary) -> None:
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
-    failed = f", {summary.failed} failed" if summary.failed else ""
-    log(
-        f"{path}: {summary.done} of {summary.total} tasks done{failed}; "
-        f"{summary.computed} computed in {duration(summary.seconds)}"
-    )
+    log(f"{path}: {summary}")
     if summary.failed:
         log(f"why they failed, and what to do: adhesis status {path}")
     for line in precision_lines(summary.precisions):

@@ -16,7 +16,7 @@ from adhesis.ensemble.aggregate.companions import Companion, LossDifference, dif
 from adhesis.ensemble.interval import interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.tables.key import axis_columns, estimate, key_columns
+from adhesis.ensemble.report.tables.key import axis_columns, estimate, gamma_column, key_columns
 from adhesis.ensemble.report.tables.table import (
     Format,
     Table,
@@ -282,8 +282,8 @@ def paired(data: Aggregate) -> Table:
     columns = (
         TableColumn("hurst", attrgetter("hurst"), "H"),
         *axis_columns(data.further),
-        TableColumn("work_of_adhesion_from [J/m^2]", attrgetter("lower"), "γ from"),
-        TableColumn("work_of_adhesion_to [J/m^2]", attrgetter("upper"), "to (J/m²)"),
+        gamma_column(data, "_from", attrgetter("lower"), "γ from"),
+        gamma_column(data, "_to", attrgetter("upper"), "to"),
         TableColumn("pairs", attrgetter("loss.n"), "pairs"),
         *_differences("loss_dimensionless_difference", "loss_dimensionless", "W~ grows by"),
         TableColumn("loss_difference [J/m^2]", attrgetter("loss.mean"), "loss by (mJ/m²)", milli),

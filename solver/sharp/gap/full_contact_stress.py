@@ -15,6 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
+from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.jit import compiled, compiled_for_both, compiled_sums
 
@@ -47,7 +48,7 @@ class Panels(NamedTuple):
     stress, slope : array, shape (finest_count, p)
         Chebyshev coefficients of S and S' on each finest panel.
     tilt : array, shape (finest_count, 12)
-        Those of h'.
+        Those of h'; 0 in the flat measure, as h' serves the length sqrt(1 + h'²) alone.
     half_plane : array, shape (2, finest_count, 8)
         Those of the opening C of a half-plane crack that begins at θ, and of one that ends there.
     weights : array, shape (2, 2·finest_count, p)
@@ -94,6 +95,8 @@ class StressSource:
     profile : Profile
     tolerance : float
         Wanted accuracy of moments and values, relative to the stress of the shortest waves.
+    measure : {"arc", "flat"}
+        Length on which adhesion acts.
 
     Attributes
     ----------
@@ -108,7 +111,7 @@ class StressSource:
     panels : Panels
     """
 
-    def __init__(self, profile: Profile, tolerance: float = 0.0) -> None:
+    def __init__(self, profile: Profile, tolerance: float = 0.0, measure: Measure = "arc") -> None:
         self.top = top = profile.highest_harmonic
         p = next(nodes for limit, nodes in _NODES if tolerance >= limit)
         count = 1 << int(np.ceil(np.log2(max(2 * top + 1, 16))))
@@ -123,6 +126,8 @@ class StressSource:
         slope = _on_panels(1j * m * m * h, x, count)
         y, v = legendre.leggauss(_TILT_NODES)
         tilt = _on_panels(1j * m * h, y, count) @ _to_chebyshev(y)
+        if measure == "flat":
+            tilt[:] = 0.0  # sqrt(1 + h'²) is then 1
         t, _ = legendre.leggauss(_HALF_PLANE_NODES)
         half_plane = [a @ _to_chebyshev(t) for a in _half_plane_openings(m * h, t, count)]
 
