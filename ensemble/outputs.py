@@ -95,7 +95,7 @@ def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> No
                         "overwritten, so give another file"
                     )
             for name, other in seen.items():
-                if _same_file(path, other) and not _is_null(path):
+                if _same_file(path, other) and os.path.realpath(path) != os.devnull:
                     raise InputError(
                         f"{name} and {option} are both {path}: each output needs a file of its own"
                     )
@@ -192,10 +192,6 @@ def _same_file(one: Path, other: Path) -> bool:
         if os.path.samefile(one, other):
             return True
     return os.path.realpath(one) == os.path.realpath(other)
-
-
-def _is_null(path: Path) -> bool:
-    return os.path.realpath(path) == os.devnull
 
 
 # ---------------------------------------------------------------------- writing

@@ -25,7 +25,7 @@ def log(text: str) -> None:
 
 @contextmanager
 def ticking(
-    task: Callable[[], str] | str, write: Callable[[str], None] = log, every: float = _EVERY
+    task: Callable[[], str], write: Callable[[str], None] = log, every: float = _EVERY
 ) -> Iterator[None]:
     """Log at intervals which task is under way, and for how long.
 
@@ -33,8 +33,8 @@ def ticking(
 
     Parameters
     ----------
-    task : str or callable
-        Description of the task, or a callable that returns it; it is called by another thread.
+    task : callable
+        Returns the description of the task; it is called by another thread.
     write : callable
         Takes a line.
     every : float
@@ -45,8 +45,7 @@ def ticking(
 
     def lines() -> None:
         while not over.wait(every):
-            text = task if isinstance(task, str) else task()
-            write(f"{text} ({time.monotonic() - started:.0f} s)")
+            write(f"{task()} ({time.monotonic() - started:.0f} s)")
 
     thread = threading.Thread(target=lines, daemon=True)
     thread.start()
@@ -157,3 +156,26 @@ def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
         yield show
     finally:
         line.show(lambda: shown, last=True)
+
+
+@contextmanager
+def following(what: str) -> Iterator[Bar]:
+    """Show how far a command is: a bar on a terminal, lines at intervals elsewhere.
+
+    Parameters
+    ----------
+    what : str
+        Description, until another text is given.
+    """
+    if sys.stderr.isatty():
+        with bar(what) as show:
+            yield show
+        return
+    shown = what
+
+    def keep(done: float | None, total: float | None, text: str = "") -> None:
+        nonlocal shown
+        shown = text or (what if total is None else f"{what}: {done:g} of {total:g}")
+
+    with ticking(lambda: shown):
+        yield keep

@@ -136,8 +136,7 @@ class Cell:
         if stop.relative_error is None:
             return None
         known = self.estimates[stop.quantity]
-        ends = (known.mean, known.low, known.high)
-        return Precision(stop.quantity, stop.relative_error, known.n, *ends, not self.pending)
+        return Precision(stop.quantity, stop.relative_error, known, not self.pending)
 
 
 def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:

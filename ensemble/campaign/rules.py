@@ -75,21 +75,6 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
     return Rule(bounds.text + example, read, quantity, bounds)
 
 
-def positive_number(unit: str) -> Rule:
-    """A number that is positive and of a size that one can compute with."""
-    return number_in(Bounds(1e-30, 1e30, unit=unit))
-
-
-def negative_number(least: float) -> Rule:
-    """Least ≤ value < 0."""
-    return number_in(Bounds(least, 0.0, without_high=True))
-
-
-def number_between(low: float, high: float) -> Rule:
-    """Low < value < high."""
-    return number_in(Bounds(low, high, without_low=True, without_high=True))
-
-
 def whole_number(least: int, most: int = 2**63 - 1) -> Rule:
     """Least ≤ value ≤ most, an integer."""
     return number_in(Bounds(least, most, whole=True))

@@ -12,7 +12,7 @@ import socket
 import subprocess
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +47,12 @@ class Check:
 class Diagnosis:
     """Result of :func:`examine`."""
 
-    versions: dict[str, str]
+    writer: str  # "mpio" or "rank 0"
+    why: str
     cores: int
     mpirun: str
     mpirun_version: str
-    writer: str  # "mpio" or "rank 0"
-    why: str
+    versions: dict[str, str]
     checks: list[Check] = field(default_factory=list)
 
     @property
@@ -62,16 +62,7 @@ class Diagnosis:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the results as a dictionary, for ``--json``."""
-        return {
-            "usable": self.usable,
-            "writer": self.writer,
-            "why": self.why,
-            "cores": self.cores,
-            "mpirun": self.mpirun,
-            "mpirun_version": self.mpirun_version,
-            "versions": self.versions,
-            "checks": [vars(check) for check in self.checks],
-        }
+        return {"usable": self.usable, **asdict(self)}
 
 
 def examine(directory: Path | str | None = None) -> Diagnosis:

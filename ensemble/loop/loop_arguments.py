@@ -14,9 +14,9 @@ from pathlib import Path
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, STRESS, WORK_OF_ADHESION
 from adhesis.ensemble.trace.trace_arguments import (
     add_cycle_arguments,
+    add_method_arguments,
     add_open_argument,
     add_reading_arguments,
-    add_strength_arguments,
 )
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
@@ -72,7 +72,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
     add_open_argument(contact)
-    add_strength_arguments(contact)
     contact.add_argument(
         "--measure",
         default="arc",
@@ -87,12 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in contact",
     )
     method = parser.add_argument_group("method")
-    method.add_argument(
-        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
-    )
-    method.add_argument(
-        "--accuracy", type=float, default=1e-3, help="relative error of the loss (default 1e-3)"
-    )
+    add_method_arguments(method, "relative error of the loss (default 1e-3)")
     method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
     output = parser.add_argument_group("output")
     output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")

@@ -34,12 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
     add_open_argument(contact)
-    add_strength_arguments(contact)
     add_cycle_arguments(contact)
-    contact.add_argument(
-        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
-    )
-    contact.add_argument("--accuracy", type=float, default=1e-3, help="of each loop (default 1e-3)")
+    add_method_arguments(contact, "of each loop (default 1e-3)")
     add_reading_arguments(parser)
     output = parser.add_argument_group("output")
     output.add_argument("--to", type=Path, metavar="DIR", help="for the page, its figures and JSON")
@@ -52,7 +48,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare turning points and control, which ``adhesis loop`` shares."""
+    """Declare strength, turning points and control, which ``adhesis loop`` shares."""
+    group.add_argument(
+        "--adhesion-range",
+        type=LENGTH.option,
+        metavar="D",
+        help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
+        "(default: zero range, they never do)",
+    )
+    group.add_argument(
+        "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"
+    )
     group.add_argument(
         "--max-penetration",
         metavar="D[,D…]",
@@ -96,18 +102,12 @@ def add_open_argument(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def add_strength_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare the strength of the interface; ``adhesis loop`` shares it."""
+def add_method_arguments(group: argparse._ArgumentGroup, accuracy: str) -> None:
+    """Declare method and accuracy; ``adhesis loop`` shares them."""
     group.add_argument(
-        "--adhesion-range",
-        type=LENGTH.option,
-        metavar="D",
-        help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
-        "(default: zero range, they never do)",
+        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
     )
-    group.add_argument(
-        "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"
-    )
+    group.add_argument("--accuracy", type=float, default=1e-3, help=accuracy)
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:

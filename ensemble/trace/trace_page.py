@@ -17,7 +17,7 @@ from adhesis.ensemble.quantities import (
     with_error,
 )
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
+from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Uncertain, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
@@ -131,7 +131,7 @@ def write_all(answer: Answer, folder: Path) -> Path:
 # ---------------------------------------------------------------------- content
 
 
-def _value(quantity: Quantity, by: float, unit: str, most: float = math.inf) -> str:
+def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) -> str:
     """Return a quantity that is not negative, with its interval."""
     unit = f" {unit}" if unit else ""
     known = with_error(by * quantity.value, by * quantity.uncertainty, 0.0, most)
@@ -242,9 +242,8 @@ def _variant_rows(answer: Answer) -> list[list[str]]:
 def _sweep_rows(answer: Answer) -> list[list[str]]:
     cycle = answer.cycle
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
-    rows = [(gamma, point, answer.main)]
-    rows += [(float(n.split()[1]), point, r) for n, _, r in answer.group("work of adhesion")]
-    rows += [(gamma, float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    rows = [(g, point, numbers) for g, numbers in answer.works_of_adhesion]
+    rows += [(gamma, d, numbers) for d, numbers in answer.turning_points if d != point]
     head = ["γ, J/m²", cycle.turn_sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
     return [
         head,

@@ -100,8 +100,16 @@ BAD = {
         ),
         *(
             (f"c.toml --redo all {option} {bad}", f"{option} is '{bad}'")
-            for option in ("--hurst", "--work-of-adhesion", "--realisation")
+            for option in ("--hurst", "--realisation")
             for bad in ("x", "-1", "nan")
+        ),
+        ("c.toml --redo all --work-of-adhesion x", "--work-of-adhesion is 'x': it must be"),
+        *(
+            (
+                f"c.toml --redo all --work-of-adhesion {bad}",
+                f"--work-of-adhesion is {bad}: this campaign has no such task",
+            )
+            for bad in ("-1", "nan")
         ),
     ],
     "status": [
@@ -210,7 +218,7 @@ def test_an_option_that_is_given_twice_is_refused(words, capsys):
     line = refused(capsys, ["loop", "--hurst", "0.8", *words.split()])
     assert line.startswith(f"adhesis loop: {option} is given twice: give it once")
     many = parser_of("run").parse(["c.toml", "--hurst", "0.7", "--hurst", "0.8"])
-    assert many.hurst == ["0.7", "0.8"]  # may be repeated
+    assert many.hurst == [0.7, 0.8]  # may be repeated
     assert not [name for name in vars(many) if name.startswith("_")]
 
 

@@ -24,7 +24,7 @@ from adhesis.ensemble.run.dispatch import (
     Unresponsive,
     Worker,
 )
-from adhesis.ensemble.run.processes import Processes, Work
+from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.solver.runtime.compiler import Compiler
@@ -451,7 +451,7 @@ def half(task, check):
 
 
 def test_processes_are_workers_like_any_other():
-    with Processes(2, Work(half)) as channel:
+    with Processes(2, half) as channel:
         outcomes, reason = hand_out(channel, 20)
     assert reason is None
     found = {outcome.task: outcome.error or outcome.result for outcome in outcomes}
@@ -466,7 +466,7 @@ def never(task, check):
 
 def test_a_process_that_is_killed_fails_its_task_and_is_replaced():
     killed = []
-    with Processes(1, Work(never, report_interval=0.01)) as channel:
+    with Processes(1, never, report_interval=0.01) as channel:
 
         def tick():
             if not killed and master.notes.get(0):

@@ -16,7 +16,7 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report import findings
-from adhesis.ensemble.task.compute import Runner, make_problem, run_task
+from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 
@@ -215,7 +215,7 @@ def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
     )
     assert (loops.preload_reached == 1).all()
     for task in campaign.tasks():
-        row = run_task(campaign, task)
+        row = Runner()(campaign, task)
         here = loops.sel(preload=dict(task.others)["preload"], realisation=task.realisation)
         assert float(here.loss.squeeze()) == row["loss"]
         method = make_method("sharp", make_problem(campaign, task))
@@ -249,7 +249,7 @@ def test_a_runner_has_the_bits_of_single_tasks_and_keeps_fields_at_mean_stresses
     campaign = parse_campaign(text_of(realisations="1"))
     runner = Runner()
     for task in campaign.tasks():
-        row, alone = runner(campaign, task), run_task(campaign, task)
+        row, alone = runner(campaign, task), Runner()(campaign, task)
         for name in row.keys() - {"wall_time", "cpu_time"}:
             np.testing.assert_array_equal(row[name], alone[name])
         preload = dict(task.others)["preload"]
@@ -268,7 +268,7 @@ def test_a_machine_of_a_campaign_may_go_beyond_the_height_of_its_profile():
         text_of("preload = 400\nstiffness = 1e8\nmax_penetration = 6", realisations="1")
     )
     (task,) = campaign.tasks()
-    row = run_task(campaign, task)
+    row = Runner()(campaign, task)
     assert row["preload_reached"] == 1
     stress = row["loading_mean_stress"]
     beyond = row["turning_penetration"] + 400 / (1e8 * row["h_max"])

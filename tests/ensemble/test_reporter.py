@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import sys
 import time
 
-from adhesis.ensemble.reporter import ticking
+from adhesis.ensemble.reporter import following, ticking
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 
 
@@ -20,9 +21,20 @@ def test_what_takes_long_is_told_and_what_is_over_is_not() -> None:
     assert said[0] == "0 of 2 (0 s)"
     assert said[1].startswith("1 of 2")
     reported = len(said)
-    with ticking("no sooner than it is due", said.append, every=60.0):
+    with ticking(lambda: "no sooner than it is due", said.append, every=60.0):
         pass
     assert len(said) == reported
+
+
+def test_what_is_printed_beside_a_bar_goes_to_stdout(capsys, monkeypatch) -> None:
+    terminal = _Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    with following("claims") as show:
+        show(1, 2, "the first claim")
+        print("the first claim holds")
+    assert capsys.readouterr().out == "the first claim holds\n"
+    assert "the first claim" in terminal.getvalue()
 
 
 def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(monkeypatch) -> None:
@@ -39,7 +51,7 @@ def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(mo
 
     now, log = [0.0], Log()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    progress = ProgressLine(Counts(total=10, done_before=0), lambda: None, log)
+    progress = ProgressLine(Counts(total=10), lambda: None, log)
     while now[0] < 36000.0:
         progress.tick()
         now[0] += 0.5
@@ -57,15 +69,17 @@ class _Terminal(io.StringIO):
 def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> None:
     now, stream = [0.0], _Terminal()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    counts = Counts(total=3, done_before=1)
+    counts = Counts(total=3, done=1)
     progress = ProgressLine(counts, lambda: None, stream)
     progress.tick()
     progress.tick()  # too early
     progress.failure("H = 0.8", "diverged")
-    counts.done, counts.failed, now[0] = 1, 1, 2.0
+    counts.done = 2
+    counts.computed = counts.failed = counts.failed_now = 1
+    now[0] = 2.0
     progress.tick()
-    progress.close()
-    progress.close()
+    progress.end()
+    progress.end()
     first, last = "1 of 3 tasks done", "2 of 3 tasks done, 1 failed, 2.0 s so far"
     shown = stream.getvalue().replace("\r\x1b[K", "|")
     assert shown == f"|{first}|failed: H = 0.8: diverged\n|{last}|{last}\n"

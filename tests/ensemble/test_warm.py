@@ -73,7 +73,8 @@ from pathlib import Path
 import numpy as np
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.task.compute import Runner
-from adhesis.ensemble.trace.job import Job, run
+from adhesis.ensemble.trace.job import Cycle, Job, run
+from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.precompile import COMPILED_METHODS, compiled_in, warm, watch_compilation
 def kept():
@@ -89,7 +90,8 @@ with watch_compilation() as seen:
             assert np.isfinite(row["gap_density"]).any() and "field_gap" in row
     profile = self_affine_profile(0.7, period=1e-3, n0=1, ratio=4, seed=2, h_rms=1e-6)
     for method in ("sharp", "grid"):
-        run(Job("answer", 1e-3, profile.coefficients, 1e6, 0.5, 0.02, 0.6, 4, method, 0.05))
+        cycle = Cycle(HalfSpace(1e6, 0.5), (0.02,), (0.6,), 4, method, 0.05)
+        run(Job("answer", profile, cycle, 0.02, 0.6))
 print(seen.functions, *sorted(kept() - before))
 """
 

@@ -184,11 +184,11 @@ def precision(data: Aggregate) -> Table:
     three_digits = partial(percent, digits=3)
     columns = (
         *key_columns(data),
-        TableColumn("n", attrgetter("precision.count"), "n"),
+        TableColumn("n", attrgetter("precision.estimate.n"), "n"),
         TableColumn("quantity", attrgetter("precision.quantity"), "quantity"),
-        TableColumn("mean", attrgetter("precision.mean"), "mean", number()),
-        TableColumn("ci_low", attrgetter("precision.low"), "95 % from", number()),
-        TableColumn("ci_high", attrgetter("precision.high"), "to", number()),
+        TableColumn("mean", attrgetter("precision.estimate.mean"), "mean", number()),
+        TableColumn("ci_low", attrgetter("precision.estimate.low"), "95 % from", number()),
+        TableColumn("ci_high", attrgetter("precision.estimate.high"), "to", number()),
         TableColumn(
             "relative_error",
             lambda cell: finite(cell.precision.relative_error),
