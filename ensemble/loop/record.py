@@ -156,7 +156,9 @@ def _range(result: LoopResult | PathResult) -> str:
 
 def _audit(result: LoopResult | PathResult) -> str:
     """The line of the audit; without adhesion there is no loss that a residual could refer to."""
-    drops = f"{result.loss_from_drops:.6g} J/m² in {counted(len(result.jumps), 'jump')}"
+    friction = " and the friction between them" if result.problem.pinning > 0 else ""
+    jumps = f"{counted(len(result.jumps), 'jump')}{friction}"
+    drops = f"{result.loss_from_drops:.6g} J/m² in {jumps}"
     if result.problem.work_of_adhesion == 0:
         return f"audit       {drops}; without adhesion nothing is lost"
     return f"audit       {drops}, residual {result.audit_residual:.2e}"
