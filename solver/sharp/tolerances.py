@@ -99,10 +99,11 @@ REFERENCE_SCALE = 10.0
 """Length, in longest steps (``LONGEST_STEP``), over which the response changes in gaps and patches
 that are longer; its error is the motion squared over it. With one longest step 352 gaps took 17 %
 more CPU time, with the same losses to 2e-5."""
-SOFT_RATE = 2.0
-"""Mean |dn/dd| of all edges, as a unit. A faster edge is taken to be next to a fold, where its
-tangent changes fast, too: it may leave its reference by less. Without this, descents next to folds
-went to and fro between windows and all gaps, and took half of a loop's time."""
+SOFT_EDGE = 6.0
+"""Compliance of an edge, over that of its gap by itself or by roughness of the shortest wave. A
+softer edge is taken to be next to a fold, where its tangent changes fast, too: it may leave its
+reference by less. In loops at the paper's scale half of all edges have 2 to 4. Without this folds
+were found up to 6e-4 h_max late."""
 REFERENCE_BALANCE = 0.01
 """C_c. Edges further out of balance in the reference of their gap, in the potentials that it had,
 follow otherwise than its response has it. Without this rates were wrong by 2e-3 after some gaps had
@@ -113,10 +114,14 @@ new one. At 0.3, 53 of 857 failures of Newton's iteration were of states that de
 (γ = 0.0025 at the paper's scale), at 0.1 eight."""
 REFERENCE_MOST_FAR = 0.25
 """Share of all gaps that may move so far before all are solved anew."""
+FEW_REFERENCES = 8
+"""Gaps: fewer count as so many for that."""
 REFERENCE_PATCH = 0.2
 """Share of a patch by which it may change before the nodes beside it are placed anew."""
 FURTHER_ORDERS = 2
 """Orders by which the rule of a gap that has changed is raised beyond what it needs."""
+FURTHER_CHARGES = 1.25
+"""Factor on the charges of the runs that hold such a gap."""
 RESPONSES_KEPT = 3
 """Responses that are kept, each of another number of gaps."""
 RESPONSE_TRIALS = 4
@@ -187,6 +192,28 @@ RUNNING_ENDS = 0.01
 """Longest steps; a shorter one ends the flow through the model."""
 RUNNING_LENGTH = 0.5
 """Longest steps; edges that move further in the model run."""
+RUNNING = 0.01
+"""C_c. Edges further out of balance run, those nearer to it follow by their tangent."""
+LEAST_DAMPING = 2.0
+"""Times the tangent of their gaps: damping of running edges. With once that, it may cancel it."""
+DAMPING_GROWTH = 16.0
+"""Times by which that grows where the edges are not stable with it."""
+SOFT_SHARE = 0.3
+"""Of the softness of the softest gap; softer ones run where the edges are not stable."""
+MOST_DAMPING = 1e6
+"""Times that tangent; where the edges are not stable with it, they have no field."""
+FOLLOWING = 0.2
+"""Longest steps; edges that Newton's step of all edges moves further run."""
+SHORT_REACH = 3.0
+"""Longest steps: reach of a step near balance."""
+SHORTEST_REACH = 0.1
+"""Longest steps; so short a step is not rejected."""
+FAINT_SADDLE = 0.01
+"""Faintest forces (``FAINT_FORCE``); at a saddle smaller ones are not followed."""
+MODEL_SHORT_STEP = 0.1
+"""Longest steps (0.005 λ_min) of one step through the model near balance, where modes of different
+edges may compete, and their times decide: with twenty times this a loop (γ = 0.04, seed 1) lost
+6e-5 less, as another edge came first."""
 SLOWEST = 0.01
 """Of the largest force. With equal speeds edges with less force than this are slower."""
 TIME_TRIES = 20

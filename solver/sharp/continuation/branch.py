@@ -140,8 +140,7 @@ class Branch:
         may predict; without one the point has none before it.
         """
         before, after = jump.before, jump.point
-        # of few gaps a jump moves nearly all: it saves no field there
-        if before is None or after is None or not self._edges.uses_windows(after.gaps):
+        if before is None or after is None:
             return after
         longest = PREDICTED_MOTION * self._edges.wave
         remaining = self._target.at - before.at

@@ -65,7 +65,6 @@ class Follower:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
-        self._last: tuple[ContinuationData, Point] | None = None
         self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, memory: ContinuationData | None) -> Point | None:
@@ -74,10 +73,8 @@ class Follower:
         self.openings.healed = []
         if memory is None or memory.branch_data is None:
             return None
-        if self._last is not None and self._last[0] is memory:
-            return self._last[1]
         at, nearly, rate, slope, previous = memory.branch_data
-        field = self.edges.field_again(memory.gaps, at, *nearly)
+        field = self.edges.field(memory.gaps, at, nearly)
         return Point(at, field, rate, slope, memory.clearance, previous)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
@@ -123,11 +120,6 @@ class Follower:
             BranchData(point.at, point.field.nearly, point.rate, point.slope, point.previous),
             self.nucleation.searched,
         )
-        # A dense field does not depend on the way to it; a hierarchical one does.
-        if self.edges.uses_windows(point.field.gaps):
-            self._last = None
-        else:
-            self._last = memory, point
         history.states[-1] = with_values(history.states[-1], internal=memory)
 
     def _handle_accepted(
@@ -283,7 +275,7 @@ class Follower:
         low = self.nucleation.minimum(point.field)[0]
         way = abs(fold.at - point.at)
         if not self.edges.is_fixed:
-            response = self.edges.system(point.gaps).response_before_fold(point)
+            response = self.edges.response_before_fold(point)
             way *= max(1.0, abs(response.separation))
         if low > self.closing.rate_at_fixed_edges(point) * way:
             return None
@@ -303,8 +295,7 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             last = self.states.of_point(point)
             states = (last,)
-        system = self.edges.system(point.gaps)
-        response = system.response_before_fold(point)
+        response = self.edges.response_before_fold(point)
         before = self.states.at_fixed_edges(last, point.field, response, fold.at)
         jump = self.jumps.compute(
             before, self._start_at_fold(fold), fold.at, target.branch, known=point,
@@ -317,7 +308,7 @@ class Follower:
         if late > allowed and finest > self.resolution.finest:
             share = max(LATE_REFINEMENT * allowed / late, LEAST_REFINEMENT)
             return None, max(share * min(way, finest), self.resolution.finest)
-        displaced = self.states.work(before, after, abs(system.fold_displacement(point)))
+        displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
@@ -328,7 +319,7 @@ class Follower:
         two, point = fold.with_another, fold.point
         if two is None:
             return None
-        displaced = abs(self.edges.system(point.gaps).fold_displacement(point))
+        displaced = abs(self.edges.fold_displacement(point))
         if two.apart > max(self.resolution.order, SECOND_FOLD_DISPLACED * displaced):
             return None
         furthest = max(fold.at, two.beyond) if fold.at > point.at else min(fold.at, two.beyond)
@@ -347,7 +338,7 @@ class Follower:
             return point.gaps
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
-        away = positions(map_gaps(point.gaps), self.edges.law.origin)[fastest]
+        away = positions(point.gaps, self.edges.law.origin)[fastest]
         return self._moved_on(fold, int(fastest[np.argmin(away)]), self.edges.law.rest_step)
 
     def _moved_on(self, fold: Fold, edge: int, length: float) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import Integers
 

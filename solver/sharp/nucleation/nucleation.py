@@ -20,7 +20,7 @@ from adhesis.solver.model.profile import EQUAL_CRESTS, Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.gap.full_contact_stress import Panels

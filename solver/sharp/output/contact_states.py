@@ -13,7 +13,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
-from adhesis.solver.sharp.field.dense_solver import FixedEdgeResponse, GapField
+from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource

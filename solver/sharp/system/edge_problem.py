@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
-from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import (
     FIXED_SEPARATION,
     FieldModel,
     LoadingDevice,
-    Solution,
 )
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES
@@ -94,13 +91,6 @@ class EdgeProblem:
             panels=source.panels,
         )
         self.count = Counters()
-
-    def solved(
-        self, gaps: Array, prescribed: float, solution: Solution, share: float = 1.0
-    ) -> GapField:
-        """Return the field of these gaps, of which the solution is known."""
-        tolerance = share * self.tolerance
-        return GapField(self.source, gaps, prescribed, tolerance, self.model.device, solution)
 
     @property
     def is_fixed(self) -> bool:

@@ -1,0 +1,293 @@
+"""Descent in energy along a jump: the gradient flow of the edges, on the tree of gaps; compiled.
+
+With n the outward motions and f = C_c² - C² the forces, the edges follow ṅ = f. Few of them run at
+a time. These, and those beside them, are held in the linear response, so that the others are
+stable and follow; of the held ones the tangent is condensed (``condensed``). With it their flow is
+integrated through a model of their openings (``model_flow``), over several shortest waves where
+they run, and over a fraction of one near equilibria and saddles, where a gap closes or a patch
+vanishes. The field at the end of each step shows how wrong the model was.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.descent.edge_model import model_about
+from adhesis.solver.sharp.descent.model_flow import (
+    flow_through,
+    largest,
+    near_balance,
+    no_flow,
+)
+from adhesis.solver.sharp.descent.step_size import (
+    model_error,
+    next_reach,
+)
+from adhesis.solver.sharp.equilibrium.condensed import (
+    follow_edges,
+    residual_of,
+    tangent_of,
+)
+from adhesis.solver.sharp.equilibrium.griffith import (
+    EdgeLaw,
+    critical_opening,
+    move_edges,
+    shortest_length,
+    step_limits,
+)
+from adhesis.solver.sharp.equilibrium.linear_response import (
+    Flags,
+    LinearResponse,
+    ResponseSolution,
+    motion_to,
+    pressure_at,
+    solve_response,
+)
+from adhesis.solver.sharp.equilibrium.renewal import condense_gaps, hold_edges, move_references
+from adhesis.solver.sharp.field.solution import FieldModel
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
+from adhesis.solver.sharp.gap.quadrature import Integers
+from adhesis.solver.sharp.tolerances import (
+    CLOSING_SHARE,
+    FOLLOWING,
+    FURTHEST_FOLLOWING,
+    LEAST_REACH,
+    LONG_CLOSING,
+    RUNNING,
+    RUNNING_LENGTH,
+    SHORT_REACH,
+    SHORTEST_REACH,
+)
+
+# Events that end a descent.
+AT_REST = 0  # the steps have become short: Newton's iteration finds the equilibrium
+VANISHED = 1  # a gap or patch is below the smallest length
+STEP_LIMIT = 2  # the steps that were allowed are used up
+NO_FIELD = 3  # the edges have no field
+OUTGROWN = 4  # some gap needs more nodes than the linear response has
+
+
+class Descent(NamedTuple):
+    """Result of a descent.
+
+    Attributes
+    ----------
+    event : int
+        Why it ended: one of the events of this module.
+    gaps : array, shape (L, 2)
+        Where it ended.
+    steps : int
+        Solutions of the linear response.
+    reach : float
+        Of the next long step, in longest steps.
+    """
+
+    event: int
+    gaps: Array
+    steps: int
+    reach: float
+
+
+@compiled_for_both
+def descend(
+    response: LinearResponse,
+    gaps: Array,
+    prescribed: float,
+    most: int,
+    equal_speeds: bool,
+    runs: Flags,
+    taken: Array,
+    reach: float,
+    law: EdgeLaw,
+    model: FieldModel,
+) -> Descent:
+    """Descend in energy, d being ``prescribed``, until an event.
+
+    ``runs`` marks the edges that run already, and ``taken``, shape (2, 2L), is the force outwards, and
+    inwards, that running edges have taken from each other; both are changed in place. ``reach`` is
+    that of the first long step.
+
+    With equal speeds, for comparison, each edge has the time Δτ in which its own force would move
+    it by the longest step.
+    """
+    held = _beside(runs)
+    edges: Integers = np.flatnonzero(held)
+    before, flow = gaps, no_flow()
+    pressure = pressure_at(response, prescribed, model.device)
+    strongest, event, steps = 0.0, STEP_LIMIT, 0
+    moved, judges = True, False
+    tangent = np.empty((0, 0))
+    while steps < most:
+        if moved:
+            if not move_references(response, gaps, held, pressure, prescribed, law, model):
+                event = OUTGROWN
+                break
+        else:
+            condense_gaps(response, hold_edges(response, gaps, held), model)
+        steps, moved = steps + 1, False
+        now = solve_response(response, prescribed, law, model.device)
+        if not np.isfinite(now.pressure):
+            event = NO_FIELD
+            break
+        pressure = now.pressure
+        residual = residual_of(response, edges, now)
+        if judges:
+            judges = False
+            error = model_error(flow, residual, edges, gaps, law, model.panels)
+            length = np.abs(flow.motion).max() / law.longest_step
+            reach = max(next_reach(reach, length, error), SHORTEST_REACH)
+            if error > 1 and length > 1.5 * SHORTEST_REACH:
+                _take_force(taken, edges, tangent, -flow.motion, law)
+                gaps, moved = before, True
+                continue
+        more = _run_more(runs, response, now.motion - response.here, law)
+        if not (now.stable or more):
+            if not _run_weakest(runs, held, response, now):
+                event = NO_FIELD
+                break
+            more = True
+        if more:
+            held = _beside(runs)
+            edges = np.flatnonzero(held)
+            continue
+        tangent = tangent_of(response, edges, now, model.device)
+        force = force_at(residual, edges, gaps, law, model.panels)
+        strongest = max(strongest, force)
+        is_long = reach >= LEAST_REACH and not near_balance(force, strongest, law)
+        while True:
+            openings = model_about(edges, gaps, residual, tangent, law, model.panels)
+            most_motion, share = min(reach, SHORT_REACH) * law.longest_step, CLOSING_SHARE
+            if is_long:
+                most_motion, share = reach * law.longest_step, LONG_CLOSING
+            limit = step_limits(map_gaps(gaps), most_motion, share)[edges]
+            flow = flow_through(
+                openings, limit, equal_speeds, is_long, strongest, law, model.panels
+            )
+            size = largest(flow.motion)
+            shortest = shortest_length(move_edges(gaps, _spread(flow.motion, edges, held)))
+            runs_on = flow.is_at_limit or size > RUNNING_LENGTH * law.longest_step
+            if not is_long or (runs_on and not shortest < law.smallest):
+                break
+            is_long = False
+        way, pressure = follow_edges(response, edges, flow.motion, now, model.device)
+        way -= motion_to(response, gaps)
+        way[edges] = flow.motion  # without rounding
+        if _run_far(runs, held, way, law):
+            held = _beside(runs)
+            edges = np.flatnonzero(held)
+            continue
+        judges = edges.shape[0] > 0
+        _take_force(taken, edges, tangent, flow.motion, law)
+        before, gaps, moved = gaps, move_edges(gaps, way), True
+        if shortest_length(gaps) < law.smallest:
+            event = VANISHED
+            break
+        if largest(way) < law.rest_step and not flow.is_at_limit:
+            event = AT_REST
+            break
+    return Descent(event, gaps, steps, reach)
+
+
+@compiled
+def _take_force(
+    taken: Array, edges: Integers, tangent: Array, motion: Array, law: EdgeLaw
+) -> None:
+    """Add the force C_c² - C² that some edges take from each other by their motions."""
+    for e in range(edges.shape[0]):
+        for f in range(edges.shape[0]):
+            force = law.critical * (tangent[e, f] + tangent[f, e]) * motion[f]
+            if e != f:
+                taken[0 if force > 0 else 1, edges[e]] += abs(force)
+
+
+@compiled
+def _spread(motion: Array, edges: Integers, held: Flags) -> Array:
+    """Return the motions of all edges, from those of some."""
+    out = np.zeros(held.shape[0])
+    out[edges] = motion
+    return out
+
+
+@compiled
+def force_at(
+    residual: Array, edges: Integers, gaps: Array, law: EdgeLaw, panels: Panels
+) -> float:
+    """Compute the norm of the forces C_c² - C |C| from C - C_c at some edges."""
+    square = 0.0
+    for i in range(edges.shape[0]):
+        critical, _ = critical_opening(gaps[edges[i] // 2, edges[i] % 2], law, panels)
+        opening = residual[i] + critical
+        square += (critical * critical - opening * abs(opening)) ** 2
+    return float(np.sqrt(square))
+
+
+@compiled
+def _run_weakest(
+    runs: Flags, held: Flags, response: LinearResponse, now: ResponseSolution
+) -> bool:
+    """Let the softest edge run where the others are not stable; False if all are held.
+
+    It is sought among the gaps of the smallest run of the tree that is not stable.
+    """
+    negative, ranges = response.factor.negative, response.tree.gap_range
+    first, last = 0, runs.shape[0] // 2 - 1
+    for run in range(negative.shape[0]):
+        if negative[run] > 0:
+            first, last = ranges[run, 0], ranges[run, 1]
+            break
+    weakest, softest = -1, -1.0
+    tangent, by_pressure = response.tangent, response.opening_by_pressure
+    for e in range(2 * first, 2 * last + 2):
+        if not held[e]:
+            stiff = abs(tangent[e, 0]) + abs(tangent[e, 1])
+            soft = abs(now.by_pressure[e] / by_pressure[e]) * stiff
+            if soft > softest:
+                weakest, softest = e, soft
+    if weakest < 0:
+        return False
+    runs[weakest] = True
+    return True
+
+
+@compiled
+def _run_more(runs: Flags, response: LinearResponse, ahead: Array, law: EdgeLaw) -> bool:
+    """Let edges run that are out of balance; returns whether they are more.
+
+    If none runs yet, those run, too, that Newton's step moves far.
+    """
+    more, none = False, not runs.any()
+    for e in range(runs.shape[0]):
+        unbalanced = abs(response.residual[e]) > RUNNING * law.critical
+        far = abs(ahead[e]) > FOLLOWING * law.longest_step
+        if (unbalanced or (none and far)) and not runs[e]:
+            runs[e], more = True, True
+    return more
+
+
+@compiled
+def _run_far(runs: Flags, held: Flags, way: Array, law: EdgeLaw) -> bool:
+    """Let edges run that would follow too far; returns whether there are any."""
+    more = False
+    for e in range(runs.shape[0]):
+        # written so that NaN is too far
+        near = abs(way[e]) <= FURTHEST_FOLLOWING * law.longest_step
+        if not (held[e] or near):
+            runs[e], more = True, True
+    return more
+
+
+@compiled
+def _beside(runs: Flags) -> Flags:
+    """Mark the edges that run, and those beside them."""
+    count = runs.shape[0]
+    some = runs.copy()
+    for e in range(count):
+        if runs[e]:
+            some[(e + 1) % count] = True
+            some[e - 1] = True
+    return some
