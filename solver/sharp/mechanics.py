@@ -50,9 +50,7 @@ from adhesis.solver.sharp.tolerances import (
     EQUAL_GAINS,
     FINER_FIELD,
     FIRST_REACH,
-    HELD_BACK,
     LAST_GAP,
-    RAN,
     RESPONSE_TRIALS,
     RESTS,
 )
@@ -182,8 +180,7 @@ class EdgeMechanics(EdgeProblem):
             The minimum, or the gaps without those gaps and patches that have closed or vanished on
             the way (an empty array when no contact is left).
         bool
-            Whether the order in which edges ran may have decided that: some took so much force from
-            others. Edges that increase each other's force reach the same minimum in any order.
+            Whether the order in which edges ran may have decided that.
 
         Raises
         ------
@@ -193,21 +190,20 @@ class EdgeMechanics(EdgeProblem):
             If the last gap closes, as it may where the separation is not fixed.
         """
         law = self.law
-        left, orders, rests = DESCENT_LIMIT, _ANY, 0
+        left, orders, rests, raced = DESCENT_LIMIT, _ANY, 0, False
         rested, start = np.empty((0, 2)), gaps
-        taken = np.zeros((2, gaps.size))
         while left > 0 and rests <= 2 * RESTS:
             end, orders = self._descend(
-                gaps, prescribed, left, orders, law, equal_speeds, taken
+                gaps, prescribed, left, orders, law, equal_speeds, start
             )
-            gaps = end.gaps
+            gaps, raced = end.gaps, raced or end.raced
             left -= end.steps
             if end.event == NO_FIELD:
                 raise NoState("there is no field of these edges", prescribed)
             if end.event == VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
-                    return rest, self._raced(start, gaps, taken)
+                    return rest, raced
                 law = law._replace(smallest=self._smallest_of_last_gap(gaps, law.smallest))
             if end.event == AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
@@ -219,7 +215,7 @@ class EdgeMechanics(EdgeProblem):
                 strict = rests <= RESTS
                 point = self.equilibrium(gaps, prescribed, reach, orders, strict=strict)
                 if point is not None:
-                    return point, self._raced(start, point.gaps, taken)
+                    return point, raced
                 left_saddle = self._leave_saddle(gaps, prescribed)
                 if left_saddle is not None:
                     gaps = left_saddle
@@ -235,16 +231,16 @@ class EdgeMechanics(EdgeProblem):
         orders: Integers,
         law: EdgeLaw,
         equal_speeds: bool,
-        taken: Array,
+        start: Array,
     ) -> tuple[Descent, Integers]:
         """Descend on a linear response; returns the orders that it came to, too."""
         runs, reach = np.zeros(gaps.size, dtype=bool), FIRST_REACH
         while True:
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
-                return Descent(NO_FIELD, gaps, 0, reach), orders
+                return Descent(NO_FIELD, gaps, 0, reach, False), orders
             end: Descent = descend(
-                near.response, gaps, prescribed, most, equal_speeds, runs, taken, reach, law,
+                near.response, gaps, prescribed, most, equal_speeds, runs, start, reach, law,
                 self.model,
             )  # fmt: skip
             self.count.add_descent(end.steps, end.steps)
@@ -253,21 +249,15 @@ class EdgeMechanics(EdgeProblem):
             gaps, reach = end.gaps, end.reach
             near.is_outgrown = True
 
-    def _raced(self, start: Array, end: Array, taken: Array) -> bool:
-        """Whether running edges took so much force from each other that their order matters."""
-        way = outward(end) * (end - start).ravel()
-        lost = np.where(way > 0, taken[0], taken[1])[np.abs(way) > RAN * self.wave]
-        return bool(not lost.max(initial=0.0) <= HELD_BACK * self.critical**2)
-
     def _leave_saddle(self, gaps: Array, prescribed: float) -> Array | None:
         """Move edges without force off a saddle of the energy; None where they are stable.
 
         Both directions along the softest modes are tried, and that on which energy falls more is
-        taken, of equal ones that in which the leading edge goes outwards. Where energy rises on both,
-        half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
+        taken, of equal ones that in which the leading edge goes outwards. Where energy rises on
+        both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
         near = self.responses.at(gaps, prescribed)
-        if near is None:
+        if near is None or self.critical == 0:
             return None
         every = np.arange(gaps.size)
         tangent = tangent_between(near.response, gaps, every, prescribed, self.law, self.model)

@@ -56,8 +56,11 @@ from adhesis.solver.sharp.tolerances import (
     CLOSING_SHARE,
     FOLLOWING,
     FURTHEST_FOLLOWING,
+    HELD_BACK,
     LEAST_REACH,
     LONG_CLOSING,
+    LONGEST_STEP,
+    RAN,
     RUNNING,
     RUNNING_LENGTH,
     SHORT_REACH,
@@ -85,12 +88,16 @@ class Descent(NamedTuple):
         Solutions of the linear response.
     reach : float
         Of the next long step, in longest steps.
+    raced : bool
+        Whether the order in which the edges ran may have decided where they ended: some took so
+        much force from others. Edges that increase each other's force end alike in any order.
     """
 
     event: int
     gaps: Array
     steps: int
     reach: float
+    raced: bool
 
 
 @compiled_for_both
@@ -101,19 +108,19 @@ def descend(
     most: int,
     equal_speeds: bool,
     runs: Flags,
-    taken: Array,
+    start: Array,
     reach: float,
     law: EdgeLaw,
     model: FieldModel,
 ) -> Descent:
     """Descend in energy, d being ``prescribed``, until an event.
 
-    ``runs`` marks the edges that run already, and ``taken``, shape (2, 2L), is the force outwards, and
-    inwards, that running edges have taken from each other; both are changed in place. ``reach`` is
-    that of the first long step.
+    ``runs`` marks the edges that run already, and is changed in place; ``start`` is where they
+    began to run, and ``reach`` that of the first long step.
 
-    With equal speeds, for comparison, each edge has the time Δτ in which its own force would move
-    it by the longest step.
+    Without adhesion the edges are stable but where patches come or go: all take Newton's steps,
+    each edge within its limit. With equal speeds, for comparison, each edge has the time Δτ in
+    which its own force would move it by the longest step.
     """
     held = _beside(runs)
     edges: Integers = np.flatnonzero(held)
@@ -142,7 +149,6 @@ def descend(
             length = np.abs(flow.motion).max() / law.longest_step
             reach = max(next_reach(reach, length, error), SHORTEST_REACH)
             if error > 1 and length > 1.5 * SHORTEST_REACH:
-                _take_force(taken, edges, tangent, -flow.motion, law)
                 gaps, moved = before, True
                 continue
         more = _run_more(runs, response, now.motion - response.here, law)
@@ -177,32 +183,55 @@ def descend(
         way, pressure = follow_edges(response, edges, flow.motion, now, model.device)
         way -= motion_to(response, gaps)
         way[edges] = flow.motion  # without rounding
-        if _run_far(runs, held, way, law):
+        is_cut = False
+        if law.critical == 0:
+            is_cut = _cut(way, step_limits(map_gaps(gaps), law.longest_step))
+        elif _run_far(runs, held, way, law):
             held = _beside(runs)
             edges = np.flatnonzero(held)
             continue
         judges = edges.shape[0] > 0
-        _take_force(taken, edges, tangent, flow.motion, law)
         before, gaps, moved = gaps, move_edges(gaps, way), True
         if shortest_length(gaps) < law.smallest:
             event = VANISHED
             break
-        if largest(way) < law.rest_step and not flow.is_at_limit:
+        if largest(way) < law.rest_step and not (flow.is_at_limit or is_cut):
             event = AT_REST
             break
-    return Descent(event, gaps, steps, reach)
+    raced = law.critical > 0 and _may_race(edges, tangent, start, gaps, law)
+    return Descent(event, gaps, steps, reach, raced)
 
 
 @compiled
-def _take_force(
-    taken: Array, edges: Integers, tangent: Array, motion: Array, law: EdgeLaw
-) -> None:
-    """Add the force C_c² - C² that some edges take from each other by their motions."""
-    for e in range(edges.shape[0]):
-        for f in range(edges.shape[0]):
-            force = law.critical * (tangent[e, f] + tangent[f, e]) * motion[f]
-            if e != f:
-                taken[0 if force > 0 else 1, edges[e]] += abs(force)
+def _may_race(
+    edges: Integers, tangent: Array, start: Array, gaps: Array, law: EdgeLaw
+) -> bool:
+    """Whether edges that have run from ``start`` took much force C_c² - C² from each other.
+
+    By the tangent at their end, to first order. The order of both ends of a gap or patch that has
+    vanished does not matter.
+    """
+    ran = RAN * law.longest_step / LONGEST_STEP
+    count = tangent.shape[0]
+    for i in range(count):
+        one, side = edges[i] // 2, edges[i] % 2
+        way = (1 - 2 * side) * (gaps[one, side] - start[one, side])
+        if abs(way) < ran:
+            continue
+        taken = 0.0
+        for j in range(count):
+            two, other = edges[j] // 2, edges[j] % 2
+            apart = abs(gaps[one, side] - gaps[two, other])
+            if i == j or min(apart, 2 * np.pi - apart) < law.smallest:
+                continue
+            along = (1 - 2 * other) * (gaps[two, other] - start[two, other])
+            if abs(along) > ran:
+                force = law.critical * (tangent[i, j] + tangent[j, i]) * along
+                taken += max(force * np.sign(way), 0.0)
+        # not written as > : a force that is no number may be large
+        if not taken <= HELD_BACK * law.critical * law.critical:
+            return True
+    return False
 
 
 @compiled
@@ -261,6 +290,8 @@ def _run_more(runs: Flags, response: LinearResponse, ahead: Array, law: EdgeLaw)
     If none runs yet, those run, too, that Newton's step moves far.
     """
     more, none = False, not runs.any()
+    if law.critical == 0:
+        return False
     for e in range(runs.shape[0]):
         unbalanced = abs(response.residual[e]) > RUNNING * law.critical
         far = abs(ahead[e]) > FOLLOWING * law.longest_step
@@ -279,6 +310,16 @@ def _run_far(runs: Flags, held: Flags, way: Array, law: EdgeLaw) -> bool:
         if not (held[e] or near):
             runs[e], more = True, True
     return more
+
+
+@compiled
+def _cut(way: Array, limit: Array) -> bool:
+    """Cut the motion of every edge to its limit; returns whether any was longer."""
+    is_cut = False
+    for e in range(way.shape[0]):
+        if abs(way[e]) > limit[e]:
+            way[e], is_cut = np.sign(way[e]) * limit[e], True
+    return is_cut
 
 
 @compiled

@@ -134,9 +134,9 @@ def move_references(
 ) -> bool:
     """Move the references of gaps to these edges where they have departed from them.
 
-    ``held`` marks the edges that are held from now on. ``pressure`` is p, with which the last solution
-    gives the potentials. Returns False where a gap or run needs more nodes than it has, or many
-    gaps are far from their references: then another response is to be set up.
+    ``held`` marks the edges that are held from now on. ``pressure`` is p, with which the last
+    solution gives the potentials. Returns False where a gap or run needs more nodes than it has,
+    or many gaps are far from their references: then another response is to be set up.
     """
     table = map_gaps(gaps)
     nodes, counts = response.nodes, model.rules.counts

@@ -43,6 +43,12 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES
 
 
+def check_definite(solution: Solution) -> None:
+    """Raise FloatingPointError if there is no solution."""
+    if math.isnan(solution.pressure):
+        raise FloatingPointError("the matrix of the gaps is not positive definite")
+
+
 class FixedEdgeResponse(NamedTuple):
     """Derivatives by the prescribed quantity d at fixed edges.
 
@@ -118,8 +124,7 @@ class GapField:
         """
         if self._solve is not None:
             self._solution, self._solve = self._solve(), None  # it may hold a response
-        if math.isnan(self._solution.pressure):
-            raise FloatingPointError("the matrix of the gaps is not positive definite")
+        check_definite(self._solution)
         return self._solution
 
     @property
