@@ -23,14 +23,7 @@ MATHEMATICAL = {
     # sizes of Gauss rules
     "gap/full_contact_stress.py": {"_TILT_NODES", "_PIECES_BY_SLOPE", "_HALF_PLANE_NODES"},
     "gap/sine_transform.py": {"_ROTATIONS"},
-    "descent/gradient_flow.py": {
-        "AT_REST",
-        "VANISHED",
-        "STEP_LIMIT",
-        "NO_FIELD",
-        "OUTGROWN",
-        "REJOINED",
-    },
+    "descent/implicit_flow.py": {"AT_REST", "VANISHED", "STEP_LIMIT", "NO_FIELD", "OUTGROWN"},
     "output/grid_fields.py": {"_FINER"},  # nodes of an output, not of a loop
     # nodes and numbers of trials of a diagnosis, which no loss depends on
     "field/patch_tension.py": {"_COARSE", "_POINTS", "_MOVES"},

@@ -6,26 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.linalg import expm, solve_triangular
-from scipy.optimize import brentq, lsq_linear
-
-from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
 from adhesis.solver.sharp.descent.bound_constrained_step import bound_constrained_step
 from adhesis.solver.sharp.descent.edge_forces import (
     FlowProblem,
     Forces,
     energy_rises,
     forces_at,
-)
-from adhesis.solver.sharp.descent.edge_model import (
-    EdgeModel,
-    advance,
-    evaluate,
-    follow_lengths,
-    model_about,
-    model_forces,
-    model_hessian,
 )
 from adhesis.solver.sharp.descent.gradient_flow import (
     AT_REST,
@@ -37,6 +23,22 @@ from adhesis.solver.sharp.descent.gradient_flow import (
     descend,
 )
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step
+from adhesis.solver.sharp.descent.trajectory import Comparison, distance_to, update_comparison
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm, solve_triangular
+from scipy.optimize import brentq, lsq_linear
+
+from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from adhesis.solver.sharp.descent.edge_model import (
+    EdgeModel,
+    advance,
+    evaluate,
+    follow_lengths,
+    model_about,
+    model_forces,
+    model_hessian,
+)
 from adhesis.solver.sharp.descent.model_flow import ModelFlow, flow_through, implicit_step
 from adhesis.solver.sharp.descent.saddle import softest_step
 from adhesis.solver.sharp.descent.step_size import (
@@ -47,10 +49,8 @@ from adhesis.solver.sharp.descent.step_size import (
     may_raise,
     model_error,
 )
-from adhesis.solver.sharp.descent.trajectory import Comparison, distance_to, update_comparison
 from adhesis.solver.sharp.equilibrium.griffith import edge_tangent
 from adhesis.solver.sharp.field.cholesky import padded
-from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.solution import no_solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import choose_orders
