@@ -14,6 +14,7 @@ from adhesis.solver.sharp.descent.implicit_flow import (
     OUTGROWN,
     VANISHED,
     Descent,
+    Running,
     descend,
 )
 from adhesis.solver.sharp.descent.saddle import leaving_step, positions
@@ -240,8 +241,8 @@ class EdgeMechanics(EdgeProblem):
             if near is None:
                 return Descent(NO_FIELD, gaps, 0, reach, False), orders
             end: Descent = descend(
-                near.response, gaps, prescribed, most, equal_speeds, runs, start, reach, law,
-                self.model,
+                near.response, gaps, prescribed, most, equal_speeds, Running(runs, start, reach),
+                law, self.model,
             )  # fmt: skip
             self.count.add_descent(end.steps, end.steps)
             if end.event != OUTGROWN:

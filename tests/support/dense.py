@@ -49,19 +49,22 @@ def solve_densely(
     )
 
 
-def dense_residual(gaps: Array, prescribed: float, edges: EdgeMechanics) -> Array:
+def dense_residual(
+    gaps: Array, prescribed: float, edges: EdgeMechanics, orders: Integers | None = None
+) -> Array:
     """Compute C_e - C_c at all edges."""
-    of = solve_densely(gaps, prescribed, edges.model)
+    of = solve_densely(gaps, prescribed, edges.model, orders)
     residual: Array = imbalance(of, edges.law, edges.model.panels)[0]
     return residual
 
 
 def dense_tangent(gaps: Array, prescribed: float, edges: EdgeMechanics) -> Array:
     """Compute ∂(C_e - C_c)/∂n_f between all edges, by central differences."""
-    columns = []
+    columns, orders = [], choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
     for f in range(gaps.size):
         way = np.zeros(gaps.size)
         way[f] = _STEP * (1 - 2 * (f % 2))
-        ends = [dense_residual(gaps + s * way.reshape(-1, 2), prescribed, edges) for s in (1, -1)]
+        way = way.reshape(-1, 2)
+        ends = [dense_residual(gaps + s * way, prescribed, edges, orders) for s in (1, -1)]
         columns.append((ends[0] - ends[1]) / (2 * _STEP))
     return np.stack(columns, axis=1)

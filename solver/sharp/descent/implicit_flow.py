@@ -18,6 +18,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.descent.edge_model import model_about
 from adhesis.solver.sharp.descent.model_flow import (
+    ModelFlow,
     flow_through,
     largest,
     near_balance,
@@ -28,6 +29,7 @@ from adhesis.solver.sharp.descent.step_size import (
     next_reach,
 )
 from adhesis.solver.sharp.equilibrium.condensed import (
+    HeldEdges,
     follow_edges,
     residual_of,
     tangent_of,
@@ -100,6 +102,24 @@ class Descent(NamedTuple):
     raced: bool
 
 
+class Running(NamedTuple):
+    """What a descent knows of the way that its edges have come.
+
+    Attributes
+    ----------
+    edges : bool array, shape (2L,)
+        Those that run; changed in place.
+    start : array, shape (L, 2)
+        Where they began to run.
+    reach : float
+        Of the first long step, in longest steps.
+    """
+
+    edges: Flags
+    start: Array
+    reach: float
+
+
 @compiled_for_both
 def descend(
     response: LinearResponse,
@@ -107,105 +127,124 @@ def descend(
     prescribed: float,
     most: int,
     equal_speeds: bool,
-    runs: Flags,
-    start: Array,
-    reach: float,
+    running: Running,
     law: EdgeLaw,
     model: FieldModel,
 ) -> Descent:
     """Descend in energy, d being ``prescribed``, until an event.
 
-    ``runs`` marks the edges that run already, and is changed in place; ``start`` is where they
-    began to run, and ``reach`` that of the first long step.
-
     Without adhesion the edges are stable but where patches come or go: all take Newton's steps,
     each edge within its limit. With equal speeds, for comparison, each edge has the time Δτ in
     which its own force would move it by the longest step.
     """
-    held = _beside(runs)
+    runs, reach = running.edges, running.reach
+    held, before, flow = _beside(runs), gaps, no_flow()
     edges: Integers = np.flatnonzero(held)
-    before, flow = gaps, no_flow()
     pressure = pressure_at(response, prescribed, model.device)
     strongest, event, steps = 0.0, STEP_LIMIT, 0
     moved, judges = True, False
     tangent = np.empty((0, 0))
     while steps < most:
-        if moved:
-            if not move_references(response, gaps, held, pressure, prescribed, law, model):
-                event = OUTGROWN
-                break
-        else:
+        if not moved:
             condense_gaps(response, hold_edges(response, gaps, held), model)
+        elif not move_references(response, gaps, held, pressure, prescribed, law, model):
+            event = OUTGROWN
+            break
         steps, moved = steps + 1, False
         now = solve_response(response, prescribed, law, model.device)
         if not np.isfinite(now.pressure):
             event = NO_FIELD
             break
-        pressure = now.pressure
-        residual = residual_of(response, edges, now)
+        pressure, residual = now.pressure, residual_of(response, edges, now)
         if judges:
             judges = False
             error = model_error(flow, residual, edges, gaps, law, model.panels)
-            length = np.abs(flow.motion).max() / law.longest_step
+            length = largest(flow.motion) / law.longest_step
             reach = max(next_reach(reach, length, error), SHORTEST_REACH)
             if error > 1 and length > 1.5 * SHORTEST_REACH:
                 gaps, moved = before, True
                 continue
         more = _run_more(runs, response, now.motion - response.here, law)
         if not (now.stable or more):
-            if not _run_weakest(runs, held, response, now):
+            more = _run_weakest(runs, held, response, now)
+            if not more:
                 event = NO_FIELD
                 break
-            more = True
+        if not more:
+            tangent = tangent_of(response, edges, now, model.device)
+            openings = HeldEdges(edges, residual, tangent)
+            flow, strongest = _flow_on(
+                openings, gaps, strongest, reach, equal_speeds, law, model.panels
+            )
+            way, pressure = follow_edges(response, edges, flow.motion, now, model.device)
+            way -= motion_to(response, gaps)
+            way[edges] = flow.motion  # without rounding
+            is_cut, more = _limit_others(runs, held, way, gaps, law)
         if more:
             held = _beside(runs)
             edges = np.flatnonzero(held)
             continue
-        tangent = tangent_of(response, edges, now, model.device)
-        force = force_at(residual, edges, gaps, law, model.panels)
-        strongest = max(strongest, force)
-        is_long = reach >= LEAST_REACH and not near_balance(force, strongest, law)
-        while True:
-            openings = model_about(edges, gaps, residual, tangent, law, model.panels)
-            most_motion, share = min(reach, SHORT_REACH) * law.longest_step, CLOSING_SHARE
-            if is_long:
-                most_motion, share = reach * law.longest_step, LONG_CLOSING
-            limit = step_limits(map_gaps(gaps), most_motion, share)[edges]
-            flow = flow_through(
-                openings, limit, equal_speeds, is_long, strongest, law, model.panels
-            )
-            size = largest(flow.motion)
-            shortest = shortest_length(move_edges(gaps, _spread(flow.motion, edges, held)))
-            runs_on = flow.is_at_limit or size > RUNNING_LENGTH * law.longest_step
-            if not is_long or (runs_on and not shortest < law.smallest):
-                break
-            is_long = False
-        way, pressure = follow_edges(response, edges, flow.motion, now, model.device)
-        way -= motion_to(response, gaps)
-        way[edges] = flow.motion  # without rounding
-        is_cut = False
-        if law.critical == 0:
-            is_cut = _cut(way, step_limits(map_gaps(gaps), law.longest_step))
-        elif _run_far(runs, held, way, law):
-            held = _beside(runs)
-            edges = np.flatnonzero(held)
-            continue
-        judges = edges.shape[0] > 0
-        before, gaps, moved = gaps, move_edges(gaps, way), True
+        judges, moved = edges.shape[0] > 0, True
+        before, gaps = gaps, move_edges(gaps, way)
         if shortest_length(gaps) < law.smallest:
             event = VANISHED
             break
         if largest(way) < law.rest_step and not (flow.is_at_limit or is_cut):
             event = AT_REST
             break
-    raced = law.critical > 0 and _may_race(edges, tangent, start, gaps, law)
+    raced = law.critical > 0 and _may_race(edges, tangent, running.start, gaps, law)
     return Descent(event, gaps, steps, reach, raced)
 
 
 @compiled
-def _may_race(
-    edges: Integers, tangent: Array, start: Array, gaps: Array, law: EdgeLaw
-) -> bool:
+def _flow_on(
+    held: HeldEdges,
+    gaps: Array,
+    strongest: float,
+    reach: float,
+    equal_speeds: bool,
+    law: EdgeLaw,
+    panels: Panels,
+) -> tuple[ModelFlow, float]:
+    """Let held edges flow through the model; returns also the largest norm of forces so far.
+
+    A long step that comes to rest, or to where a gap or patch vanishes, is taken as a short one.
+    """
+    edges = held.edges
+    force = force_at(held.residual, edges, gaps, law, panels)
+    strongest = max(strongest, force)
+    is_long = reach >= LEAST_REACH and not near_balance(force, strongest, law)
+    while True:
+        openings = model_about(edges, gaps, held.residual, held.tangent, law, panels)
+        most, share = min(reach, SHORT_REACH) * law.longest_step, CLOSING_SHARE
+        if is_long:
+            most, share = reach * law.longest_step, LONG_CLOSING
+        limit = step_limits(map_gaps(gaps), most, share)[edges]
+        flow = flow_through(openings, limit, equal_speeds, is_long, strongest, law, panels)
+        motion = np.zeros(gaps.size)
+        motion[edges] = flow.motion
+        vanished = shortest_length(move_edges(gaps, motion)) < law.smallest
+        runs_on = flow.is_at_limit or largest(motion) > RUNNING_LENGTH * law.longest_step
+        if not is_long or (runs_on and not vanished):
+            return flow, strongest
+        is_long = False
+
+
+@compiled
+def _limit_others(
+    runs: Flags, held: Flags, way: Array, gaps: Array, law: EdgeLaw
+) -> tuple[bool, bool]:
+    """Let edges run that would follow too far; returns whether any was cut, and any is to run.
+
+    Without adhesion the motions are cut instead.
+    """
+    if law.critical == 0:
+        return _cut(way, step_limits(map_gaps(gaps), law.longest_step)), False
+    return False, _run_far(runs, held, way, law)
+
+
+@compiled
+def _may_race(edges: Integers, tangent: Array, start: Array, gaps: Array, law: EdgeLaw) -> bool:
     """Whether edges that have run from ``start`` took much force C_c² - C² from each other.
 
     By the tangent at their end, to first order. The order of both ends of a gap or patch that has
@@ -235,17 +274,7 @@ def _may_race(
 
 
 @compiled
-def _spread(motion: Array, edges: Integers, held: Flags) -> Array:
-    """Return the motions of all edges, from those of some."""
-    out = np.zeros(held.shape[0])
-    out[edges] = motion
-    return out
-
-
-@compiled
-def force_at(
-    residual: Array, edges: Integers, gaps: Array, law: EdgeLaw, panels: Panels
-) -> float:
+def force_at(residual: Array, edges: Integers, gaps: Array, law: EdgeLaw, panels: Panels) -> float:
     """Compute the norm of the forces C_c² - C |C| from C - C_c at some edges."""
     square = 0.0
     for i in range(edges.shape[0]):
@@ -256,9 +285,7 @@ def force_at(
 
 
 @compiled
-def _run_weakest(
-    runs: Flags, held: Flags, response: LinearResponse, now: ResponseSolution
-) -> bool:
+def _run_weakest(runs: Flags, held: Flags, response: LinearResponse, now: ResponseSolution) -> bool:
     """Let the softest edge run where the others are not stable; False if all are held.
 
     It is sought among the gaps of the smallest run of the tree that is not stable.

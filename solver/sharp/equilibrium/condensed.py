@@ -6,6 +6,8 @@ complement of the tangent of all edges.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
@@ -21,6 +23,23 @@ from adhesis.solver.sharp.equilibrium.renewal import condense_gaps, hold_edges
 from adhesis.solver.sharp.field.solution import FieldModel, LoadingDevice
 from adhesis.solver.sharp.field.tree_factor import Charges, charge_run, downward_pass
 from adhesis.solver.sharp.gap.quadrature import Integers
+
+
+class HeldEdges(NamedTuple):
+    """Some edges that are held, all others following.
+
+    Attributes
+    ----------
+    edges : int array, shape (n,)
+    residual : array, shape (n,)
+        C - C_c.
+    tangent : array, shape (n, n)
+        ∂(C_e - C_c)/∂n_f.
+    """
+
+    edges: Integers
+    residual: Array
+    tangent: Array
 
 
 @compiled
