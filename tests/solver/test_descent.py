@@ -20,6 +20,7 @@ from adhesis.solver.sharp.descent.edge_model import (
 )
 from adhesis.solver.sharp.descent.implicit_flow import (
     AT_REST,
+    OUTGROWN,
     STEP_LIMIT,
     VANISHED,
     Descent,
@@ -33,11 +34,15 @@ from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.cholesky import padded
 from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.tolerances import LONGEST_REACH, MODEL_STEP, REACH_CUT, REACH_GROWTH
+from adhesis.solver.sharp.tolerances import (
+    FIRST_REACH,
+    LONGEST_REACH,
+    MODEL_STEP,
+    REACH_CUT,
+    REACH_GROWTH,
+)
 from tests.support.dense import dense_tangent, solve_densely
 
 SOLID = HalfSpace(1e6, 0.5)
@@ -333,11 +338,14 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     """Descend on a single wave of amplitude 1 µm, at a separation in amplitudes."""
     edges, ends = method.edges, np.array(gaps, dtype=float)
     prescribed = separation * 2 * np.pi * 1e-3
-    orders = choose_orders(map_gaps(ends), edges.model.digits, edges.model.rules.counts)
-    near = edges.responses.near(ends, prescribed, orders)
-    assert near is not None
-    none = Running(np.zeros(ends.size, dtype=bool), ends, 12.0)
-    return descend(near.response, ends, prescribed, most, False, none, edges.law, edges.model)
+    none = Running(np.zeros(ends.size, dtype=bool), ends, FIRST_REACH)
+    while True:
+        near = edges.responses.near(ends, prescribed, np.empty(0, dtype=np.int64))
+        assert near is not None
+        found = descend(near.response, ends, prescribed, most, False, none, edges.law, edges.model)
+        if found.event != OUTGROWN:
+            return found
+        near.is_outgrown, ends = True, found.gaps
 
 
 NARROW = [[0.2, 2 * np.pi - 0.2]]  # one narrow patch on the crest at θ = 0

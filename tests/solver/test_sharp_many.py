@@ -101,7 +101,7 @@ def mechanics(profile, toughness, tolerance=1e-6):
 
 def test_newton_step_and_stability_equal_the_dense_ones(profile):
     """Steps of all edges to 1e-3, and the same verdict, on stable and unstable states."""
-    edges = mechanics(profile, 1.0)
+    edges = mechanics(profile, 1.0, 1e-9)
     separation = 3 * profile.h_max * profile.q0
     verdicts = set()
     for seed in range(12):
@@ -125,7 +125,7 @@ def test_newton_step_and_stability_equal_the_dense_ones(profile):
 @pytest.mark.parametrize("device", [FIXED_SEPARATION, LoadingDevice(1.0, 0.7)])
 def test_the_tangent_of_some_edges_is_the_dense_one_of_all_condensed(profile, device):
     """Some edges held, all others following: a Schur complement of the tangent of all edges."""
-    edges = mechanics(profile, 1.0)
+    edges = mechanics(profile, 1.0, 1e-9)
     edges.model = edges.model._replace(device=device)
     gaps = random_gaps(9, 0.5, 0.3, 3)
     separation = 3 * profile.h_max * profile.q0

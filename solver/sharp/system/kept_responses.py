@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.equilibrium.griffith import shortest_length
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.equilibrium.renewal import settle_response
 from adhesis.solver.sharp.equilibrium.response_setup import (
@@ -98,6 +99,8 @@ class KeptResponses:
 
     def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
         """Set up a response of these gaps, from the last one if there is one."""
+        if not (np.isfinite(gaps).all() and shortest_length(gaps) > 0):
+            return None
         problem = self._problem
         law, model = problem.law, problem.model
         problem.count.fields += 1
