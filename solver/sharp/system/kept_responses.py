@@ -65,6 +65,8 @@ class KeptResponses:
 
         ``least`` are the least orders of the gaps, or empty. None if these have no field.
         """
+        if not (np.isfinite(gaps).all() and shortest_length(gaps) > 0):
+            return None
         kept = self._kept
         known = self._of_as_many(gaps)
         if known is not None:
@@ -99,8 +101,6 @@ class KeptResponses:
 
     def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
         """Set up a response of these gaps, from the last one if there is one."""
-        if not (np.isfinite(gaps).all() and shortest_length(gaps) > 0):
-            return None
         problem = self._problem
         law, model = problem.law, problem.model
         problem.count.fields += 1
