@@ -194,9 +194,7 @@ class EdgeMechanics(EdgeProblem):
         left, orders, rests, raced = DESCENT_LIMIT, _ANY, 0, False
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            end, orders = self._descend(
-                gaps, prescribed, left, orders, law, equal_speeds, start
-            )
+            end, orders = self._descend(gaps, prescribed, left, orders, law, equal_speeds, start)
             gaps, raced = end.gaps, raced or end.raced
             left -= end.steps
             if end.event == NO_FIELD:

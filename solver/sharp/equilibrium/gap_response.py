@@ -113,9 +113,7 @@ def _by_eta(eta: Array, w: Array, potential: Array, i: int) -> float:
 
 
 @compiled_sums
-def _open_edges(
-    out: LinearResponse, k: int, solved: Array, ends: Array, model: FieldModel
-) -> None:
+def _open_edges(out: LinearResponse, k: int, solved: Array, ends: Array, model: FieldModel) -> None:
     """Compute C at both edges of a gap by its loads and by potentials, and the edges' strength.
 
     ``ends`` has a row for each edge: C by each load, and the strength of its singular opening.

@@ -108,9 +108,7 @@ def _allocate_blocks(
 
 
 @compiled
-def fill_gaps(
-    indices: Integers, nodes: Nodes, equations: Equations, model: FieldModel
-) -> None:
+def fill_gaps(indices: Integers, nodes: Nodes, equations: Equations, model: FieldModel) -> None:
     """Fill in the own parts of some gaps."""
     rules, panels = model.rules, model.panels
     counts, orders, offset, table = rules.counts, nodes.orders, nodes.offset, nodes.table
