@@ -8,17 +8,22 @@ from typing import Any
 import numpy as np
 
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.core import (
+    descend,
+    equilibrium_many,
+    solve_many,
+    solve_separately,
+    tangent_between,
+)
 from adhesis.solver.sharp.descent.implicit_flow import (
     AT_REST,
     NO_FIELD,
     OUTGROWN,
     VANISHED,
     Descent,
-    descend,
 )
 from adhesis.solver.sharp.descent.saddle import leaving_step, positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.condensed import tangent_between
 from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
     imbalance,
@@ -26,10 +31,7 @@ from adhesis.solver.sharp.equilibrium.griffith import (
     shortest_length,
     step_limits,
 )
-from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
-    EquilibriumOfMany,
-    equilibrium_many,
-)
+from adhesis.solver.sharp.equilibrium.hierarchical_newton import EquilibriumOfMany
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import (
@@ -37,8 +39,6 @@ from adhesis.solver.sharp.field.gap_field import (
     GapField,
     respond_at_fixed_edges,
 )
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
-from adhesis.solver.sharp.equilibrium.renewal import settle_response
-from adhesis.solver.sharp.equilibrium.response_setup import (
+from adhesis.solver.sharp.core import (
     count_unknown,
     set_up_response,
+    settle_response,
     update_response,
 )
+from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem

@@ -1,0 +1,267 @@
+// What Python sees of the kernels: functions of arrays, and objects whose fields it reads.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/shared_ptr.h>
+
+#include "descent.hpp"
+#include "edge_model.hpp"
+#include "newton.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace adhesis {
+
+namespace {
+
+using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+using IntegerArray = nb::ndarray<const int64_t, nb::c_contig, nb::device::cpu>;
+using Values = nb::object;  // an array of floats
+using Whole = nb::object;   // of integers
+using Truth = nb::ndarray<nb::numpy, bool, nb::ndim<1>, nb::c_contig>;
+
+Vector vector_of(const Array& array) { return {array.data(), array.data() + array.size()}; }
+
+Integers integers_of(const IntegerArray& array) {
+  return {array.data(), array.data() + array.size()};
+}
+
+// Hand numbers over to numpy, without a copy.
+template <class Number>
+nb::object array_of(std::vector<Number> values, std::initializer_list<size_t> shape) {
+  auto* kept = new std::vector<Number>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<Number>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, Number>(kept->data(), shape, owner));
+}
+
+Values array_of(const Vector& values) { return array_of<double>(values, {values.size()}); }
+
+Values pairs_of(const Vector& values) { return array_of<double>(values, {values.size() / 2, 2}); }
+
+Whole array_of(const Integers& values) {
+  return array_of<int64_t>(std::vector<int64_t>(values.begin(), values.end()), {values.size()});
+}
+
+// The table of gaps that Python knows: ends, patches, α.
+Values table_of(const std::vector<Gap>& gaps) {
+  Vector out;
+  for (const Gap& gap : gaps)
+    out.insert(out.end(), {gap.end[0], gap.end[1], gap.patch[0], gap.patch[1], gap.alpha});
+  return array_of<double>(out, {gaps.size(), 5});
+}
+
+std::vector<Gap> gaps_of(const Array& table) {
+  std::vector<Gap> out(table.shape(0));
+  for (size_t k = 0; k < out.size(); ++k) {
+    const double* row = table.data() + 5 * k;
+    out[k] = {{row[0], row[1]}, {row[2], row[3]}, row[4]};
+  }
+  return out;
+}
+
+Values slopes_of(const Nodes& nodes) {
+  Vector out;
+  for (auto& slope : nodes.slope) out.insert(out.end(), slope.begin(), slope.end());
+  return array_of<double>(out, {nodes.slope.size(), 2});
+}
+
+std::shared_ptr<GaussRules> make_rules(const IntegerArray& counts, const Array& eta,
+                                       const Array& weights, const Array& end_values,
+                                       const Array& crack, const Array& modes) {
+  auto rules = std::make_shared<GaussRules>();
+  const double *x = eta.data(), *w = weights.data(), *low = end_values.data();
+  const double *high = low + eta.size(), *straight = crack.data(), *u = modes.data();
+  for (int m : integers_of(counts)) {
+    GaussRule rule;
+    rule.count = m;
+    rule.eta.assign(x, x + m);
+    rule.weights.assign(w, w + m);
+    rule.end_values = {Vector(low, low + m), Vector(high, high + m)};
+    rule.crack.assign(straight, straight + m * m);
+    rule.modes.assign(u, u + m * m);
+    rule.derivative = derivative_matrix(rule.eta, rule.weights);
+    rules->push_back(rule);
+    x += m, w += m, low += m, high += m, straight += m * m, u += m * m;
+  }
+  return rules;
+}
+
+std::shared_ptr<Panels> make_panels(double width, int finest_count, const Array& x, const Array& w,
+                                    const Array& stress, const Array& slope, const Array& tilt,
+                                    const Array& half_plane, const Array& weights,
+                                    const IntegerArray& level_start, const Array& end_x,
+                                    const Array& end_w, int short_count) {
+  const double* half = half_plane.data() + half_plane.size() / 2;
+  const double* of_slope = weights.data() + weights.size() / 2;
+  return std::make_shared<Panels>(Panels{
+      width, finest_count, vector_of(x), vector_of(w), vector_of(stress), vector_of(slope),
+      vector_of(tilt),
+      {Vector(half_plane.data(), half), Vector(half, half + half_plane.size() / 2)},
+      {Vector(weights.data(), of_slope), Vector(of_slope, of_slope + weights.size() / 2)},
+      integers_of(level_start), vector_of(end_x), vector_of(end_w), ShortRule(short_count)});
+}
+
+std::shared_ptr<LinearResponse> keep(NewResponse&& made) {
+  return made.has_field ? std::make_shared<LinearResponse>(std::move(made.response)) : nullptr;
+}
+
+}  // namespace
+
+}  // namespace adhesis
+
+NB_MODULE(_kernels, m) {
+  using namespace adhesis;
+
+  nb::class_<GaussRules>(m, "GaussRules");
+  m.def("make_rules", &make_rules);
+  nb::class_<Panels>(m, "Panels");
+  m.def("make_panels", &make_panels);
+  nb::class_<Model>(m, "Model")
+      .def("__init__", [](Model* model, double weight, double compliance, double digits,
+                          std::shared_ptr<GaussRules> rules, std::shared_ptr<Panels> panels) {
+        new (model) Model{{weight, compliance}, digits, rules, panels};
+      });
+  nb::class_<EdgeLaw>(m, "EdgeLaw")
+      .def("__init__", [](EdgeLaw* law, double critical, double newton_tolerance,
+                          double field_error, double rest_step, double longest_step,
+                          double smallest, double overlap_limit, double force_error) {
+        new (law) EdgeLaw{critical, newton_tolerance, field_error, rest_step,
+                          longest_step, smallest, overlap_limit, force_error};
+      });
+
+  nb::class_<Field>(m, "Field")
+      .def_prop_ro("table", [](const Field& f) { return table_of(f.nodes.gaps); })
+      .def_prop_ro("orders", [](const Field& f) { return array_of(f.nodes.orders); })
+      .def_prop_ro("offset", [](const Field& f) { return array_of(f.nodes.offset); })
+      .def_prop_ro("theta", [](const Field& f) { return array_of(f.nodes.theta); })
+      .def_prop_ro("weight", [](const Field& f) { return array_of(f.nodes.weight); })
+      .def_prop_ro("slope", [](const Field& f) { return slopes_of(f.nodes); })
+      .def_prop_ro("load", [](const Field& f) { return array_of(f.equations.load); })
+      .def_prop_ro("unit_solved", [](const Field& f) { return array_of(f.solved[1]); })
+      .def_prop_ro("scaled_opening", [](const Field& f) { return array_of(f.scaled_opening); })
+      .def_prop_ro("opening", [](const Field& f) { return array_of(f.opening); })
+      .def_ro("unit_mean", &Field::unit_mean)
+      .def_ro("resistance", &Field::resistance)
+      .def_ro("pressure", &Field::pressure)
+      .def_ro("separation", &Field::separation);
+  m.def("solve_field", [](const Array& gaps, double prescribed, const IntegerArray& orders,
+                          const Model& model) {
+    const Vector ends = vector_of(gaps);
+    const Integers own = integers_of(orders);
+    nb::gil_scoped_release release;
+    return std::make_shared<Field>(solve_field(ends, prescribed, own, 1, model).field);
+  });
+  m.def("solve_separately", [](const Array& gaps, const Array& table, const IntegerArray& orders,
+                               const Array& potential, double pressure, double prescribed,
+                               const Model& model) {
+    const Vector ends = vector_of(gaps), outer = vector_of(potential);
+    const std::vector<Gap> known = gaps_of(table);
+    const Integers own = integers_of(orders);
+    nb::gil_scoped_release release;
+    return std::make_shared<Field>(
+        solve_separately(ends, known, own, outer, pressure, prescribed, model));
+  });
+
+  nb::class_<LinearResponse>(m, "LinearResponse")
+      .def_prop_ro("gap_count", &LinearResponse::gap_count)
+      .def_prop_ro("table", [](const LinearResponse& r) { return table_of(r.nodes.gaps); })
+      .def_prop_ro("orders", [](const LinearResponse& r) { return array_of(r.nodes.orders); })
+      .def_prop_ro("opening",
+                   [](const LinearResponse& r) {
+                     Vector out;
+                     for (const Edge& edge : r.edges) out.push_back(edge.opening);
+                     return array_of(out);
+                   })
+      .def("condense", &LinearResponse::condense)
+      .def("linearise", &LinearResponse::linearise)
+      .def("factor_runs",
+           [](LinearResponse& r) { r.factor_runs(Flags(r.gap_count(), true)); })
+      .def("solve", [](LinearResponse& r, double prescribed, const EdgeLaw& law,
+                       const Model& model) {
+        const ResponseSolution now = r.solve(prescribed, law, model.device);
+        return nb::make_tuple(array_of(now.motion), array_of(now.rate), now.pressure, now.slope,
+                              now.stable);
+      });
+  m.def("set_up_response",
+        [](const Array& gaps, double prescribed, const IntegerArray& orders, const EdgeLaw& law,
+           const Model& model) {
+          const Vector ends = vector_of(gaps);
+          const Integers own = integers_of(orders);
+          nb::gil_scoped_release release;
+          return keep(set_up_response(ends, prescribed, own, law, model));
+        });
+  m.def("update_response",
+        [](const LinearResponse& known, const Array& gaps, double prescribed,
+           const IntegerArray& least, const EdgeLaw& law, const Model& model) {
+          const Vector ends = vector_of(gaps);
+          const Integers own = integers_of(least);
+          nb::gil_scoped_release release;
+          return keep(update_response(known, ends, prescribed, own, law, model));
+        });
+  m.def("count_unknown", [](const LinearResponse& known, const Array& gaps, const EdgeLaw& law,
+                            const Model& model) {
+    return count_unknown(known, vector_of(gaps), law, model);
+  });
+  m.def("settle_response", [](LinearResponse& response, const Array& gaps, double prescribed,
+                              const EdgeLaw& law, const Model& model) {
+    const Vector ends = vector_of(gaps);
+    nb::gil_scoped_release release;
+    return settle_response(response, ends, prescribed, law, model);
+  });
+  m.def("tangent_between", [](LinearResponse& response, const IntegerArray& edges,
+                              double prescribed, const EdgeLaw& law, double weight,
+                              double compliance) {
+    const Device device = {weight, compliance};
+    const ResponseSolution now = response.solve(prescribed, law, device);
+    const CondensedEdges condensed(response, integers_of(edges), now, device);
+    return array_of<double>(condensed.tangent().values, {edges.size(), edges.size()});
+  });
+
+  nb::class_<Equilibrium>(m, "Equilibrium")
+      .def_ro("found", &Equilibrium::found)
+      .def_ro("is_outgrown", &Equilibrium::is_outgrown)
+      .def_ro("corrections", &Equilibrium::corrections)
+      .def_prop_ro("gaps", [](const Equilibrium& e) { return pairs_of(e.ends); })
+      .def_prop_ro("potential", [](const Equilibrium& e) { return array_of(e.potential); })
+      .def_prop_ro("rate", [](const Equilibrium& e) { return array_of(e.at.rate); })
+      .def_prop_ro("pressure", [](const Equilibrium& e) { return e.at.pressure; })
+      .def_prop_ro("separation", [](const Equilibrium& e) { return e.at.separation; })
+      .def_prop_ro("slope", [](const Equilibrium& e) { return e.at.slope; });
+  m.def("find_equilibrium",
+        [](LinearResponse& response, const Array& gaps, double prescribed, double reach,
+           bool strict, const EdgeLaw& law, const Model& model) {
+          Vector ends = vector_of(gaps);
+          nb::gil_scoped_release release;
+          return find_equilibrium(response, ends, prescribed, reach, strict, law, model);
+        });
+
+  nb::class_<Descent>(m, "Descent")
+      .def_prop_ro("event", [](const Descent& d) { return int(d.event); })
+      .def_prop_ro("gaps", [](const Descent& d) { return pairs_of(d.ends); })
+      .def_ro("steps", &Descent::steps)
+      .def_ro("reach", &Descent::reach);
+  m.def("descend", [](LinearResponse& response, const Array& gaps, double prescribed, int most,
+                      bool equal_speeds, Truth runs, double reach, const EdgeLaw& law,
+                      const Model& model) {
+    Vector ends = vector_of(gaps);
+    Flags running(runs.data(), runs.data() + runs.size());
+    Descent out;
+    {
+      nb::gil_scoped_release release;
+      out = descend(response, ends, prescribed, most, equal_speeds, running, reach, law, model);
+    }
+    std::copy(running.begin(), running.end(), runs.data());
+    return out;
+  });
+
+  // Single parts, for tests.
+  m.def("gap_moments", [](const Array& table, int k, const Model& model, int modes, int fields) {
+    Vector s(modes * fields);
+    std::array<std::array<double, 2>, 2> ends = {};
+    gap_moments(gaps_of(table)[k], *model.panels, modes, fields, s.data(), ends);
+    Vector loads = {ends[0][0], ends[0][1], ends[1][0], ends[1][1]};
+    return nb::make_tuple(array_of<double>(s, {size_t(modes), size_t(fields)}),
+                          array_of<double>(loads, {2, 2}));
+  });
+  m.def("nothing", [](double x) { return x; });
+}
