@@ -172,16 +172,90 @@ NB_MODULE(_kernels, m) {
                      for (const Edge& edge : r.edges) out.push_back(edge.opening);
                      return array_of(out);
                    })
+      .def_prop_ro("softness", [](const LinearResponse& r) { return array_of(r.softness); })
+      .def("edge_values",
+           [](const LinearResponse& r) {  // residual, here, and stiffness of every edge
+             Vector residual, here, stiffness;
+             for (const Edge& edge : r.edges) {
+               residual.push_back(edge.residual);
+               here.push_back(edge.here);
+               stiffness.push_back(std::abs(edge.tangent[0]) + std::abs(edge.tangent[1]));
+             }
+             return nb::make_tuple(array_of(residual), array_of(here), array_of(stiffness));
+           })
       .def("condense", &LinearResponse::condense)
       .def("linearise", &LinearResponse::linearise)
       .def("factor_runs",
            [](LinearResponse& r) { r.factor_runs(Flags(r.gap_count(), true)); })
+      .def("pressure_at", [](const LinearResponse& r, double prescribed,
+                             const Model& model) { return r.pressure_at(prescribed, model.device); })
+      .def("potential_at", [](const LinearResponse& r, double p) { return array_of(r.potential_at(p)); })
+      .def("motion_to", [](const LinearResponse& r, const Array& ends) {
+        return array_of(r.motion_to(vector_of(ends)));
+      })
+      .def("any_outdated", [](const LinearResponse& r, const Array& ends, const EdgeLaw& law) {
+        return any_outdated(r, vector_of(ends), law);
+      })
+      .def("move_references",
+           [](LinearResponse& r, const Array& ends, const Array& damping, double pressure,
+              double prescribed, const EdgeLaw& law, const Model& model) {
+             return move_references(r, vector_of(ends), vector_of(damping), pressure, prescribed,
+                                    law, model);
+           })
+      .def("damp", [](LinearResponse& r, const Array& ends, const Array& damping,
+                      const Model& model) {
+        condense_gaps(r, damp_edges(r, vector_of(ends), vector_of(damping)), model);
+      })
       .def("solve", [](LinearResponse& r, double prescribed, const EdgeLaw& law,
-                       const Model& model) {
-        const ResponseSolution now = r.solve(prescribed, law, model.device);
-        return nb::make_tuple(array_of(now.motion), array_of(now.rate), now.pressure, now.slope,
-                              now.stable);
+                       const Model& model) { return r.solve(prescribed, law, model.device); });
+  nb::class_<ResponseSolution>(m, "ResponseSolution")
+      .def_prop_ro("motion", [](const ResponseSolution& s) { return array_of(s.motion); })
+      .def_prop_ro("rate", [](const ResponseSolution& s) { return array_of(s.rate); })
+      .def_ro("pressure", &ResponseSolution::pressure)
+      .def_ro("separation", &ResponseSolution::separation)
+      .def_ro("slope", &ResponseSolution::slope)
+      .def_ro("stable", &ResponseSolution::stable);
+  nb::class_<CondensedEdges>(m, "CondensedEdges")
+      .def("__init__",
+           [](CondensedEdges* c, LinearResponse& r, const IntegerArray& edges,
+              const ResponseSolution& now, const Model& model) {
+             new (c) CondensedEdges(r, integers_of(edges), now, model.device);
+           }, nb::keep_alive<1, 2>())
+      .def("residual", [](const CondensedEdges& c, const ResponseSolution& now) {
+        return array_of(c.residual(now));
+      })
+      .def("follow", [](CondensedEdges& c, const Array& motion, const ResponseSolution& now) {
+        double pressure;
+        Vector way = c.follow(vector_of(motion), now, pressure);
+        return nb::make_tuple(array_of(way), pressure);
+      })
+      // the flow of the edges through their model
+      .def("flow", [](const CondensedEdges& c, const Array& ends, const Array& residual,
+                      const Array& limit, bool equal_speeds, bool is_long, double strongest,
+                      const EdgeLaw& law, const Model& model) {
+        EdgeModel openings(c.edges(), vector_of(ends), vector_of(residual), c.tangent(), law,
+                           *model.panels);
+        return flow_through(openings, vector_of(limit), equal_speeds, is_long, strongest, law);
       });
+  nb::class_<ModelFlow>(m, "ModelFlow")
+      .def_prop_ro("motion", [](const ModelFlow& f) { return array_of(f.motion); })
+      .def_prop_ro("opening", [](const ModelFlow& f) { return array_of(f.opening); })
+      .def_prop_ro("lengths", [](const ModelFlow& f) { return array_of(f.lengths); })
+      .def_prop_ro("residuals",
+                   [](const ModelFlow& f) {
+                     Vector all;
+                     for (const Vector& r : f.residuals) all.insert(all.end(), r.begin(), r.end());
+                     return array_of<double>(all, {f.residuals.size(), f.motion.size()});
+                   })
+      .def_ro("is_at_limit", &ModelFlow::is_at_limit);
+  m.def("critical_openings", [](const Array& theta, const EdgeLaw& law, const Model& model) {
+    Vector out;
+    for (double at : vector_of(theta)) out.push_back(critical_opening(at, law, *model.panels).value);
+    return array_of(out);
+  });
+  m.def("near_balance", [](double force, double strongest, const EdgeLaw& law) {
+    return near_balance(force, strongest, law);
+  });
   m.def("set_up_response",
         [](const Array& gaps, double prescribed, const IntegerArray& orders, const EdgeLaw& law,
            const Model& model) {

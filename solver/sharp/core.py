@@ -31,3 +31,7 @@ settle_response = _choose(renewal, "settle_response")
 tangent_between = _choose(condensed, "tangent_between")
 equilibrium_many = _choose(hierarchical_newton, "equilibrium_many")
 descend = _choose(implicit_flow, "descend")
+if os.environ.get("ADHESIS_KERNELS") == "flow-in-python":
+    from adhesis.solver.sharp import flow_in_python
+
+    equilibrium_many, descend = flow_in_python.equilibrium_many, flow_in_python.descend
