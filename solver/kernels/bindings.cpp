@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/shared_ptr.h>
 
+#include "clearance.hpp"
 #include "descent.hpp"
 #include "edge_model.hpp"
 #include "newton.hpp"
@@ -100,6 +101,35 @@ std::shared_ptr<Panels> make_panels(double width, int finest_count, const Array&
       {Vector(weights.data(), of_slope), Vector(of_slope, of_slope + weights.size() / 2)},
       integers_of(level_start), vector_of(end_x), vector_of(end_w), ShortRule(short_count)});
 }
+
+// The field of known openings, for searches.
+std::shared_ptr<Field> make_field(const Array& table, const IntegerArray& orders,
+                                  const Array& theta, const Array& slope, const Array& f,
+                                  const Array& load, const Model& model) {
+  auto field = std::make_shared<Field>();
+  field->nodes = Nodes(gaps_of(table), integers_of(orders), *model.rules);
+  field->nodes.theta = vector_of(theta);
+  for (size_t k = 0; k < slope.size() / 2; ++k)
+    field->nodes.slope[k] = {slope.data()[2 * k], slope.data()[2 * k + 1]};
+  field->scaled_opening = vector_of(f);
+  field->equations.load = vector_of(load);
+  return field;
+}
+
+// Positions, openings and curvatures of minima.
+nb::object minima_of(const std::vector<Minimum>& minima) {
+  Vector theta, opening, curvature;
+  for (const Minimum& minimum : minima) {
+    theta.push_back(minimum.theta);
+    opening.push_back(minimum.opening);
+    curvature.push_back(minimum.curvature);
+  }
+  return nb::make_tuple(array_of(theta), array_of(opening), array_of(curvature));
+}
+
+struct Searched {
+  SearchedGaps gaps;
+};
 
 std::shared_ptr<LinearResponse> keep(NewResponse&& made) {
   return made.has_field ? std::make_shared<LinearResponse>(std::move(made.response)) : nullptr;
@@ -327,6 +357,60 @@ NB_MODULE(_kernels, m) {
     std::copy(running.begin(), running.end(), runs.data());
     return out;
   });
+
+  nb::class_<SearchLengths>(m, "SearchLengths")
+      .def("__init__", [](SearchLengths* lengths, double max_displacement,
+                          double closing_per_motion, double surface, double narrowest,
+                          double widest, int top) {
+        new (lengths) SearchLengths{max_displacement, closing_per_motion, surface,
+                                    narrowest, widest, top};
+      });
+  nb::class_<Searched>(m, "Searched").def(nb::init<>());
+  m.def("make_field", &make_field);
+  m.def("search", [](const Field& field, const Searched& searched, const SearchLengths& lengths,
+                     const Model& model) {
+    Search found;
+    {
+      nb::gil_scoped_release release;
+      found = search(field, searched.gaps, lengths, model);
+    }
+    return nb::make_tuple(found.least, found.count, minima_of(found.minima),
+                          Searched{found.searched});
+  });
+  m.def("clearance_left", [](const Field& field, const Searched& searched,
+                             const SearchLengths& lengths, const Model& model) {
+    return array_of(clearance_left(field, searched.gaps, lengths, model).clearance);
+  });
+  m.def("search_gaps", [](const Field& field, const IntegerArray& gaps,
+                          const SearchLengths& lengths, const Model& model) {
+    const std::vector<Minimum> minima = find_minima(field, integers_of(gaps), lengths.top, model);
+    return nb::make_tuple(minima_of(minima),
+                          array_of(least_clearances(minima, field.nodes.gap_count(), lengths)));
+  });
+  m.def("open_gap", [](const Field& field, int k, int count, const Model& model) {
+    const FineOpening fine =
+        open_gap(field.nodes, k, field.scaled_opening, Circle(count + 1), model);
+    return nb::make_tuple(array_of(fine.theta), array_of(fine.theta_by_t), array_of(fine.opening),
+                          array_of(fine.modes));
+  });
+  m.def("work_of_gaps", &work_of_gaps);
+  m.def("edge_openings", [](const Field& field, const Array& f, const Model& model) {
+    Vector out(2 * field.nodes.gap_count());
+    for (int e = 0; e < int(out.size()); ++e) {
+      const int k = e / 2, side = e % 2;
+      const Vector& end_values = (*model.rules)[field.nodes.orders[k]].end_values[side];
+      out[e] = std::sqrt(2 * field.nodes.slope[k][side]) *
+               dot(end_values.data(), f.data() + field.nodes.offset[k], field.nodes.size_of(k));
+    }
+    return array_of(out);
+  });
+  m.def("map_gaps", [](const Array& gaps) { return table_of(map_gaps(vector_of(gaps))); });
+  m.def("choose_orders", [](const Array& table, double digits, const GaussRules& rules) {
+    Integers out;
+    for (const Gap& gap : gaps_of(table)) out.push_back(choose_order(gap, digits, rules));
+    return array_of(out);
+  });
+  m.def("shortest_length", [](const Array& gaps) { return shortest_length(vector_of(gaps)); });
 
   // Single parts, for tests.
   m.def("gap_moments", [](const Array& table, int k, const Model& model, int modes, int fields) {

@@ -223,38 +223,36 @@ void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, do
     nodes.from_end[0][nodes.count] = nodes.from_end[1][nodes.count] = 1;
     for (int field = 0; field < fields; ++field) nodes.source[field][nodes.count] = 0;
   }
-  const int count = nodes.count;
-  // sin((n+1)t), cos t = η, by its recurrence
-  Vector twice(count), current(count), previous(count, 0.0);
-  for (int i = 0; i < count; ++i) {
-    FromEnds at = {nodes.from_end[1][i], nodes.from_end[0][i]};
-    current[i] = std::sqrt(at.minus * at.plus);
-    twice[i] = 2 * at.eta();
+  // sin((n+1)t), cos t = η, by its recurrence; four nodes at a time, for all modes
+  std::vector<std::array<Four, 2>> total(modes, {Four{}, Four{}});
+  std::array<Four, 2> low = {}, high = {};
+  for (int i = 0; i < nodes.count; i += 4) {
+    const Four minus = load_four(&nodes.from_end[1][i]), plus = load_four(&nodes.from_end[0][i]);
+    const Four product = minus * plus;
+    Four now, previous = {}, twice;
+    std::array<Four, 2> source = {};
+    for (int lane = 0; lane < 4; ++lane) {
+      now[lane] = std::sqrt(product[lane]);
+      twice[lane] = 2 * FromEnds{minus[lane], plus[lane]}.eta();
+    }
+    for (int field = 0; field < fields; ++field) {
+      source[field] = load_four(&nodes.source[field][i]);
+      const Four share = source[field] / (now * pi);
+      low[field] += share * minus;
+      high[field] += share * plus;
+    }
+    for (int n = 0; n < modes; ++n) {
+      total[n][0] += source[0] * now;
+      if (fields > 1) total[n][1] += source[1] * now;
+      const Four next = twice * now - previous;
+      previous = now;
+      now = next;
+    }
   }
   for (int field = 0; field < fields; ++field) {
-    Four low = {}, high = {};
-    for (int i = 0; i < count; i += 4) {
-      Four share = load_four(&nodes.source[field][i]) / (load_four(&current[i]) * pi);
-      low += share * load_four(&nodes.from_end[1][i]);
-      high += share * load_four(&nodes.from_end[0][i]);
-    }
-    ends[0][field] = sum_lanes(low);
-    ends[1][field] = sum_lanes(high);
-  }
-  const double* stress = nodes.source[0].data();
-  const double* slope = nodes.source[fields - 1].data();
-  for (int n = 0; n < modes; ++n) {
-    Four total = {}, total_of_slope = {};
-    for (int i = 0; i < count; i += 4) {
-      Four now = load_four(&current[i]);
-      total += load_four(stress + i) * now;
-      if (fields > 1) total_of_slope += load_four(slope + i) * now;
-      Four next = load_four(&twice[i]) * now - load_four(&previous[i]);
-      std::memcpy(&previous[i], &now, sizeof now);
-      std::memcpy(&current[i], &next, sizeof next);
-    }
-    s[n * fields] = sum_lanes(total) * (2 / pi);
-    if (fields > 1) s[n * fields + 1] = sum_lanes(total_of_slope) * (2 / pi);
+    ends[0][field] = sum_lanes(low[field]);
+    ends[1][field] = sum_lanes(high[field]);
+    for (int n = 0; n < modes; ++n) s[n * fields + field] = sum_lanes(total[n][field]) * (2 / pi);
   }
 }
 

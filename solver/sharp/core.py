@@ -13,9 +13,14 @@ from adhesis.solver.sharp.equilibrium import (
     renewal,
     response_setup,
 )
-from adhesis.solver.sharp.field import hierarchical_solver, separate_gaps
+from adhesis.solver.sharp.equilibrium import griffith
+from adhesis.solver.sharp.field import hierarchical_solver, separate_gaps, solution
+from adhesis.solver.sharp.gap import conformal_map, quadrature
 
 _numba = os.environ.get("ADHESIS_KERNELS") == "numba"
+
+
+is_native = not _numba
 
 
 def _choose(module: Any, name: str) -> Any:
@@ -31,6 +36,10 @@ settle_response = _choose(renewal, "settle_response")
 tangent_between = _choose(condensed, "tangent_between")
 equilibrium_many = _choose(hierarchical_newton, "equilibrium_many")
 descend = _choose(implicit_flow, "descend")
+map_gaps = _choose(conformal_map, "map_gaps")
+choose_orders = _choose(quadrature, "choose_orders")
+shortest_length = _choose(griffith, "shortest_length")
+edge_openings = _choose(solution, "edge_openings")
 if os.environ.get("ADHESIS_KERNELS") == "flow-in-python":
     from adhesis.solver.sharp import flow_in_python
 

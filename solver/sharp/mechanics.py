@@ -9,8 +9,11 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.core import (
+    choose_orders,
     descend,
     equilibrium_many,
+    map_gaps,
+    shortest_length,
     solve_many,
     solve_separately,
     tangent_between,
@@ -28,7 +31,6 @@ from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
     imbalance,
     move_edges,
-    shortest_length,
     step_limits,
 )
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import EquilibriumOfMany
@@ -40,9 +42,8 @@ from adhesis.solver.sharp.field.gap_field import (
     respond_at_fixed_edges,
 )
 from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import (

@@ -190,3 +190,94 @@ def descend(
         response.kernel, gaps, prescribed, most, equal_speeds, runs, reach, law_of(law),
         model_of(model),
     )  # fmt: skip
+
+
+def _model_with(panels: Panels) -> Any:
+    return model_of(FieldModel(LoadingDevice(1.0, 0.0), 0.0, GAUSS_RULES, panels))
+
+
+def _field_of(nodes: Nodes, f: Array, model: Any, load: Array = _NO_MATRIX) -> Any:
+    return _kernels.make_field(
+        nodes.table, nodes.orders, nodes.theta, nodes.slope, np.ascontiguousarray(f), load, model
+    )
+
+
+_lengths = lru_cache(lambda lengths: _kernels.SearchLengths(*lengths))
+_NONE = _kernels.Searched()
+
+
+def _known(searched: Any) -> Any:
+    return searched if isinstance(searched, _kernels.Searched) else _NONE
+
+
+def search(
+    gaps: Array, nodes: Nodes, f: Array, rules: Any, panels: Panels, lengths: Any, searched: Any
+) -> tuple[float, int, tuple[Array, Array, Array], Any]:
+    """Find the least clearance of a field, searching only gaps that may have closed."""
+    model = _model_with(panels)
+    found: tuple[float, int, tuple[Array, Array, Array], Any] = _kernels.search(
+        _field_of(nodes, f, model), _known(searched), _lengths(lengths), model
+    )
+    return found
+
+
+def clearance_left(
+    nodes: Nodes, f: Array, panels: Panels, lengths: Any, searched: Any
+) -> Array:
+    """Compute a lower bound of the clearance in each gap."""
+    model = _model_with(panels)
+    left: Array = _kernels.clearance_left(
+        _field_of(nodes, f, model), _known(searched), _lengths(lengths), model
+    )
+    return left
+
+
+def least_clearances(
+    indices: Integers, nodes: Nodes, f: Array, panels: Panels, lengths: Any
+) -> Array:
+    """Find the least clearance of some gaps."""
+    model = _model_with(panels)
+    given = _field_of(nodes, f, model), indices, _lengths(lengths), model
+    least: Array = _kernels.search_gaps(*given)[1]
+    return least[indices]
+
+
+def open_gap(
+    nodes: Nodes, k: int, f: Array, count: int, panels: Panels
+) -> tuple[Array, Array, Array, Array]:
+    """Evaluate θ, falling, dθ/dt, T and b_n of gap k at so many nodes."""
+    model = _model_with(panels)
+    fine: tuple[Array, Array, Array, Array] = _kernels.open_gap(
+        _field_of(nodes, f, model), k, count, model
+    )
+    return fine
+
+
+def work_of_gaps(nodes: Nodes, load: Array, f: Array, top: int, panels: Panels) -> float:
+    """Integrate S_full T dθ over the gaps."""
+    model = _model_with(panels)
+    return float(_kernels.work_of_gaps(_field_of(nodes, f, model, load), top, model))
+
+
+def edge_openings(f: Array, nodes: Nodes, rules: Any) -> Array:
+    """Evaluate sqrt(2 dη/dθ) f(±1) at every gap end, shape (2L, 1)."""
+    model = next(iter(_models.values()))
+    opening: Array = _kernels.edge_openings(_field_of(nodes, f, model), f, model)
+    return opening.reshape(-1, 1)
+
+
+def map_gaps(gaps: Array) -> Array:
+    """Make the table of gaps."""
+    table: Array = _kernels.map_gaps(np.ascontiguousarray(gaps))
+    return table
+
+
+def choose_orders(table: Array, digits: float, counts: Integers) -> Integers:
+    """Choose the order of each gap."""
+    orders: Integers = _kernels.choose_orders(table, digits, _RULES)
+    return orders
+
+
+def shortest_length(gaps: Array) -> float:
+    """Find the length of the shortest gap or patch."""
+    return float(_kernels.shortest_length(np.ascontiguousarray(gaps)))
