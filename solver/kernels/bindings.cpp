@@ -404,6 +404,19 @@ NB_MODULE(_kernels, m) {
     }
     return array_of(out);
   });
+  nb::class_<LengthRule>(m, "LengthRule")
+      .def("__init__", [](LengthRule* rule, const Array& nodes, const Array& weights,
+                          const Array& before) {
+        new (rule) LengthRule{vector_of(nodes), vector_of(weights), vector_of(before)};
+      });
+  // the length of the profile over all patches
+  m.def("contact_length", [](const Array& gaps, const Panels& panels, const LengthRule& rule) {
+    double total = length_up_to(2 * pi, panels, rule);
+    const Vector ends = vector_of(gaps);
+    for (size_t e = 0; e < ends.size(); ++e)
+      total += (e % 2 == 0 ? 1 : -1) * length_up_to(ends[e], panels, rule);
+    return total;
+  });
   m.def("map_gaps", [](const Array& gaps) { return table_of(map_gaps(vector_of(gaps))); });
   m.def("choose_orders", [](const Array& table, double digits, const GaussRules& rules) {
     Integers out;

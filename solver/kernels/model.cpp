@@ -72,6 +72,19 @@ ValueAndSlope measure_at(double theta, const Panels& panels) {
   return {measure, tilt / measure * rate};
 }
 
+double length_up_to(double theta, const Panels& panels, const LengthRule& rule) {
+  const double turns = std::floor(theta / (2 * pi));
+  const double position = (theta - turns * 2 * pi) / panels.width;
+  const int panel = std::min(std::max(int(position), 0), panels.finest_count - 1);
+  const double share = std::min(std::max(position - panel, 0.0), 1.0);
+  double part = 0;
+  for (size_t i = 0; i < rule.nodes.size(); ++i) {
+    const double at = (panel + share * rule.nodes[i]) * panels.width;
+    part += rule.weights[i] * measure_at(at, panels).value;
+  }
+  return turns * rule.before.back() + rule.before[panel] + part * share * panels.width;
+}
+
 int choose_order(const Gap& gap, double digits, const GaussRules& rules) {
   double wanted = digits / convergence_rate(gap);
   int order = 0;

@@ -72,6 +72,14 @@ void interpolate(const Vector& coefficients, const double* position, int count,
 // sqrt(1 + h'²) and its derivative by θ.
 ValueAndSlope measure_at(double theta, const Panels& panels);
 
+// Rule on a finest panel from 0 to 1, and ∫ sqrt(1 + h'²) dθ from 0 to the start of each panel.
+struct LengthRule {
+  Vector nodes, weights, before;
+};
+
+// Integrate sqrt(1 + h'²) dθ from 0 to θ.
+double length_up_to(double theta, const Panels& panels, const LengthRule& rule);
+
 // C and dC/dθ of a half-plane crack that begins (side 0) or ends (1) at θ.
 inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& panels) {
   return evaluate_series(panels.half_plane[side], theta, panels);

@@ -281,3 +281,23 @@ def choose_orders(table: Array, digits: float, counts: Integers) -> Integers:
 def shortest_length(gaps: Array) -> float:
     """Find the length of the shortest gap or patch."""
     return float(_kernels.shortest_length(np.ascontiguousarray(gaps)))
+
+
+_length_rules: dict[int, tuple[Array, Any]] = {}
+
+
+def contact_between(
+    gaps: Array, before: Array, panels: Panels, nodes: Array, weights: Array
+) -> tuple[Array, float]:
+    """Return the patches between gaps, and the length of the profile over them."""
+    _model_with(panels)
+    if id(before) not in _length_rules:
+        _length_rules[id(before)] = before, _kernels.LengthRule(nodes, weights, before)
+    rule = _length_rules[id(before)][1]
+    kernel = _panels[id(panels.stress)][1]
+    left = np.concatenate([[gaps[-1, 1] - 2 * np.pi], gaps[:-1, 1]])
+    patches = np.stack([left, gaps[:, 0]], axis=1)
+    patches -= np.floor(patches[:, :1] / (2 * np.pi)) * 2 * np.pi
+    first = int(np.argmin(patches[:, 0]))
+    length = float(_kernels.contact_length(gaps, kernel, rule))
+    return np.concatenate([patches[first:], patches[:first]]), length
