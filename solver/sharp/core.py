@@ -9,11 +9,11 @@ from adhesis.solver.sharp import native as _native
 from adhesis.solver.sharp.descent import implicit_flow
 from adhesis.solver.sharp.equilibrium import (
     condensed,
+    griffith,
     hierarchical_newton,
     renewal,
     response_setup,
 )
-from adhesis.solver.sharp.equilibrium import griffith
 from adhesis.solver.sharp.field import hierarchical_solver, separate_gaps, solution
 from adhesis.solver.sharp.gap import conformal_map, quadrature
 

@@ -208,7 +208,7 @@ def descend(
             condensed = _kernels.CondensedEdges(kernel, edges, now, of_model)
             critical = _kernels.critical_openings(gaps.ravel()[edges], of_law, of_model)
             error = _model_error(flow, condensed.residual(now), critical, law)
-            length = float(np.abs(flow.motion).max(initial=0.0)) / law.longest_step  # type: ignore[union-attr]
+            length = float(np.abs(flow.motion).max(initial=0.0)) / law.longest_step  # type: ignore[attr-defined]
             reach = _next_reach(reach, length, error)
             if error > 1 and length > 1.5 * SHORTEST_REACH:
                 gaps, moved = before, True
