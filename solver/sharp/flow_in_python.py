@@ -168,7 +168,7 @@ def descend(
     """Descend in energy until an event."""
     kernel, of_law, of_model = response.kernel, law_of(law), model_of(model)
     sign, edges = outward(gaps), np.flatnonzero(runs)
-    before, flow = gaps, None
+    before, flow = gaps, _kernels.ModelFlow
     pressure = kernel.pressure_at(prescribed, of_model)
     strongest, event, steps, damped = 0.0, STEP_LIMIT, 0, LEAST_DAMPING
     moved, judges = True, False
@@ -208,7 +208,7 @@ def descend(
             condensed = _kernels.CondensedEdges(kernel, edges, now, of_model)
             critical = _kernels.critical_openings(gaps.ravel()[edges], of_law, of_model)
             error = _model_error(flow, condensed.residual(now), critical, law)
-            length = float(np.abs(flow.motion).max(initial=0.0)) / law.longest_step  # type: ignore[attr-defined]
+            length = float(np.abs(flow.motion).max(initial=0.0)) / law.longest_step
             reach = _next_reach(reach, length, error)
             if error > 1 and length > 1.5 * SHORTEST_REACH:
                 gaps, moved = before, True
