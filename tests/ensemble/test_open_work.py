@@ -16,7 +16,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report.findings import verdict
 from adhesis.ensemble.report.paper import is_reading
 from adhesis.ensemble.report.tables.loss_tables import losses
-from adhesis.ensemble.task.compute import make_problem, run_task
+from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.doubt import beyond_zero_range
 from adhesis.ensemble.trace.answer import check as check_trace
 from adhesis.ensemble.trace.answer import make_cycle
@@ -122,7 +122,7 @@ def test_the_table_of_a_trace_keeps_the_ratio_of_both_works_of_adhesion():
     prepared = small_trace()
     check_trace(prepared, cycle)
     plan = make_plan(prepared, cycle, processes=0)
-    found = {(job.work_of_adhesion, job.work_of_adhesion_open) for job in plan.jobs}
+    found = {(job.work_of_adhesion, job.cycle.open_at(job.work_of_adhesion)) for job in plan.jobs}
     assert found == {(0.04, 0.06), (0.02, 0.03), (0.08, 0.12)}
 
 
@@ -219,7 +219,7 @@ def test_equal_works_of_adhesion_are_those_of_one():
 
 def test_a_row_has_its_friction():
     campaign = parse_campaign(text("0.08", work_of_adhesion="[0.04]", hurst="[0.8]"))
-    row = run_task(campaign, campaign.tasks()[0])
+    row = Runner()(campaign, campaign.tasks()[0])
     assert row["gamma_open"] == 0.08
     assert 0 < row["friction"] < row["loss"]
     assert row["loss_from_drops"] == pytest.approx(row["loss"], rel=1e-3)

@@ -392,10 +392,10 @@ answer(work_of_adhesion=[]) -> ValueError: work_of_adhesion is empty: it must ho
 answer(max_penetration=[0.5, 1.0]) -> ValueError: max_penetration is 1.0: it must be
 answer(method='magic') -> ValueError: method is 'magic': it must be one of
 answer(processes=-1) -> ValueError: processes is -1: it must be a whole number from 0 to 4096
-answer(control=Control(0)) -> ValueError: max_stress is missing: a path under a load must have it
+answer(control=Control(0)) -> ValueError: a path under a load turns at max_stress: give that
 answer(control=Control(0), max_penetration=0.5) ->
-    ValueError: max_penetration is given: a path under a load turns at
-answer(max_stress=500.0) -> ValueError: max_stress is given: it belongs to a load
+    ValueError: a path under a load turns at max_stress: give that, and no max_penetration
+answer(max_stress=500.0) -> ValueError: max_stress is given, but a path under a separation
 answer(quick=1) -> TypeError: quick is 1: it must be True or False
 answer(watch=1) -> TypeError: watch is 1: it must be a function, or None
 # files
