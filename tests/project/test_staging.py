@@ -270,7 +270,7 @@ def staged(here: Site, disk: str = "disk1") -> Path:
 
 
 def test_a_second_job_touches_nothing_of_the_first(real: Site) -> None:
-    """Both have the same disk, or each its own or none; it is submitted twice, or comes too early."""
+    """Both have one disk, or each its own or none; it is submitted twice, or comes too early."""
     first = real.start(STAGING="disk1")
     wait_until(lambda: done_rows(staged(real)) == 3)
     seen = sorted(real.folder.rglob("*"))
