@@ -201,3 +201,12 @@ def test_the_grid_is_refused_and_auto_takes_sharp():
         make_method("auto", wave(2.0), nodes_per_wave=32)
     assert make_method("auto", wave(2.0)).name == "sharp"
     assert make_method("grid", wave(1.0)).name == "grid"
+
+
+def test_under_a_load_the_solid_falls_off_at_the_largest_tension_of_the_larger_work() -> None:
+    method = make_method("sharp", wave(2.0, Control(0.0)), accuracy=1e-4)
+    loop = run_loop(method, max_stress=2000.0, load_steps=20)
+    opens = SingleWave(A, PERIOD, SOLID.modulus, 2.0 * GAMMA, "arc")
+    tension = -opens.mean_stress(np.linspace(1e-3, 0.4, 40_000) * PERIOD).min()
+    assert loop.pull_off_stress == pytest.approx(tension, rel=1e-5)
+    assert abs(loop.audit_residual) < 1e-5
