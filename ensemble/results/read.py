@@ -133,6 +133,12 @@ class Results:
 
     def _check_layout(self) -> None:
         """Compare shapes and types with those of the campaign, before anything of them is read."""
+        missing = [column.name for column in self._datasets if column.name not in self._file]
+        if missing:
+            raise InputError(
+                f"{self.path} was written by another state of adhesis, without {missing[0]}: read "
+                "it with that one, or compute the campaign again into another file"
+            )
         if schema.file_size(self.campaign, self.part) > os.path.getsize(self.path):
             raise ValueError("truncated")
         wanted = schema.scales(self.campaign, self.part)

@@ -145,6 +145,14 @@ def test_a_task_of_another_campaign_is_refused(damage, path, name, pending):
     assert f"its tasks are not those of its campaign ({name} of row 3 is" in sentence
 
 
+def test_a_file_whose_rows_have_not_all_numbers_of_today_is_not_called_damaged(damage, path):
+    changed(path, lambda file: file.__delitem__("friction"))
+    write_head(path)
+    verdict, sentence = damage.judge(path.read_bytes())
+    assert verdict == "refused"
+    assert "was written by another state of adhesis, without friction: read it with" in sentence
+
+
 def test_an_axis_that_is_not_the_campaigns_is_refused(damage, path):
     changed(path, _set("unloading_penetration", 4, 0.123))
     write_head(path)
