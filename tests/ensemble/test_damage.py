@@ -18,6 +18,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report.findings import missing
+from adhesis.ensemble.results import head
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
@@ -145,9 +146,13 @@ def test_a_task_of_another_campaign_is_refused(damage, path, name, pending):
     assert f"its tasks are not those of its campaign ({name} of row 3 is" in sentence
 
 
-def test_a_file_whose_rows_have_not_all_numbers_of_today_is_not_called_damaged(damage, path):
+def test_a_file_whose_rows_have_not_all_numbers_of_today_is_not_called_damaged(
+    damage, path, monkeypatch
+):
     changed(path, lambda file: file.__delitem__("friction"))
-    write_head(path)
+    with monkeypatch.context() as then:
+        then.setattr(head, "ROW_DATASETS", [d for d in head.ROW_DATASETS if d.name != "friction"])
+        write_head(path)
     verdict, sentence = damage.judge(path.read_bytes())
     assert verdict == "refused"
     assert "was written by another state of adhesis, without friction: read it with" in sentence
