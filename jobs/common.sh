@@ -155,11 +155,13 @@ stage_in() {
         if [ -e "$target" ] && ! copy "$target" "$results"; then
             refuse 74 "$file could not be copied to $results"
         fi
-    elif is_changed && ! cmp -s "$results" "$target"; then # left by a job that was killed
-        refuse 2 "$results holds results that were not copied back, and $file has changed since:" \
-            "join them (adhesis merge $results --out $file) and remove $stage"
-    elif ! version >"$stage/version"; then
-        refuse 74 "$stage/version could not be written"
+    elif is_changed; then # left by a job that was killed
+        if ! cmp -s "$results" "$target"; then
+            refuse 2 "$results holds results that were not copied back, and $file has changed since:" \
+                "join them (adhesis merge $results --out $file) and remove $stage"
+        fi
+        # only of equal files: a job that is killed here leaves it empty
+        if ! version >"$stage/version"; then refuse 74 "$stage/version could not be written"; fi
     fi
 }
 

@@ -38,17 +38,7 @@ WORDS: dict[str, tuple[object, ...]] = {
     "verify": ("{}/r.h5",),
     "merge": ("{}/r.h5", "--out", "all.h5"),
     "report": ("{}/r.h5", "--to", "report"),
-    "loop": (
-        *LOOP,
-        *MATERIAL,
-        "--accuracy",
-        "0.1",
-        "--quiet",
-        "--json",
-        "l.json",
-        "--csv",
-        "l.csv",
-    ),
+    "loop": (*LOOP, *MATERIAL, "--accuracy", "0.1", "--quiet", "--json", "l.json"),
     "trace": ("{}/s.csv", "--unit", "um", *MATERIAL, "--plan"),
     "sample": ("s.csv",),
     "validate": ("--method", "grid"),
@@ -116,7 +106,9 @@ def test_a_command_under_a_limit_ends_in_one_sentence_and_leaves_nothing_half_wr
     if limit == "u" and os.geteuid() == 0 and shutil.which("setpriv") is None:
         pytest.skip("root is not bound by a limit of processes, and setpriv is missing")
     words = [name, *(str(word).format(finished) for word in WORDS[name])]
-    done = limited(f"-{limit} {value}", words, tmp_path, fake="")
+    # tasks that cost nothing, where the run gets so far; they load modules outside of the command
+    fake = "" if limit == "f" else None
+    done = limited(f"-{limit} {value}", words, tmp_path, fake=fake)
     assert "Traceback" not in done.stdout + done.stderr
     if done.returncode == 0:
         assert limit != "v" or value >= 1_000_000 or name in _WITHOUT_NUMERICS
