@@ -313,6 +313,21 @@ def test_rows_of_a_killed_run_come_back(real: Site) -> None:
     assert not staged(real).exists()
 
 
+def test_the_noted_version_is_not_written_anew_beside_rows_that_are_left(real: Site) -> None:
+    """A job that is killed while it writes it would make the next one refuse the rows."""
+    first = real.start(STAGING="disk1")
+    wait_until(lambda: done_rows(staged(real)) == 3)
+    os.killpg(first.pid, signal.SIGKILL)
+    first.wait()
+    noted = (staged(real).parent / "version").stat()
+    second = real.start("--patience", "60", STAGING="disk1")
+    wait_until(lambda: done_rows(staged(real)) > 3)
+    assert (staged(real).parent / "version").stat().st_mtime_ns == noted.st_mtime_ns
+    (real.folder / "free").touch()
+    text, _ = second.communicate(timeout=120)
+    assert second.returncode == 0, text
+
+
 def test_a_run_of_somebody_else_and_a_job_do_not_destroy_each_other(real: Site) -> None:
     """The other run is not told of STAGING; it writes to the results file itself."""
     by_hand = real.run_by_hand()
