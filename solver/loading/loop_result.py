@@ -213,6 +213,14 @@ class LoopResult(EquilibriumPath):
             *(self.edge_range, self.touch_range),
         )
         found += opening_warnings(self.jumps, self.loss)
+        profile = self.problem.profile
+        alike = profile.equal_parts > 1 or profile.mirror_axes.size > 0
+        if self.problem.pinning > 0 and alike and self.patches.max() > 1:
+            found.append(
+                "parts of the profile are alike, and with two works of adhesion it is not settled "
+                "at which separation one of equal patches recedes before the other: the loss may "
+                "be wrong by a per cent; take a profile whose parts differ a little"
+            )
         return tuple(found)
 
     @property

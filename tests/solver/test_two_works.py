@@ -203,6 +203,16 @@ def test_the_grid_is_refused_and_auto_takes_sharp():
     assert make_method("grid", wave(1.0)).name == "grid"
 
 
+def test_equal_patches_of_two_works_are_doubted() -> None:
+    """Which of them goes first, and when, differs between accuracies by more than the error."""
+    equal = replace(wave(3.0), profile=Profile(PERIOD, np.array([0, 0, 0.5 * A], complex)))
+    loops = [
+        run_loop(make_method("sharp", problem), max_penetration=0.8, load_steps=10)
+        for problem in (equal, replace(equal, work_of_adhesion_open=None), wave(3.0))
+    ]
+    assert [any("are alike" in text for text in loop.warnings) for loop in loops] == [1, 0, 0]
+
+
 def test_under_a_load_the_solid_falls_off_at_the_largest_tension_of_the_larger_work() -> None:
     method = make_method("sharp", wave(2.0, Control(0.0)), accuracy=1e-4)
     loop = run_loop(method, max_stress=2000.0, load_steps=20)
