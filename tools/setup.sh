@@ -179,6 +179,11 @@ locked() { grep -E "^($1)==" requirements.lock; }
 install_tests() { install $(grep -v '^#' requirements-test.lock); }
 
 mkdir -p .setup/wheels
+# Two at a time, of `make run` and `make test` say, would install into one .venv over each other.
+if command -v flock >/dev/null && { exec 9>>.setup/lock; } 2>/dev/null && ! flock -n 9; then
+    say "another set-up is at work in this folder: waiting for its end"
+    flock 9
+fi
 if ready; then
     if needs_tests; then
         : >"$log"

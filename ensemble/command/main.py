@@ -77,7 +77,7 @@ _RANK_0_FIRST = 20.0  # s
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM was received."""
+    """SIGTERM was received, or SIGHUP of a terminal that closes."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -170,19 +170,26 @@ def _execute(name: str, words: Sequence[str]) -> int:
 
 @contextmanager
 def _termination(*, enabled: bool) -> Iterator[None]:
-    """Raise Terminated at SIGTERM, so that unfinished files are removed."""
-    if not (enabled and in_main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL):
-        yield
-        return
+    """Raise Terminated at SIGTERM and SIGHUP, so that unfinished files are removed.
+
+    A signal that is ignored, as SIGHUP under ``nohup``, stays so. What follows the first one is
+    ignored: a terminal that closes sends two.
+    """
 
     def terminate(_: int, __: FrameType | None) -> None:
+        for number in handled:
+            signal.signal(number, signal.SIG_IGN)
         raise Terminated
 
-    signal.signal(signal.SIGTERM, terminate)
+    numbers = (signal.SIGTERM, signal.SIGHUP) if enabled and in_main_thread() else ()
+    handled = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]
+    for number in handled:
+        signal.signal(number, terminate)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in handled:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def _overview() -> Parser:

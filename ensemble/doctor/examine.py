@@ -158,13 +158,15 @@ def _failure_of(command: list[str], env: dict[str, str]) -> str:
     )
     try:
         output, _ = process.communicate(timeout=_TIME_LIMIT)
-    except subprocess.TimeoutExpired:
+    except BaseException as error:  # also an interrupt: what was started ends before its folder
         process.terminate()  # a launcher then ends its ranks; a kill would leave them running
         try:
             process.communicate(timeout=5)
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
+        if not isinstance(error, subprocess.TimeoutExpired):
+            raise
         return f"did not end within {_TIME_LIMIT:.0f} s"
     if process.returncode:
         # of several processes, the first page has the reason, of one its traceback's last lines

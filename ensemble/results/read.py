@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
-from adhesis.ensemble.errors import InputError, lack
+from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import check_head
@@ -82,7 +82,7 @@ class Results:
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
-                self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
+                self.part = self._part()
                 self._datasets = schema.datasets(self.campaign)
                 self._check_layout()
                 self._check_attributes()
@@ -130,6 +130,16 @@ class Results:
                 raise ValueError(name)
             found[name] = value
         return found
+
+    def _part(self) -> Part:
+        text = self.attributes.get("part", str(WHOLE))
+        try:
+            return Part.parse(text)
+        except InputError:  # of which it names an option
+            raise InputError(
+                f"{self.path} is damaged: its attribute part is {quoted(text)}, and must be K/N "
+                f"with 1 ≤ K ≤ N, as 3/20; {_INSTEAD}"
+            ) from None
 
     def _check_layout(self) -> None:
         """Compare shapes and types with those of the campaign, before anything of them is read."""

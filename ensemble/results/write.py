@@ -48,6 +48,11 @@ class Writer:
         own; opening and closing are collective. If not, this process is the only writer.
     origin : callable, optional
         Versions and processor of what computes a row, by the rank that does.
+
+    Raises
+    ------
+    WriteError
+        If it cannot be opened.
     """
 
     def __init__(
@@ -59,14 +64,18 @@ class Writer:
         self.path = Path(path)
         # HDF5's own lock would refuse readers; two writers are refused by
         # adhesis.ensemble.run.lock.
-        self._disk = DiskFile(self.path, "r+b") if comm is None else None
         self._names = ExitStack()
         with signals_held():
-            if self._disk is not None:
-                self._file = h5py.File(self._disk, "r+")
-            else:
-                name = self._names.enter_context(_short_name(self.path))
-                self._file = h5py.File(name, "r+", driver="mpio", comm=comm)
+            try:
+                self._disk = DiskFile(self.path, "r+b") if comm is None else None
+                if self._disk is not None:
+                    self._file = h5py.File(self._disk, "r+")
+                else:
+                    name = self._names.enter_context(_short_name(self.path))
+                    self._file = h5py.File(name, "r+", driver="mpio", comm=comm)
+                self._opened = os.stat(self.path)
+            except OSError as error:  # it was there when the run was prepared
+                raise WriteError(f"{self.path} could not be opened: {reason(error)}") from error
             self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in schema.DATASETS}
             self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
         self._origin = origin
@@ -178,11 +187,24 @@ class Writer:
         """Name the row in an error of the disk; what a signal handler raises comes afterwards."""
         with signals_held():
             try:
+                self._check_place()
                 yield
             except (OSError, RuntimeError) as error:
                 raise WriteError(
                     f"row {row} of {self.path} could not be written: {reason(error)}"
                 ) from error
+
+    def _check_place(self) -> None:
+        """Refuse to fill a file that is not at its path any more, and may have no name at all."""
+        try:
+            moved = not os.path.samestat(os.stat(self.path), self._opened)
+        except (FileNotFoundError, NotADirectoryError):
+            moved = True
+        if moved:
+            raise WriteError(
+                f"{self.path} was moved, replaced or removed while a run wrote to it: put the old "
+                "file back"
+            )
 
     def flush(self) -> None:
         """Hand what was written to the operating system."""

@@ -56,8 +56,12 @@ class Processes:
         return [self._processes[rank].pid for rank in self.workers]
 
     def __enter__(self) -> Self:
-        for rank in self.workers:
-            self._start(rank)
+        try:
+            for rank in self.workers:
+                self._start(rank)
+        except BaseException:  # too few processes, or an interrupt: those that run are ended
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:

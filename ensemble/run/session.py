@@ -262,6 +262,9 @@ class _Session:
     def __post_init__(self) -> None:
         campaign, plan, options, engine = self.campaign, self.plan, self.options, self.engine
         self._started = time.monotonic()
+        # by the clock that nobody sets
+        deadline = options.deadline
+        self._ends = None if deadline is None else deadline.at - time.time() + self._started
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Counts(total, plan.done, plan.failed)
         self._groups: Mapping[int, Group] = {
@@ -406,8 +409,7 @@ class _Session:
         return None
 
     def _time_left(self) -> float | None:
-        deadline = self.options.deadline
-        return None if deadline is None else deadline.at - time.time()
+        return None if self._ends is None else self._ends - time.monotonic()
 
     @staticmethod
     def _estimate(schedule: Schedule, in_flight: float, workers: int) -> float | None:

@@ -348,14 +348,50 @@ def ctrl_c():
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "run"])
 @pytest.mark.parametrize(
     ("number", "code", "word"),
-    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+    [
+        (signal.SIGINT, 130, "interrupted"),
+        (signal.SIGTERM, 143, "terminated"),
+        (signal.SIGHUP, 143, "terminated"),
+    ],
 )
 def test_signals_end_a_command_in_one_line(name, number, code, word, capsys, monkeypatch):
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run under nohup
     module = importlib.import_module(module_of(name))
     monkeypatch.setattr(module, "execute", lambda args: signal.raise_signal(number))
-    assert main([name, *required(name)]) == code
-    assert capsys.readouterr().err == f"adhesis {name}: {word}\n"
-    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    try:
+        assert main([name, *required(name)]) == code
+        assert capsys.readouterr().err == f"adhesis {name}: {word}\n"
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_second_signal_does_not_cut_the_removal_of_unfinished_files_short(folder, monkeypatch):
+    """A terminal that closes sends SIGHUP twice: the shell's, and the system's."""
+    module = importlib.import_module(module_of("status"))
+    removed = []
+
+    def execute(args):
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            signal.raise_signal(signal.SIGTERM)
+            removed.append(True)
+
+    monkeypatch.setattr(module, "execute", execute)
+    assert main(["status", "r.h5"]) == 143
+    assert removed == [True]
+
+
+def test_what_nohup_ignores_does_not_end_a_command(folder, monkeypatch):
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    module = importlib.import_module(module_of("status"))
+    monkeypatch.setattr(module, "execute", lambda args: signal.raise_signal(signal.SIGHUP) or 0)
+    try:
+        assert main(["status", "r.h5"]) == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):

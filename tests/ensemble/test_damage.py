@@ -254,6 +254,7 @@ ATTRIBUTES = {
     "a seed of several numbers": lambda file: file.attrs.create("seed", [5, 5]),
     "another convention": lambda file: file.attrs.modify("Conventions", "none"),
     "a part": lambda file: file.attrs.create("part", "1/1 "),
+    "no part": lambda file: file.attrs.create("part", "3/2"),
     "another unit": lambda file: file["loss"].attrs.modify("units", "mJ m-2"),
     "the unit of an axis": lambda file: file["unloading_penetration"].attrs.modify("units", "m"),
     "no unit": lambda file: file["loss"].attrs.pop("units"),
@@ -281,6 +282,8 @@ def test_an_attribute_that_is_not_the_campaigns_is_refused(path, name, capsys):
     (line,) = capsys.readouterr().err.splitlines()
     if name == "another seed":
         assert "is damaged: its attribute seed is 77, and that of its campaign is 5" in line
+    assert "--part" not in line  # no option was used
+    assert name != "no part" or "is damaged: its attribute part is '3/2'" in line
 
 
 # ---------------------------------------------------------------- what commands say

@@ -483,6 +483,23 @@ def test_a_process_that_is_killed_fails_its_task_and_is_replaced():
     assert [(o.task, o.error) for o in outcomes] == [(0, "its process ended with code -9")]
 
 
+def test_processes_end_where_the_system_does_not_grant_all_of_them(monkeypatch):
+    """They would wait for tasks as long as a Python session lasts."""
+    started = []
+
+    def start(self, rank):
+        if started:
+            raise BlockingIOError("no more processes")
+        granted(self, rank)
+        started.append(self._processes[rank])
+
+    granted = Processes._start
+    monkeypatch.setattr(Processes, "_start", start)
+    with pytest.raises(BlockingIOError):
+        Processes(2, half).__enter__()
+    assert started[0].returncode is not None
+
+
 def test_tasks_that_would_not_end_in_time_stay_behind():
     _, collected, reason, _ = simulate(
         1, [10.0] * 20, limits=lambda c: Limits(time_left=lambda: 45 - c.now)

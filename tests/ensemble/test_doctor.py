@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +19,7 @@ from adhesis.ensemble.run import launch
 from adhesis.solver import precompile as warm
 from adhesis.solver.runtime import disk_cache as code_cache
 from adhesis.solver.runtime.disk_cache import CodeFiles
+from tests.support.campaign_support import has_ended
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
@@ -94,6 +97,23 @@ def test_a_launcher_that_hangs_is_given_up(tmp_path: Path, monkeypatch: pytest.M
     diagnosis = doctor.examine()
     assert not diagnosis.usable
     assert any("did not end within" in check.text for check in diagnosis.checks)
+
+
+def test_an_interrupt_ends_what_was_started_before_its_folder_goes(tmp_path: Path) -> None:
+    hanging = tmp_path / "mpirun"
+    hanging.write_text(f"#!/bin/sh\necho $$ >{tmp_path}/pid; kill -TERM $PPID; exec sleep 600\n")
+    hanging.chmod(0o755)
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            doctor._failure_of([str(hanging)], dict(os.environ))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert has_ended(int((tmp_path / "pid").read_text()))
 
 
 def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any]) -> None:

@@ -128,6 +128,20 @@ def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number, ranks, hangup_co
     assert "Forwarding" not in errors  # a line of Open MPI's
 
 
+def test_ranks_end_when_the_results_file_is_moved(tmp_path):
+    """The run would have gone on, and reported rows as done that nobody finds."""
+    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
+    process = start("run", path, "--out", out, "--ranks", 3, fake=f"hold=1 free={free}")
+    wait_until(lambda: done_rows(out) >= 1)
+    out.rename(tmp_path / "old.h5")
+    free.touch()
+    _, errors = process.communicate(timeout=150)
+    assert process.returncode == 74, errors
+    assert "r.h5 was moved, replaced or removed while a run wrote to it" in errors
+    (tmp_path / "old.h5").rename(out)
+    assert here(path, out).done == 8
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="the system ends children on Linux alone")
 def test_ranks_end_with_a_run_that_is_killed_and_the_next_one_resumes(tmp_path, whole):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"

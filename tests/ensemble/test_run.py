@@ -451,6 +451,15 @@ def test_workers_have_as_long_to_answer_as_the_walltime_leaves(tmp_path):
         assert found._limits.grace == pytest.approx(grace)
 
 
+def test_a_clock_that_is_set_back_does_not_move_the_walltime(tmp_path, monkeypatch):
+    campaign = load_campaign(write_campaign(tmp_path))
+    plan = Plan(campaign.tasks(), [0], 0, 0)
+    options = Options(deadline=deadline(1000.0, time.time(), {}))
+    found = session._Session(campaign, plan, None, options, StopSignals(), Engine())
+    monkeypatch.setattr(time, "time", lambda: 0.0)
+    assert found._time_left() <= 970.0
+
+
 def test_a_hangup_stops_a_run_unless_it_is_ignored():
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     try:

@@ -199,6 +199,14 @@ class Job:
     cluster: Cluster
     folder: Path
     number: str
+    env: dict[str, str]
+
+    def again(self, *words: str) -> Job:
+        """Submit the same campaign once more, from the same folder."""
+        words = ("sbatch", "--parsable", "--ntasks=2", str(SCRIPT), "study.toml", *words)
+        done = subprocess.run(words, env=self.env, cwd=self.folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return Job(self.cluster, self.folder, done.stdout.strip(), self.env)
 
     @property
     def values(self) -> dict[str, str]:
@@ -215,6 +223,10 @@ class Job:
         """Return the number of done rows in its results file."""
         return done_rows(self.folder / "study.h5")
 
+    def staged_tasks(self) -> int:
+        """Return the number of done rows in its copy of the results file."""
+        return done_rows(next(self.folder.glob("disk/*/study.h5"), self.folder / "none"))
+
     def wait(self, what: Callable[[], object], text: str, seconds: float = 90) -> None:
         """Wait for a condition; the job and all logs in the message."""
         try:
@@ -225,11 +237,23 @@ class Job:
             ) from error
 
 
+# How the first start of a job with STAGING ends.
+ENDS = {
+    "requeued": ("scontrol", "requeue"),
+    "at its time limit": ("scancel", "--batch", "--signal=USR1"),  # what Slurm does then
+}
+
+
 class Submit(Protocol):
     """How a job is submitted; see :func:`submit`."""
 
     def __call__(
-        self, *words: str, realisations: int = 3, launcher: str = "", silence: int = 120
+        self,
+        *words: str,
+        realisations: int = 3,
+        launcher: str = "",
+        silence: int = 120,
+        staging: str = "",
     ) -> Job:
         """Submit."""
 
@@ -246,7 +270,13 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Submit
     if mpirun is None:
         pytest.skip("no mpirun here")
 
-    def submit(*words: str, realisations: int = 3, launcher: str = "", silence: int = 120) -> Job:
+    def submit(
+        *words: str,
+        realisations: int = 3,
+        launcher: str = "",
+        silence: int = 120,
+        staging: str = "",
+    ) -> Job:
         folder = tmp_path_factory.mktemp("a study, ")
         text = campaign_text(realisations=str(realisations))
         (folder / "study.toml").write_text(text)
@@ -263,12 +293,13 @@ exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
         adhesis.chmod(0o755)
         (folder / "mpirun").write_text(f"{mpirun}\n")  # as set-up records it
         env = cluster.env | {"ADHESIS": str(adhesis), "LAUNCHER": launcher, "REPORT": "no"}
+        env |= {"STAGING": staging and str(folder / staging)}
         if not words[0].startswith("/"):
             words = ("sbatch", "--parsable", *words, str(SCRIPT), "study.toml")
         done = subprocess.run(words, env=env, cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         numbers = re.findall(r"\d+", done.stdout)
-        return Job(cluster, folder, numbers[-1])
+        return Job(cluster, folder, numbers[-1], env)
 
     return submit
 
@@ -279,6 +310,8 @@ def jobs(cluster: Cluster, submit: Submit) -> dict[str, Job]:
     # Slurm looks at its clocks twice a minute and signals up to a minute early: soon, that is.
     limited = ("--ntasks=2", "--time=2", "--signal=B:USR1@85")
     jobs = {"limited": submit(*limited, realisations=10)}
+    for end in ENDS:
+        jobs[f"staged, {end}"] = submit("--ntasks=2", realisations=10, staging="disk")
     jobs["parts"] = submit(str(ROOT / "jobs" / "parts.sh"), "2", "--mem=1", "study.toml")
     jobs["killed"] = submit("--nodes=1", "--ntasks-per-node=3", realisations=10)
     jobs["stopped"] = submit("--nodes=1", "--ntasks-per-node=3", realisations=10, silence=2)
@@ -325,6 +358,28 @@ def test_a_job_with_a_rank_that_hangs_comes_back_and_finishes(jobs: dict[str, Jo
     assert "adhesis run ended with 75" in job.log
     job.wait(lambda: job.values["JobState"] == "COMPLETED", "finished")
     assert job.done_tasks() == 40
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_two_jobs_of_one_campaign_with_staging_lose_no_row(
+    cluster: Cluster, jobs: dict[str, Job], end: str
+) -> None:
+    """The second one comes while the first runs, which then comes back and finishes."""
+    first = jobs[f"staged, {end}"]
+    first.wait(lambda: first.staged_tasks() > 0, "a first task")
+    second = first.again("--patience", "0")
+    second.wait(lambda: second.values["JobState"] == "FAILED", "refused")
+    assert "study.h5 is held by another job" in second.log
+    assert first.staged_tasks() > 0
+    assert not (first.folder / "study.h5").exists()
+    cluster.call(*ENDS[end], first.number)
+    first.wait(lambda: first.values["Restarts"] == "1", "requeued")
+    first.wait(lambda: first.values["JobState"] == "COMPLETED", "finished")
+    assert first.done_tasks() == 40
+    assert list((first.folder / "disk").iterdir()) == []
+    begun = (first.folder / "begun").read_text().split()
+    assert len(set(begun)) == 40
+    assert len(begun) <= 41  # only the task that the signal met was begun twice
 
 
 def test_srun_passes_the_signal_on_too(cluster: Cluster, jobs: dict[str, Job]) -> None:

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.layout import create
@@ -611,3 +611,36 @@ def test_ranks_that_outlive_their_launcher_are_waited_for(tmp_path):
     orphan.wait()
     with RunLock(path) as lock:
         lock.acquire(1, 2.0)
+
+
+# ------------------------------------------------------- a file that is taken away from its writer
+
+
+def _replace(path):
+    path.rename(path.with_name("old.h5"))
+    path.write_bytes(path.with_name("old.h5").read_bytes())
+
+
+TAKEN_AWAY = {
+    "removed": lambda path: path.unlink(),
+    "moved": lambda path: path.rename(path.with_name("old.h5")),
+    "moved with its folder": lambda path: path.parent.rename(f"{path.parent}-old"),
+    "replaced": _replace,
+}
+
+
+@pytest.mark.parametrize("how", TAKEN_AWAY)
+def test_no_row_is_written_into_a_file_that_is_not_at_its_path(path, campaign, how):
+    """The rows would have been counted as done, and be lost with the file."""
+    row = fake_result(campaign, campaign.tasks()[0])
+    with Writer(path) as writer:
+        writer.write_failure(1, "no result", 1.0)
+        TAKEN_AWAY[how](path)
+        with pytest.raises(WriteError, match=r"r\.h5 was moved, replaced or removed while"):
+            writer.write_result(0, row)
+
+
+def test_a_file_that_is_gone_when_it_is_opened_to_write_is_one_sentence(path):
+    path.unlink()
+    with pytest.raises(WriteError, match=r"r\.h5 could not be opened: No such file or directory"):
+        Writer(path)

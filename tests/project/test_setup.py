@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import fcntl
 import importlib.metadata
 import os
 import re
@@ -142,6 +143,33 @@ def test_an_older_python_is_named_before_anything_is_installed(tmp_path: Path) -
     assert done.returncode == 1
     assert done.stderr.startswith("Python 3.11 or newer is needed, and this is Python 3.10: ")
     assert done.stderr.count("\n") == 1
+
+
+def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
+    """Both would install into one .venv."""
+    if shutil.which("flock") is None:
+        pytest.skip("flock is missing here, without which set-up does not wait")
+    shutil.copytree(ROOT / "tools", tmp_path / "tools")
+    for name in ("pyproject.toml", "requirements.lock", "requirements-test.lock"):
+        shutil.copy(ROOT / name, tmp_path)
+    (tmp_path / ".setup").mkdir()
+    env = os.environ | {"PYTHON": "/bin/false"}  # where it would end at once
+    with (tmp_path / ".setup" / "lock").open("w") as first:
+        fcntl.flock(first, fcntl.LOCK_EX)
+        second = subprocess.Popen(
+            [tmp_path / "tools" / "setup.sh"],
+            env=env,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert second.stdout is not None
+        line = second.stdout.readline()
+        assert line == "setup: another set-up is at work in this folder: waiting for its end\n"
+        assert second.poll() is None
+    _, errors = second.communicate(timeout=20)
+    assert second.returncode == 1
+    assert "Python 3.11 or newer is needed" in errors
 
 
 def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
