@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # Other names of an open descriptor of this process; to rename a file over them would destroy them.
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
 _MOST_LINKS = 40  # of a chain, as of Linux
+_NEW_TERMINAL = os.makedev(5, 2)  # /dev/ptmx: opening it makes a terminal
 _STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
 
 
@@ -334,8 +335,11 @@ def _open_device(target: Path) -> IO[bytes]:
     """Open a character device to write (OSError, also for whatever else has taken its place)."""
     descriptor = os.open(target, os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
-        if not stat.S_ISCHR(os.fstat(descriptor).st_mode):
+        found = os.fstat(descriptor)
+        if not stat.S_ISCHR(found.st_mode):
             raise OSError(errno.EINVAL, "it is neither a file nor a character device")
+        if found.st_rdev == _NEW_TERMINAL:  # nobody reads it: a write would wait for ever
+            raise OSError(errno.EINVAL, "it opens a terminal of its own, which nobody reads")
         os.set_blocking(descriptor, True)
         return os.fdopen(descriptor, "wb")
     except BaseException:

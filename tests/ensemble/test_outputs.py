@@ -348,3 +348,12 @@ def test_a_report_on_a_full_disk_ends_in_one_sentence(ask: Ask) -> None:
         "adhesis report: the report in out could not be written (File too large)"
     ]
     assert list(Path("out").iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/ptmx").exists(), reason="needs /dev/ptmx")
+def test_a_terminal_that_nobody_reads_is_refused() -> None:
+    """A write to it would wait for ever."""
+    with pytest.raises(OSError, match="which nobody reads"), whole_file(Path("/dev/ptmx")):
+        pass
+    with pytest.raises(InputError, match=r"^--csv is /dev/ptmx: .*which nobody reads"):
+        check_outputs({"--csv": Path("/dev/ptmx")}, {})
