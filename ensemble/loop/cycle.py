@@ -189,8 +189,9 @@ def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
 def in_options(text: str, args: argparse.Namespace) -> str:
     """Return a message on a path with the options that prescribe a stiffness or the separation."""
     option = "--stiffness" if args.layer is None else "--layer"
+    weight = "--stiffness 0 --max-stress"
     for words, replacement in (
-        ("give a stiffness", "give --stiffness K"),
+        ("give a preload in place of max_stress", f"give --preload in place of {weight}"),
         (
             "give a larger stiffness",
             "give a thinner --layer" if args.layer is not None else "give a larger --stiffness",

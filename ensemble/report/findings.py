@@ -285,9 +285,8 @@ def _limit(data: Aggregate) -> list[str]:
     if not opens:  # else patches open from inside where the limit ends
         low, cell = min(found, key=lambda entry: entry[0])
         out.append(
-            f"The zero-range limit holds for ranges of adhesion well below {low:.3g} m: the least "
-            "valid_range, edge_range or touch_range of all loops, at "
-            f"{cell_name(cell)}."
+            f"The zero-range limit holds for ranges of adhesion well below {1e9 * low:.3g} nm: the "
+            f"least valid_range, edge_range or touch_range of all loops, at {cell_name(cell)}."
         )
     beyond = [(count, cell) for cell in data.cells if (count := int(cell.beyond_zero_range.sum()))]
     if beyond:

@@ -89,8 +89,14 @@ def short_of_preload(data: Aggregate) -> list[tuple[int, Cell]]:
     """Return the cells with loops that did not reach their preload, and how many these are."""
     if data.campaign.cycle.preload is None:
         return []
-    short = ((int(np.sum(cell.values["preload_reached"] == 0)), cell) for cell in data.cells)
-    return [(count, cell) for count, cell in short if count]
+    return [(count, cell) for cell in data.cells if (count := loops_short_of_preload(cell))]
+
+
+def loops_short_of_preload(cell: Cell) -> int:
+    """Return how many loops of a cell turned before their preload was reached."""
+    if cell.campaign.cycle.preload is None:
+        return 0
+    return int(np.sum(cell.values["preload_reached"] == 0))
 
 
 def below(data: Aggregate, others: Sequence[tuple[str, float]]) -> str:

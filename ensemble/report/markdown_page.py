@@ -14,7 +14,7 @@ from adhesis.ensemble.quantities import in_one_unit
 from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import Illustration
 from adhesis.ensemble.report.figures.style import left_out
-from adhesis.ensemble.report.further_axes import shown_cells
+from adhesis.ensemble.report.further_axes import short_of_preload, shown_cells
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.works import works
@@ -160,6 +160,8 @@ def _footnote(data: Aggregate) -> str:
     ]
     if data.campaign.cycle.under_load:
         parts.append("under a weight: it falls off, the energy of the fall is not counted")
+    if short_of_preload(data):
+        parts.append("short: loops that turned before their preload was reached")
     if any(cell.work_of_adhesion > 0 for cell in data.cells):
         parts.append("W/γ: loss over work of adhesion")
     if "resolution" in kinds:
@@ -207,6 +209,8 @@ def _bullets(sentences: Sequence[str]) -> list[str]:
 def _shown(item: Illustration, data: Aggregate, of_paper: bool) -> str:
     title = f"{item.title} (paper's {item.of_paper})" if of_paper and item.of_paper else item.title
     caption = item.caption
+    if item.at_stress and data.campaign.cycle.turns_at_stress:
+        caption += f" {item.at_stress}"
     if of_paper and item.beside_paper is not None:
         caption += f" {item.beside_paper(data if item.whole else data.shown)}"
     return f"![{title}]({item.name}.png)\n\n**{title}.** {caption} ([PDF]({item.name}.pdf))"

@@ -218,11 +218,12 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if len(groups) <= _MOST_GROUPS_SHOWN:
         units = status["axis_units"]
         further = {
-            name: name if units[name] == "1" else f"{name} in {AXIS_UNITS[units[name]]}"
+            name: key if units[name] == "1" else f"{key} in {AXIS_UNITS[units[name]]}"
             for name in status["axes"][2:]
+            for key in [name.removeprefix("wanted_")]
         }
         names = "".join(f"{heading}  " for heading in further.values())
-        loss = "loss W~ ± standard error of the mean"
+        loss = "loss in mJ/m² ± standard error of the mean"
         lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  {loss}"]
         lines += [_group_line(group, further) for group in groups]
     if status["under_load"]:
@@ -246,8 +247,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
 
 def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
     counts = f"{group['done']:8d} {group['pending']:8d} {group['failed']:7d}"
-    mean, loss = group["mean_seconds"], group["loss_dimensionless"]
-    error = group["loss_dimensionless_standard_error"]
+    mean, loss, error = group["mean_seconds"], group["loss"], group["loss_standard_error"]
     return (
         f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} "
         + "".join(f"{group[name]:{len(heading)}.4g}  " for name, heading in further.items())
@@ -259,7 +259,7 @@ def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
 
 
 def _loss(loss: float, error: float | None) -> str:
-    return f"{loss:.4g}" if error is None else with_error(loss, error, 0.0)
+    return f"{1e3 * loss:.4g}" if error is None else with_error(1e3 * loss, 1e3 * error, 0.0)
 
 
 def _listed(

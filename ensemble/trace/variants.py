@@ -84,7 +84,7 @@ class Plan(ByValue):
             f"plan        {self.waves} waves, about {self.patches} "
             f"patch{'es' if self.patches != 1 else ''} at a time: "
             f"{len(self.runs)} loops, about {duration(sum(self.seconds.values()))} of CPU time, "
-            f"{duration(self.wall)} on {counted(self.processes, 'core')}"
+            f"{duration(self.wall)} on {counted(self.processes, 'core')} of a quiet machine"
         ]
         return "\n".join(lines + [f"hint        {hint}" for hint in self.hints])
 

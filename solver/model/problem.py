@@ -258,7 +258,8 @@ class Problem(ByValue):
         first = self.control.prescribed(self.profile.h_max, 0.0)
         at_touch = prescribed >= first
         where = "at first touch" if at_touch else f"before {self.describe_prescribed(prescribed)}"
-        held, remedy = "under a load", "give a stiffness"
+        held = "under a load"
+        remedy = "for a machine that turns at a mean stress give a preload in place of max_stress"
         if not self.control.is_load:
             held = f"at a stiffness of {self.control.stiffness:g} Pa/m"
             remedy = "give a larger stiffness"

@@ -102,7 +102,7 @@ def test_a_load_that_runs_away_ends_in_where_it_does(tmp_path, capsys):
     assert main([*replacing(SCENE, words), "--json", str(out)]) == 1
     assert capsys.readouterr().err == (
         "adhesis loop: under a load this surface is drawn into full contact at first touch (γ = 1 "
-        "J/m², E = 1e6 Pa): give --stiffness K, or prescribe the separation by leaving --stiffness "
-        "out\n"
+        "J/m², E = 1e6 Pa): for a machine that turns at a mean stress give --preload in place of "
+        "--stiffness 0 --max-stress, or prescribe the separation by leaving --stiffness out\n"
     )
     assert not out.exists()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 import adhesis
 from adhesis import Control, HalfSpace, prepare_trace, read_trace, run_loop
@@ -234,13 +235,23 @@ def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
     assert (folder / "loss_along_preload.png").exists()
 
 
+SHORT = "loops short of the preload"
+
+
+def hollow(axes: Axes) -> list[float]:
+    """Places of the hollow marks of a panel."""
+    lines = [line for line in axes.lines if line.get_markerfacecolor() == "white"]
+    return [x for line in lines for x in line.get_xdata()]
+
+
 def test_loops_short_of_their_preload_are_counted_below_the_figures(tmp_path):
     """They turned at one depth, whatever the preload, which the figure would seem to deny."""
     text = re.sub(r"preload = .*", "preload = [1e8, 2e8]", text_of(realisations="1"))
     results = adhesis.Campaign(text).run(tmp_path / "c.h5")
-    assert results.plot.loss_along("preload").get_supxlabel() == (
-        "2 of 2 loops did not reach their preload"
-    )
+    figure = results.plot.loss_along("preload")
+    assert figure.get_supxlabel() == "2 of 2 loops did not reach their preload"
+    assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == SHORT
+    assert [len(hollow(axes)) for axes in figure.axes] == [2] * 5
     said = " ".join(findings.agreement(results.averages))
     assert "Along preload from 100 MPa to 200 MPa the mean loss in J/m² stays the same in 1" in said
 
@@ -289,7 +300,19 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
     capsys.readouterr()
     assert main(["status", str(out)]) == 0
     assert "1 loop did not reach the preload" in capsys.readouterr().out
+    page = tmp_path / "report"
+    assert main(["report", str(out), "--to", str(page)]) == 0
+    table = (page / "losses.csv").read_text().splitlines()
+    place = table[0].split(",").index("short_of_preload")
+    assert [row.split(",")[place] for row in table[1:]] == ["0", "1"]
+    text = (page / "report.md").read_text()
+    assert " | short | " in text
+    assert "short: loops that turned before their preload was reached" in text
+    assert text.count("turn at different penetrations") == 2
     with adhesis.open(out) as results:
+        figure = results.plot.loss_along("preload")
+        (mark,) = hollow(figure.axes[0])
+        assert mark == pytest.approx(1.0)  # MPa, the second of the two
         loops = results.dataset
         assert loops.preload_reached.values.ravel().tolist() == [1.0, 0.0]
         assert loops.turning_penetration.values.ravel()[1] == 0.999

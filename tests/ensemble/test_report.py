@@ -277,6 +277,8 @@ def test_loops_are_drawn_with_one_standard_deviation(data):
     with style():
         figure = loops.loop_against_penetration(data)
     assert len(figure.axes) == 4
+    for column in (figure.axes[::2], figure.axes[1::2]):  # one scale for all H
+        assert len({axes.get_ylim() for axes in column}) == 1
     axes = figure.axes[2]
     cell = data.cell(0.8, 0.01)
     line = lines_of(axes)[r"$\gamma$ = 0.01 J/m², loading"]
@@ -761,7 +763,7 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     sound = aggregate(write(tmp_path / "sound.h5", plan, values))
     least = values["valid_range"].min()
     (sentence,) = (text for text in findings.quality(sound) if "zero-range limit holds" in text)
-    assert f"well below {least:.3g} m" in sentence
+    assert f"well below {1e9 * least:.3g} nm" in sentence
     assert not read_status(tmp_path / "sound.h5")["beyond_limit"]
     values["valid_range"][2] = 0.5e-9
     values["valid_range"][3] = np.inf

@@ -185,7 +185,7 @@ def test_the_status_has_the_units_of_the_axes(tmp_path):
     assert status["axis_units"]["max_stress"] == "Pa"
     heading = next(line for line in as_text(status).splitlines() if "γ in J/m²" in line)
     assert "young in Pa  max_stress in Pa  " in heading
-    assert "W~ ± standard error of the mean" in heading
+    assert "loss in mJ/m² ± standard error of the mean" in heading
 
 
 def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):

@@ -523,6 +523,7 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     trace = Trace(1e-6 * heights / heights.std(), 0.2e-6, "t.txt")
     found = prepare_trace(trace)
     plan = make_plan(found, make_cycle(HALF_SPACE, 0.001, 0.9, 40, "auto", 1e-3), processes=2)
+    assert plan.text.splitlines()[0].endswith(" on 2 cores of a quiet machine")
     assert plan.waves == pytest.approx(0.95 * n / 5, rel=0.01)
     sizes = {job.name: job.profile.highest_harmonic for job in plan.jobs}
     assert sizes["taper 5 %"] < 8000 < sizes["answer"]

@@ -182,7 +182,8 @@ def test_a_state_that_is_not_found_is_reported_in_the_units_of_the_turning_point
         (
             1e3,
             1e12,
-            r"at first touch \(γ = .*, E = 1e6 Pa\): give a stiffness, or prescribe the sep",
+            r"at first touch \(γ = .*, E = 1e6 Pa\): for a machine .* give a preload in place of "
+            r"max_stress, or prescribe the separation$",
         ),
         (0.2, 1e12, r"before a mean stress of 5e\+11 Pa"),
     ],

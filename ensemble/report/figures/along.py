@@ -10,7 +10,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
-from adhesis.ensemble.report.figures.loss_figures import errorbar
+from adhesis.ensemble.report.figures.loss_figures import errorbar, short_handle, short_of
 from adhesis.ensemble.report.figures.style import (
     MM,
     MOST_CURVES,
@@ -92,7 +92,8 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
                 x /= axis_unit
                 found = [cell.estimates[name] for cell in line]
                 above = name != "pull_off_penetration"
-                errorbar(axes, x, found, k, of_line, unit=unit, from_zero=above)
+                hollow = short_of(line)
+                errorbar(axes, x, found, k, of_line, unit=unit, from_zero=above, hollow=hollow)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
@@ -110,6 +111,8 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
             axes.set_xticks(ticks)
     handles, texts = grid[0][0].get_legend_handles_labels()
     if any(texts):
+        drawn = [cell for line in lines.values() for cell in line]
+        handles = [*handles, *short_handle(drawn)]
         legend_above(figure, handles, 3 if second is None else 2)
     say_below(figure, below(data, fixed))
     return figure

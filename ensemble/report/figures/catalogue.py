@@ -33,6 +33,8 @@ class Illustration:
     beside_paper : callable, optional
         Returns a sentence for the caption on what the paper shows there and the figure does not;
         used where the campaign is the paper's.
+    at_stress : str
+        A further sentence for the caption where loops turn at a mean stress.
     whole : bool
         Whether it draws all cells, and not those of :attr:`Aggregate.shown`.
     is_worth : callable
@@ -45,6 +47,7 @@ class Illustration:
     draw: Callable[[Aggregate], PublishedFigure]
     of_paper: str = ""
     beside_paper: Callable[[Aggregate], str] | None = None
+    at_stress: str = ""
     whole: bool = False
     is_worth: Callable[[Aggregate], bool] = lambda data: True
 
@@ -70,6 +73,10 @@ def _compared_with(figure: PaperFigure, addition: str = "") -> Callable[[Aggrega
     return lambda data: f"{beside_paper(data, figure)}{addition}"
 
 
+_ENDS = (
+    "Loops that turn at one mean stress turn at different penetrations: a curve ends where the "
+    "first of its realisations turns, and its branches need not meet."
+)
 LOOPS = (
     Illustration(
         "fig6_contact_against_stress",
@@ -79,6 +86,7 @@ LOOPS = (
         "a single realisation.",
         loops.contact_against_stress,
         "Fig. 6",
+        at_stress=_ENDS,
     ),
     Illustration(
         "fig7_loop_against_penetration",
@@ -87,6 +95,7 @@ LOOPS = (
         "A realisation that has detached counts with zero.",
         loops.loop_against_penetration,
         "Fig. 7",
+        at_stress=_ENDS,
     ),
 )
 _BELOW = "A caret at 0 marks an interval that goes on below."

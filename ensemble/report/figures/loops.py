@@ -100,7 +100,7 @@ def loop_against_penetration(data: Aggregate) -> PublishedFigure:
     """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations."""
     hursts = spread_out(data.hursts, MOST_PANELS)
     height = (13 + 46 * len(hursts)) * MM
-    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True)
+    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey="col")
     grid = panels(figure, len(hursts), 2)
     for row, hurst in zip(grid, hursts, strict=True):
         for axes, name in zip(row, ("mean_stress_dimensionless", "contact_fraction"), strict=True):

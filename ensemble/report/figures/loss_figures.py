@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ from adhesis.ensemble.report.figures.style import (
     with_x_label,
 )
 from adhesis.ensemble.report.findings import typical_cell
+from adhesis.ensemble.report.further_axes import loops_short_of_preload
 from adhesis.ensemble.report.tables.loss_tables import papers_loss
 
 _FEWEST_BARS = 4  # for which there is room
@@ -72,7 +74,8 @@ def loss_against_hurst(data: Aggregate) -> PublishedFigure:
     for axes, (k, gamma) in zip(figure.panels, shown, strict=False):
         cells = _of_gamma(data, gamma)
         x = np.array([cell.hurst for cell in cells])
-        errorbar(axes, x, [cell.estimates[name] for cell in cells], k, "_", unit=unit)
+        found = [cell.estimates[name] for cell in cells]
+        errorbar(axes, x, found, k, "_", unit=unit, hollow=short_of(cells))
         _stars(axes, [(cell.hurst + aside, papers_loss(cell), look(k).colour) for cell in cells])
         axes.set_title(gamma_label(gamma), loc="left", pad=3)
     for axes in figure.panels[len(shown) :]:
@@ -86,7 +89,7 @@ def loss_against_hurst(data: Aggregate) -> PublishedFigure:
         if len(hursts) <= _MOST_TICKS:
             axes.set_xticks(hursts)
         axes.set_xlim(min(hursts) - 2.5 * aside, max(hursts) + 2.5 * aside)
-    legend_above(figure, [_mean_handle(), *_star_handle(data)], 2)
+    legend_above(figure, [_mean_handle(), *_star_handle(data), *short_handle(data.cells)], 2)
     return figure
 
 
@@ -100,7 +103,7 @@ def loss_against_slope(data: Aggregate) -> PublishedFigure:
             cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
             found = [cell.estimates[name] for cell in cells]
-            errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit)
+            errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit, hollow=short_of(cells))
             colour = look(k).colour
             _stars(axes, [(paper.m2(c.hurst), papers_loss(c), colour) for c in cells])
         axes.set_ylabel(label)
@@ -112,7 +115,7 @@ def loss_against_slope(data: Aggregate) -> PublishedFigure:
         Line2D([], [], color=look(k).colour, marker=look(k).marker, ls="none", label=f"H = {h:g}")
         for k, h in enumerate(hursts)
     ]
-    legend_above(figure, [*handles, *_star_handle(data)], 4)
+    legend_above(figure, [*handles, *_star_handle(data), *short_handle(data.cells)], 4)
     return figure
 
 
@@ -353,11 +356,13 @@ def pull_off(data: Aggregate) -> PublishedFigure:
             f"H = {hurst:g}",
             offset=_apart(data, k, len(hursts)) / size,
             unit=1e3,
+            hollow=short_of(cells),
         )
     axes.set_xlabel(rf"work of adhesion $\gamma$ ({unit})")
     axes.set_ylabel("largest tension (kPa)")
     axes.set_ylim(bottom=0)
-    legend_above(figure, axes.get_legend_handles_labels()[0], 3)
+    handles = [*axes.get_legend_handles_labels()[0], *short_handle(data.cells)]
+    legend_above(figure, handles, 3)
     _second_scale(axes, data)
     return figure
 
@@ -408,10 +413,12 @@ def errorbar(
     unit: float = 1.0,
     *,
     from_zero: bool = True,
+    hollow: Sequence[bool] = (),
 ) -> None:
     """Draw means with their intervals, in multiples of a unit; joined if they are many.
 
-    Where the panel begins at 0, a mark there shows which intervals go on below.
+    Where the panel begins at 0, a mark there shows which intervals go on below. Marks of cells that
+    are short of their preload are hollow.
     """
     mean = np.array([estimate.mean for estimate in found]) / unit
     low = np.array([estimate.low for estimate in found]) / unit
@@ -425,8 +432,28 @@ def errorbar(
         linestyle=LINES[k] if x.size >= _FEWEST_FOR_A_LINE else "none",
         label=label,
     )
+    if any(hollow):
+        place = np.flatnonzero(hollow)
+        options: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5}
+        marker, colour = look(k).marker, look(k).colour
+        axes.plot(
+            (x + offset)[place], mean[place], marker=marker, color=colour, label="_", **options
+        )
     if from_zero:
         mark_below_zero(axes, (x + offset)[low < 0], look(k).colour)
+
+
+def short_of(cells: Sequence[Cell]) -> list[bool]:
+    """Return whether loops of each cell turned before their preload, for :func:`errorbar`."""
+    return [loops_short_of_preload(cell) > 0 for cell in cells]
+
+
+def short_handle(cells: Sequence[Cell]) -> list[Line2D]:
+    """Return the entry of hollow marks in a legend, if there are any."""
+    if not any(short_of(cells)):
+        return []
+    look_of_mark: dict[str, Any] = {"color": "0.3", "marker": "o", "markerfacecolor": "white"}
+    return [Line2D([], [], linestyle="none", label="loops short of the preload", **look_of_mark)]
 
 
 def mark_below_zero(axes: Axes, x: np.ndarray, colour: str) -> None:

@@ -16,6 +16,7 @@ from adhesis.ensemble.aggregate.companions import Companion, LossDifference, dif
 from adhesis.ensemble.interval import interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.further_axes import loops_short_of_preload
 from adhesis.ensemble.report.tables.key import axis_columns, estimate, gamma_column, key_columns
 from adhesis.ensemble.report.tables.table import (
     Format,
@@ -38,6 +39,7 @@ def losses(data: Aggregate) -> Table:
         TableColumn("n", attrgetter("done"), "n"),
         TableColumn("failed", attrgetter("failed"), "failed", only_if_any=True),
         TableColumn("pending", attrgetter("pending"), "pending", only_if_any=True),
+        *_preload_columns(data),
         _estimated("loss_dimensionless", "mean", "W~", number(), last=True),
         _estimated("loss_dimensionless", "std"),
         _estimated("loss_dimensionless", "sem", "s.e.", number(2), last=True),
@@ -122,6 +124,14 @@ def losses(data: Aggregate) -> Table:
         _estimated("wall_time", "mean [s]"),
     )
     return make_table("Loss of one loop", columns, data.cells)
+
+
+def _preload_columns(data: Aggregate) -> tuple[TableColumn, ...]:
+    """Return the column of loops that turned before their preload; none without a preload."""
+    if data.campaign.cycle.preload is None:
+        return ()
+    name = "short_of_preload"
+    return (TableColumn(name, loops_short_of_preload, "short", plain, only_if_any=True),)
 
 
 def _friction_columns(data: Aggregate) -> tuple[TableColumn, ...]:
@@ -328,10 +338,10 @@ def profiles(data: Aggregate) -> Table:
     columns = (
         TableColumn("hurst", attrgetter("hurst"), "H"),
         *axis_columns([data.further[k] for k in further]),
-        TableColumn("h_rms [m]", estimate("h_rms"), "h_rms (µm)", number(unit=1e-6)),
+        TableColumn("h_rms [m]", estimate("h_rms"), "mean h_rms (µm)", number(unit=1e-6)),
         TableColumn("h_max [m]", estimate("h_max"), "mean h_max (µm)", number(unit=1e-6)),
         TableColumn("m0 [m^2]", estimate("m0"), "m0 (µm²)", number(unit=1e-12)),
-        TableColumn("m2", estimate("m2"), "m2", number()),
+        TableColumn("m2", estimate("m2"), "mean m2", number()),
         TableColumn("m2_paper", _papers_m2, "m2, paper", number(2), only_if_any=True),
         TableColumn("m4 [1/m^2]", estimate("m4"), "m4 (1/µm²)", number(unit=1e12)),
     )
