@@ -23,6 +23,7 @@ from adhesis.ensemble.report.further_axes import (
 )
 from adhesis.ensemble.report.tables.loss_tables import least
 from adhesis.ensemble.task.doubt import why_beyond
+from adhesis.solver.loading.zero_range import ANY_RANGE
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
@@ -286,7 +287,7 @@ def _limit(data: Aggregate) -> list[str]:
         low, cell = min(found, key=lambda entry: entry[0])
         out.append(
             f"The zero-range limit holds for ranges of adhesion well below {low:.3g} m: the least "
-            "valid_range, edge_range or touch_range of all loops, at "
+            f"{ANY_RANGE} of all loops, at "
             f"{cell_name(cell)}."
         )
     beyond = [(count, cell) for cell in data.cells if (count := int(cell.beyond_zero_range.sum()))]

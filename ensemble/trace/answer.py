@@ -227,6 +227,14 @@ class Answer(ByValue):
         """Least ``touch_range`` in m of the answer's loop and its variants; None without touch."""
         return self._least("touch_range")
 
+    @property
+    def turn_range(self) -> float | None:
+        """Least ``turn_range`` in m of the answer's loop and its variants; None if none is known.
+
+        None, too, if it is longer than the other three.
+        """
+        return self._least("turn_range")
+
     def _least(self, name: str) -> float | None:
         found = (one[name] for one in self._alike())
         return min((value for value in found if value is not None), default=None)
@@ -687,6 +695,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "valid_range": answer.valid_range,
         "edge_range": answer.edge_range,
         "touch_range": answer.touch_range,
+        "turn_range": answer.turn_range,
         "largest_interior_tension": answer.largest_interior_tension,
         "loop": dict(answer.main),
         "runs": run_rows(answer),

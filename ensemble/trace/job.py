@@ -113,7 +113,7 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     return loop.numbers() | {
         "range_warnings": range_warnings(
             *(problem, loop.valid_range, loop.loss, loop.contact_fraction),
-            *(loop.edge_range, loop.touch_range),
+            *loop.outer_ranges,
         )
         + opening_warnings(loop.jumps, loop.loss),
         "strain_warnings": strain_warnings(

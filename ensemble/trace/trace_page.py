@@ -103,9 +103,13 @@ def _range(answer: Answer) -> str:
         inside = f"tension inside patches of up to {tension}: {length_text(answer.valid_range, 3)}"
         ranges.append(answer.valid_range)
     outside = ""
-    for where, value in (("edges", answer.edge_range), ("touches", answer.touch_range)):
+    for where, value in (
+        ("at edges", answer.edge_range),
+        ("at touches", answer.touch_range),
+        ("beyond the turn", answer.turn_range),
+    ):
         if value is not None:
-            outside += f"; at {where}: {length_text(value, 3)}"
+            outside += f"; {where}: {length_text(value, 3)}"
             ranges.append(value)
     return (
         "the zero-range model is valid if the real adhesion reaches less than "

@@ -773,7 +773,8 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     (warning,) = (text for text in findings.quality(data) if "touch_range is below" in text)
     assert warning.startswith("WARNING: 4 of 8 losses")
     assert [row["row"] for row in status["beyond_limit"]] == [7, 5, 2, 6]
-    told = "4 losses are doubtful: valid_range, edge_range or touch_range is below 1e-09 m"
+    ranges = "valid_range, edge_range, touch_range or turn_range"
+    told = f"4 losses are doubtful: {ranges} is below 1e-09 m"
     assert told in as_text(status)
     assert "touch_range 4e-10 m" in as_text(status)
     table = loss_tables.losses(data)
