@@ -37,6 +37,7 @@ def summary(answer: Answer) -> str:
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
         f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
         f"{length_text(loop['h_max'], 4)}; "
+        f"{'adhesion on the projection (flat); ' if answer.cycle.measure == 'flat' else ''}"
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
         f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
