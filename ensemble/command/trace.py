@@ -31,7 +31,7 @@ def execute(args: argparse.Namespace) -> int:
     gammas = read_words(option, words_of(option, text), WORK_OF_ADHESION.read)
     if len(set(gammas)) < len(gammas):
         raise InputError(f"{option} is {text!r}: its values must differ")
-    with refused_as_input(vars(args)):
+    with refused_as_input(vars(args), thickness="layer"):
         half_space = HalfSpace(args.young, args.poisson)
         control = control_of(args, half_space)
         turns = turns_of(args, control)
