@@ -3,8 +3,8 @@
     python benchmarks/finite_range.py even [--loops 40] [--seed 1]
     python benchmarks/finite_range.py random [--loops 40] [--seed 1]
 
-The least range is that of ``valid_range``, ``edge_range`` and ``touch_range`` of a loop by
-``sharp``. At half of it a loss must be less than a tenth off. Exit code 1 if one is not.
+The least range is that of ``valid_range``, ``edge_range``, ``touch_range`` and ``turn_range`` of a
+loop by ``sharp``. At half of it a loss must be less than a tenth off. Exit code 1 if one is not.
 
 **even**: random even profiles whose loops have one even patch throughout, under Dugdale's law, in
 closed form. The profile is h = Σ A_n cos(nθ), θ = 2πx/λ, in contact for |θ| < a, cohesive for
@@ -379,7 +379,8 @@ def main() -> int:
     accuracy, one_after_another = 1e-4 if is_even else 1e-3, np.random.default_rng(args.seed)
     found, number = 0, args.first
     worst = 0.0
-    print("number  waves  patches  jumps  contact  valid  edge  touch (nm)  loss (J/m²)  off by")
+    print("number  waves  patches  jumps  contact  ", end="")
+    print("valid  edge  touch  turn (nm)  loss (J/m²)  off by")
     while found < args.loops:
         own = np.random.default_rng([args.seed, number])
         coefficients, gamma, depth = draw(one_after_another if is_even else own, args.lowest)
@@ -389,7 +390,7 @@ def main() -> int:
             loop = run_loop(make_method("sharp", problem, accuracy=accuracy), max_penetration=depth)
         except PathError:
             continue
-        ranges = [loop.valid_range, loop.edge_range, loop.touch_range]
+        ranges = [loop.valid_range, *loop.outer_ranges]
         loss = judge(loop, coefficients, gamma, SHARE * min(ranges), args)
         if loss is None:
             continue

@@ -18,7 +18,7 @@ from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
 from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
 from adhesis.ensemble.task.fields import FieldPlan, field_plan
 from adhesis.ensemble.task.row import JUMP_COUNT, NUMBERS, TIMES
-from adhesis.solver.loading.zero_range import least_range
+from adhesis.solver.loading.zero_range import RANGES, least_range
 from adhesis.solver.model import problem
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import Array
@@ -30,7 +30,8 @@ _PER_TASK = tuple(dataset.name for dataset in (*TIMES, *NUMBERS, JUMP_COUNT))
 # they belong to the place of one tension.
 _NOT_AVERAGED = frozenset(
     (
-        *("valid_range", "edge_range", "touch_range", "opening_strength"),
+        *RANGES,
+        "opening_strength",
         *("largest_interior_tension", "interior_tension_position", "interior_tension_penetration"),
     )
 )
@@ -114,10 +115,8 @@ class Cell:
 
     @property
     def least_range(self) -> Array:
-        """Least of the three ranges of adhesion of each done task, in m, shape (done,)."""
-        return least_range(
-            *(self.values[name] for name in ("valid_range", "edge_range", "touch_range"))
-        )
+        """Least of the four ranges of adhesion of each done task, in m, shape (done,)."""
+        return least_range(*(self.values[name] for name in RANGES))
 
     @property
     def doubtful(self) -> NDArray[np.bool_]:

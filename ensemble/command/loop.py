@@ -60,7 +60,7 @@ def execute(args: argparse.Namespace) -> int:
     taken = _defaults_taken(args)
     _set_material(args)
     _check_files(args)
-    with refused_as_input(vars(args)):
+    with refused_as_input(vars(args), thickness="layer"):
         profile, warnings = _profile(args)
         source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)

@@ -61,6 +61,12 @@ class Parser(argparse.ArgumentParser):
             link = " " if error.message.startswith("is ") else ": "
             self.error(f"{error.argument_name}{link}{error.message}")
 
+    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
+        # "--young=--": some Pythons take the value for the end of the options, and hand on a list
+        if action.option_strings and action.nargs is None and arg_strings == ["--"]:
+            raise argparse.ArgumentError(action, "is '--': a value is missing")
+        return super()._get_values(action, arg_strings)
+
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             names = ", ".join(map(repr, action.choices))

@@ -31,14 +31,14 @@ def execute(args: argparse.Namespace) -> int:
     gammas = read_words(option, words_of(option, text), WORK_OF_ADHESION.read)
     if len(set(gammas)) < len(gammas):
         raise InputError(f"{option} is {text!r}: its values must differ")
-    with refused_as_input(vars(args)):
+    with refused_as_input(vars(args), thickness="layer"):
         half_space = HalfSpace(args.young, args.poisson)
         control = control_of(args, half_space)
         turns = turns_of(args, control)
         cycle = make_cycle(
             half_space, gammas, turns.points, args.load_steps, args.method, args.accuracy, control,
             args.adhesion_range, args.strength, at_preload=turns.are_preloads, latest=turns.latest,
-            work_of_adhesion_open=args.work_of_adhesion_open,
+            work_of_adhesion_open=args.work_of_adhesion_open, measure=args.measure,
         )  # fmt: skip
     if args.to is not None:
         check_output_folder("--to", args.to, FILES, {"the command": args.file})

@@ -14,6 +14,7 @@ from pathlib import Path
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, STRESS, WORK_OF_ADHESION
 from adhesis.ensemble.trace.trace_arguments import (
     add_cycle_arguments,
+    add_measure_argument,
     add_method_arguments,
     add_open_argument,
     add_reading_arguments,
@@ -72,12 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
     add_open_argument(contact)
-    contact.add_argument(
-        "--measure",
-        default="arc",
-        metavar="NAME",
-        help="adhesion acts on the length of the profile (arc, default) or its projection (flat)",
-    )
+    add_measure_argument(contact)
     add_cycle_arguments(contact)
     contact.add_argument(
         "--path",

@@ -23,6 +23,7 @@ from adhesis.ensemble.report.further_axes import (
 )
 from adhesis.ensemble.report.tables.loss_tables import least
 from adhesis.ensemble.task.doubt import why_beyond
+from adhesis.solver.loading.zero_range import ANY_RANGE
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
@@ -286,7 +287,7 @@ def _limit(data: Aggregate) -> list[str]:
         low, cell = min(found, key=lambda entry: entry[0])
         out.append(
             f"The zero-range limit holds for ranges of adhesion well below {1e9 * low:.3g} nm: the "
-            f"least valid_range, edge_range or touch_range of all loops, at {cell_name(cell)}."
+            f"least {ANY_RANGE} of all loops, at {cell_name(cell)}."
         )
     beyond = [(count, cell) for cell in data.cells if (count := int(cell.beyond_zero_range.sum()))]
     if beyond:

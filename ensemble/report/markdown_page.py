@@ -18,6 +18,7 @@ from adhesis.ensemble.report.further_axes import short_of_preload, shown_cells
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.works import works
+from adhesis.solver.loading.zero_range import ANY_RANGE
 
 
 def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustration]]]) -> str:
@@ -176,7 +177,7 @@ def _footnote(data: Aggregate) -> str:
     if any(np.isfinite(cell.least_range).any() for cell in data.cells):
         parts.append(
             "range: range of adhesion below which the zero-range limit holds (the least of "
-            "valid_range, edge_range and touch_range of all loops)"
+            f"{ANY_RANGE} of all loops)"
         )
     if paper.are_its_cells(data.shown.cells):
         parts.append(f"paper: {paper.REFERENCE}, Table 1, – where it gives none")

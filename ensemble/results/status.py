@@ -24,14 +24,13 @@ from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, why_beyond
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.zero_range import least_range
+from adhesis.solver.loading.zero_range import RANGES, least_range
 from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
 _AVERAGED = ("wall_time", "loss", "loss_dimensionless")
-_RANGES = ("valid_range", "edge_range", "touch_range")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
 
@@ -140,8 +139,8 @@ def _beyond_limit(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
 ) -> list[dict[str, Any]]:
     rows = np.flatnonzero(beyond_zero_range(column) & (state == DONE))
-    least = least_range(*(column[name][rows] for name in _RANGES))
-    return named(column, rows[np.argsort(least, kind="stable")], "loss", *_RANGES)
+    least = least_range(*(column[name][rows] for name in RANGES))
+    return named(column, rows[np.argsort(least, kind="stable")], "loss", *RANGES)
 
 
 def _times(times: NDArray[np.float64]) -> dict[str, float]:
@@ -282,7 +281,7 @@ def _errors_of(row: Mapping[str, Any]) -> str:
 
 
 def _range_of(row: Mapping[str, Any]) -> str:
-    known = {name: row[name] for name in _RANGES if row[name] is not None}
+    known = {name: row[name] for name in RANGES if row[name] is not None}
     least = min(known, key=lambda name: known[name]) if known else None
     shown = "range unknown" if least is None else f"{least} {known[least]:.2g} m"
     return f": {shown}, loss {row['loss']:.3g} J/m²"

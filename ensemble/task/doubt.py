@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.loading.zero_range import (
+    ANY_RANGE,
     DOUBTFUL_BARRIER,
     DOUBTFUL_EXCESS,
     DOUBTFUL_LOSS,
@@ -24,13 +25,13 @@ from adhesis.solver.loading.zero_range import (
 # Numbers of a row from which beyond_zero_range decides, in the order of beyond_limit.
 _OF_LIMIT = (
     *("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction"),
-    *("opening_strength", "barrier", "edge_range", "touch_range", "gamma_open"),
+    *("opening_strength", "barrier", "edge_range", "touch_range", "turn_range", "gamma_open"),
 )
 OF_DOUBT = ("audit_residual", "loss_error", *_OF_LIMIT)
 """Numbers of a row from which its loss is judged."""
 
 BEYOND_LIMIT = (
-    f"valid_range, edge_range or touch_range is below {DOUBTFUL_RANGE:g} m, or the loss above "
+    f"{ANY_RANGE} is below {DOUBTFUL_RANGE:g} m, or the loss above "
     f"{DOUBTFUL_LOSS:g} times the work of adhesion of the largest contact, so that an interface of "
     "finite range would lose less (docs/zero-range.md)"
 )
@@ -39,8 +40,8 @@ BEYOND_LIMIT = (
 BEYOND_STRENGTH = (
     f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, or the "
     f"barriers of openings are more than {DOUBTFUL_BARRIER:g} of the loss, or the range of "
-    "adhesion is longer than edge_range or touch_range, so that what zero range leaves open "
-    "matters for it (docs/zero-range.md)"
+    "adhesion is longer than edge_range, touch_range or turn_range, so that what zero range leaves "
+    "open matters for it (docs/zero-range.md)"
 )
 """Why losses are doubtful where patches open from inside."""
 

@@ -102,10 +102,11 @@ NUMBERS = (
     _dataset("loss_error", FLOAT, "J m-2", "estimated numerical error of the loss"),
     _dataset("races", COUNT, "1", "jumps that another rule of descent would have ended elsewhere"),
     _dataset("energy_at_stake", FLOAT, "J m-2", "energy between the ends of those jumps"),
-    # below the least of three ranges of adhesion the zero-range limit holds
+    # below the least of four ranges of adhesion the zero-range limit holds
     _dataset("valid_range", FLOAT, "m", "range of adhesion below which no patch opens from inside"),
     _dataset("edge_range", FLOAT, "m", "range whose cohesive zone is as long as what pins edges"),
     _dataset("touch_range", FLOAT, "m", "range that changes the loss by 0.01 by earlier touches"),
+    _dataset("turn_range", FLOAT, "m", "way beyond the turn in which jumps take 0.01 of the loss"),
     _dataset("largest_interior_tension", FLOAT, "Pa", "largest tension inside patches"),
     _dataset(
         *("interior_tension_position", FLOAT, "m", "position of that tension"),

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from adhesis.solver import checks, views
 from adhesis.solver.loading.loop import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.problem import Measure, Problem
 from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
 from adhesis.solver.values import ByValue, finite
 
@@ -227,6 +227,14 @@ class Answer(ByValue):
         """Least ``touch_range`` in m of the answer's loop and its variants; None without touch."""
         return self._least("touch_range")
 
+    @property
+    def turn_range(self) -> float | None:
+        """Least ``turn_range`` in m of the answer's loop and its variants; None if none is known.
+
+        None, too, if it is longer than the other three.
+        """
+        return self._least("turn_range")
+
     def _least(self, name: str) -> float | None:
         found = (one[name] for one in self._alike())
         return min((value for value in found if value is not None), default=None)
@@ -304,6 +312,7 @@ def loss_of_trace(
     adhesion_range: float | None = None,
     strength: float | None = None,
     work_of_adhesion_open: float | None = None,
+    measure: Measure = "arc",
     quick: bool = False,
     processes: int | None = None,
     progress: bool = False,
@@ -339,6 +348,8 @@ def loss_of_trace(
     work_of_adhesion_open : float, optional
         Work of adhesion in J/m² where an edge recedes, beside a single γ; in the table of works of
         adhesion both keep their ratio.
+    measure : {"arc", "flat"}
+        Whether adhesion acts on the length of the profile or on its projection.
     quick : bool
         Without the two tables.
     processes : int, optional
@@ -389,6 +400,7 @@ def loss_of_trace(
         at_preload=preload is not None,
         latest=latest,
         work_of_adhesion_open=work_of_adhesion_open,
+        measure=measure,
     )
     check(prepared, cycle)
     checks.flag("quick", quick)
@@ -423,6 +435,7 @@ def make_cycle(
     at_preload: bool = False,
     latest: float | None = None,
     work_of_adhesion_open: float | None = None,
+    measure: Measure = "arc",
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -433,6 +446,7 @@ def make_cycle(
     """
     checks.choice("method", method, METHOD_NAMES)
     checks.real("accuracy", accuracy, checks.ACCURACY)
+    checks.choice("measure", measure, get_args(Measure))
     control = control or Control()
     turning = "max_stress" if control.is_load else "max_penetration"
     turning = "preload" if at_preload else turning
@@ -453,7 +467,7 @@ def make_cycle(
         check_cycle(point, load_steps, control)
     cycle = Cycle(
         half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength,
-        at_preload, latest, work_of_adhesion_open,
+        at_preload, latest, work_of_adhesion_open, measure,
     )  # fmt: skip
     for gamma in gammas:
         cycle.strength_at(gamma)
@@ -467,8 +481,9 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     for gamma in cycle.works_of_adhesion:
         strength, open_ = cycle.strength_at(gamma), cycle.open_at(gamma)
         problem = Problem(
-            profile, cycle.half_space, gamma, strength=strength, work_of_adhesion_open=open_
-        )
+            profile, cycle.half_space, gamma, strength=strength, work_of_adhesion_open=open_,
+            measure=cycle.measure,
+        )  # fmt: skip
         if problem.pinning > 0:
             check_pinning(cycle.method, None)
 
@@ -673,6 +688,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "poisson": cycle.half_space.poisson,
         "work_of_adhesion": cycle.works_of_adhesion[0],
         "work_of_adhesion_open": answer.main["work_of_adhesion_open"],
+        "measure": cycle.measure,
         "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
         "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
         "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
@@ -687,6 +703,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "valid_range": answer.valid_range,
         "edge_range": answer.edge_range,
         "touch_range": answer.touch_range,
+        "turn_range": answer.turn_range,
         "largest_interior_tension": answer.largest_interior_tension,
         "loop": dict(answer.main),
         "runs": run_rows(answer),

@@ -13,7 +13,7 @@ from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
 from adhesis.solver.method import Branch, ContactState
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Problem, strength_of
+from adhesis.solver.model.problem import Measure, Problem, strength_of
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName, make_method
 
@@ -38,6 +38,7 @@ class Cycle:
     at_preload: bool = False
     latest: float | None = None
     work_of_adhesion_open: float | None = None
+    measure: Measure = "arc"
 
     @property
     def turn_sign(self) -> str:
@@ -104,7 +105,7 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     profile, cycle, gamma = job.profile, job.cycle, job.work_of_adhesion
     problem = Problem(
         profile, cycle.half_space, gamma, cycle.control, strength=cycle.strength_at(gamma),
-        work_of_adhesion_open=cycle.open_at(gamma),
+        work_of_adhesion_open=cycle.open_at(gamma), measure=cycle.measure,
     )  # fmt: skip
     method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
     turn = turn_arguments(cycle.control, job.turning_point, cycle.at_preload, cycle.latest)
@@ -113,7 +114,7 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     return loop.numbers() | {
         "range_warnings": range_warnings(
             *(problem, loop.valid_range, loop.loss, loop.contact_fraction),
-            *(loop.edge_range, loop.touch_range),
+            *loop.outer_ranges,
         )
         + opening_warnings(loop.jumps, loop.loss),
         "strain_warnings": strain_warnings(

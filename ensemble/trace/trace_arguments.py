@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
     add_open_argument(contact)
+    add_measure_argument(contact)
     add_cycle_arguments(contact)
     add_method_arguments(contact, "of each loop (default 1e-3)")
     add_reading_arguments(parser)
@@ -99,6 +100,16 @@ def add_open_argument(group: argparse._ArgumentGroup) -> None:
         metavar="G",
         help="where an edge recedes, at least that where it advances, --work-of-adhesion; between "
         "both it is pinned (default: the same)",
+    )
+
+
+def add_measure_argument(group: argparse._ArgumentGroup) -> None:
+    """Declare the length on which adhesion acts; ``adhesis loop`` shares it."""
+    group.add_argument(
+        "--measure",
+        default="arc",
+        metavar="NAME",
+        help="adhesion acts on the length of the profile (arc, default) or its projection (flat)",
     )
 
 

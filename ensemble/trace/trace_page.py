@@ -37,6 +37,7 @@ def summary(answer: Answer) -> str:
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
         f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
         f"{length_text(loop['h_max'], 4)}; "
+        f"{'adhesion on the projection (flat); ' if answer.cycle.measure == 'flat' else ''}"
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
         f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
@@ -103,9 +104,13 @@ def _range(answer: Answer) -> str:
         inside = f"tension inside patches of up to {tension}: {length_text(answer.valid_range, 3)}"
         ranges.append(answer.valid_range)
     outside = ""
-    for where, value in (("edges", answer.edge_range), ("touches", answer.touch_range)):
+    for where, value in (
+        ("at edges", answer.edge_range),
+        ("at touches", answer.touch_range),
+        ("beyond the turn", answer.turn_range),
+    ):
         if value is not None:
-            outside += f"; at {where}: {length_text(value, 3)}"
+            outside += f"; {where}: {length_text(value, 3)}"
             ranges.append(value)
     return (
         "the zero-range model is valid if the real adhesion reaches less than "

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from time import process_time
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from adhesis.solver.loading.zero_range import (
     narrowest_length,
     stress_text,
     touch_stress,
+    turn_range,
 )
 from adhesis.solver.method import ContactState, Method, MethodReport
 from adhesis.solver.model.jump import Jump
@@ -28,6 +29,8 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue, finite
 from adhesis.solver.views import ResultViews
+
+PathOrLoop = TypeVar("PathOrLoop", bound="EquilibriumPath")
 
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
@@ -87,6 +90,9 @@ class EquilibriumPath(ByValue, ResultViews):
         has one (docs/zero-range.md).
     narrowest_length : float
         Shortest length in m that decides where edges stand (``zero_range``).
+    turn_range : float
+        Range of adhesion in m at which jumps that lie beyond a turning point, and would come before
+        it, take a hundredth of the loss. Infinite if it is longer than the other three ranges.
 
     References
     ----------
@@ -115,6 +121,7 @@ class EquilibriumPath(ByValue, ResultViews):
     receded: Array | None = None
     interior: InteriorTension | None = None
     narrowest_length: float = float("nan")
+    turn_range: float = float("nan")
 
     # Beside those of every path, in the order in which they are listed.
     _columns: ClassVar[tuple[str, ...]] = ()
@@ -176,11 +183,16 @@ class EquilibriumPath(ByValue, ResultViews):
 
     @property
     def least_range(self) -> float:
-        """The least of ``valid_range``, ``edge_range`` and ``touch_range``, in m.
+        """The least of ``valid_range``, ``edge_range``, ``touch_range``, ``turn_range``, in m.
 
         The zero-range limit holds for ranges of adhesion well below it (docs/zero-range.md).
         """
-        return float(least_range(self.valid_range, self.edge_range, self.touch_range))
+        return float(least_range(self.valid_range, *self.outer_ranges))
+
+    @property
+    def outer_ranges(self) -> tuple[float, float, float]:
+        """``edge_range``, ``touch_range`` and ``turn_range``: all but that inside patches, in m."""
+        return self.edge_range, self.touch_range, self.turn_range
 
     @property
     def lost(self) -> float:
@@ -245,6 +257,8 @@ class EquilibriumPath(ByValue, ResultViews):
         outside = (
             f"at edges: {1e9 * self.edge_range:.3g} nm; at touches: {1e9 * self.touch_range:.3g} nm"
         )
+        if math.isfinite(self.turn_range):
+            outside += f"; beyond the turn: {1e9 * self.turn_range:.3g} nm"
         if math.isfinite(strength):
             range_ = self.problem.work_of_adhesion / strength
             largest = 0.0 if interior is None else interior.tension
@@ -298,6 +312,7 @@ class EquilibriumPath(ByValue, ResultViews):
             "valid_range": finite(self.valid_range),
             "edge_range": finite(self.edge_range),
             "touch_range": finite(self.touch_range),
+            "turn_range": finite(self.turn_range),
             "seconds": self.seconds,
             "method": self.method.name,
         }
@@ -352,3 +367,24 @@ def path_fields(method: Method, record: Record, started: float) -> dict[str, Any
         "interior": interior,
         "narrowest_length": narrowest_length(problem, record),
     }
+
+
+def with_turn_range(
+    result: PathOrLoop, method: Method, record: Record, step: float, started: float
+) -> PathOrLoop:
+    """Return a result with its ``turn_range``, which is sought as far as the other ranges reach.
+
+    Parameters
+    ----------
+    result : LoopResult or PathResult
+    method : Method
+    record : Record
+    step : float
+        Load step, in the unit of the turning points.
+    started : float
+        First CPU time of the path, in s.
+    """
+    problem = result.problem
+    step = problem.prescribed(0.0) - problem.prescribed(step)
+    found = turn_range(method, record, step, result.lost, result.least_range)
+    return replace(result, turn_range=found, seconds=process_time() - started)

@@ -159,7 +159,9 @@ def run_loop(
             if reached:
                 break
         unload_recorded(method, record, state, axis, turn, report)
-    return result_of(method, record, turn, i if reached else load_steps, started, preload)
+    return result_of(
+        method, record, turn, i if reached else load_steps, started, axis.step, preload
+    )
 
 
 def turning_of(control: Control, max_penetration: T | None, max_stress: T | None) -> T:

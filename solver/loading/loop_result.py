@@ -14,7 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import choice, counted, real, reals
-from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
+from adhesis.solver.loading.equilibrium_path import (
+    EquilibriumPath,
+    path_fields,
+    with_turn_range,
+)
 from adhesis.solver.loading.loop_state import LoopState, state_at_stress
 from adhesis.solver.loading.mean_stress_event import has_reached
 from adhesis.solver.loading.path_record import Record
@@ -210,7 +214,7 @@ class LoopResult(EquilibriumPath):
             )
         found += range_warnings(
             *(self.problem, self.valid_range, self.loss, self.contact_fraction),
-            *(self.edge_range, self.touch_range),
+            *self.outer_ranges,
         )
         found += opening_warnings(self.jumps, self.loss)
         profile = self.problem.profile
@@ -422,9 +426,12 @@ def result_of(
     turning_point: float,
     load_steps: int,
     started: float,
+    step: float,
     preload: float | None = None,
 ) -> LoopResult:
     """Make the result from the record of a loop; ``started`` is its first CPU time, in s.
+
+    ``step`` is the load step, in the unit of the turning point.
 
     Raises
     ------
@@ -446,7 +453,7 @@ def result_of(
     max_penetration = turning_point
     if not problem.control.is_fixed:
         max_penetration = float(fields["penetration"][turn])
-    return LoopResult(
+    result = LoopResult(
         turning_point=turning_point,
         max_penetration=max_penetration,
         preload=preload,
@@ -458,6 +465,7 @@ def result_of(
         work_spent=loss + gained,
         **fields,
     )
+    return with_turn_range(result, method, record, step, started)
 
 
 def strain_warnings(

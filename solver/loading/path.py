@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
-from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
+from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields, with_turn_range
 from adhesis.solver.loading.loop import (
     DEFAULT_LOAD_STEPS,
     HOW_METHOD,
@@ -151,7 +151,7 @@ class PathResult(EquilibriumPath):
         lost = self.loss_from_drops
         found = range_warnings(
             *(self.problem, self.valid_range, lost, self.contact_fraction),
-            *(self.edge_range, self.touch_range),
+            *self.outer_ranges,
         )
         found += strain_warnings(self.problem, self.mean_stress, self.separation, self.patches)
         return (*found, *opening_warnings(self.jumps, lost))
@@ -395,7 +395,7 @@ class _PathRunner:
         work, potential = record.work(problem), record.column("potential")
         change = float(potential[-1] - potential[0]) / problem.profile.period
         rest = work - change - fields["loss_from_drops"]
-        return PathResult(
+        result = PathResult(
             turning_points=points,
             load_steps=load_steps,
             leg=np.array(self.legs),
@@ -407,3 +407,4 @@ class _PathRunner:
             loss_error=estimated_error(record, rest, problem),
             **fields,
         )
+        return with_turn_range(result, self.method, record, self.axis.step, started)

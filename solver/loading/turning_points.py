@@ -186,7 +186,7 @@ class LoadingBranch:
         preload = turn if self._of_preloads else None
         ended = self._passed == len(self._drives) or not self._of_preloads
         steps = self._passed - 1 if ended else self._passed
-        return result_of(self.method, record, self._drive, steps, started, preload)
+        return result_of(self.method, record, self._drive, steps, started, axis.step, preload)
 
 
 def run_loops(

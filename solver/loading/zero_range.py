@@ -1,4 +1,4 @@
-"""Compute the three ranges of adhesion that bound the zero-range model.
+"""Compute the four ranges of adhesion that bound the zero-range model.
 
 A zero range of adhesion is an infinite strength: inside a contact nothing opens, whatever the
 tension there. An interface of range δ gives way near σ_th = γ/δ. So with σ_in the largest local
@@ -23,6 +23,14 @@ the loss in all at
     touch_range = 0.01 loss / Σ |Δp̄|,
 
 the sum over the jumps in which a patch appears or a gap closes.
+
+So does a jump of loading that lies just beyond the turning point: it comes before it, and the loop
+is that of a deeper one. Within
+
+    turn_range
+
+of separation beyond a turning point the jumps take a hundredth of the loss in all. It is looked for
+up to the least of the other three, on the path itself.
 """
 
 from __future__ import annotations
@@ -36,20 +44,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.method import Method
+from adhesis.solver.method import ContactState, Method, PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Branch, Jump, JumpKind
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 
+RANGES = ("valid_range", "edge_range", "touch_range", "turn_range")
+"""Names of the four ranges, as properties of a result and in rows of a results file."""
+
+ANY_RANGE = f"{', '.join(RANGES[:-1])} or {RANGES[-1]}"
+"""Their names in a sentence."""
+
 DOUBTFUL_RANGE = 1e-9
-"""Least of the three ranges below which a loss is doubtful, in m: adhesion has 0.2 to 10 nm."""
+"""Least of the four ranges below which a loss is doubtful, in m: adhesion has 0.2 to 10 nm."""
 
 TOUCHES: frozenset[JumpKind] = frozenset({"snap-in", "merging"})
 """Kinds of the jumps in which surfaces come into contact away from edges, or a gap closes."""
 
 TOUCH_SHARE = 0.01
-"""Share of the loss that is lost at ``touch_range``."""
+"""Share of the loss that is lost at ``touch_range``, and beyond the turn at ``turn_range``."""
 
 DOUBTFUL_LOSS = 20.0
 """Loss over γ A_max/A0 above which a loss is doubtful (docs/zero-range.md)."""
@@ -65,6 +79,7 @@ DOUBTFUL_BARRIER = 0.1
 # tension is largest, contact is lost with a large drop. And number of states of the whole path.
 _JUMPS, _SAMPLES = 16, 6
 _MOST_OF_LOSS = 0.9
+_OF_GAP = 0.99  # of the mean gap at a turning point: nearer to full contact no jump is sought
 _SAME = 1e-9  # of the period: edges that differ by less have not moved
 _ROUNDED = 1e-12  # prescribed values that differ by less, of themselves, are equal
 
@@ -224,9 +239,70 @@ def touch_stress(
     return total
 
 
-def least_range(valid_range: Any, edge_range: Any, touch_range: Any) -> NDArray[np.float64]:
-    """Return the least of the three ranges, in m; one that is unknown (NaN) does not count."""
-    ranges = np.broadcast_arrays(valid_range, edge_range, touch_range)
+def turn_range(method: Method, record: Record, step: float, lost: float, longest: float) -> float:
+    """Find the way in m beyond a turning point in which jumps take a hundredth of the loss.
+
+    Each leg of loading is followed beyond its end, where the path turns or ends. Where it cannot be
+    followed so far, or full contact is near, the way up to there counts: nothing is known beyond.
+
+    Parameters
+    ----------
+    method : Method
+    record : Record
+        Of the path.
+    step : float
+        Load step in the prescribed value, positive.
+    lost : float
+        Loss in J/m².
+    longest : float
+        The way is followed so far, in m.
+
+    Returns
+    -------
+    float
+        The least over the turning points; infinite if it is longer than ``longest``.
+    """
+    if method.problem.work_of_adhesion == 0:
+        return math.inf
+    following = [*record.branches[1:], "unloading"]
+    turns = [
+        state
+        for branch, after, state in zip(record.branches, following, record.states, strict=True)
+        if (branch, after) == ("loading", "unloading")
+    ]
+    return min(_way_beyond(method, state, step, TOUCH_SHARE * lost, longest) for state in turns)
+
+
+def _way_beyond(
+    method: Method, state: ContactState, step: float, most: float, longest: float
+) -> float:
+    """Return the way of :func:`turn_range` beyond one state; jumps take ``most`` there."""
+    problem, turn = method.problem, state.separation
+    way, dropped = min(longest, _OF_GAP * turn), 0.0
+    x, end = problem.prescribed_in(state), turn - way
+    while state.separation > end:
+        x = max(x - step, end) if problem.control.is_fixed else x - step
+        step *= 2  # under a load the separation falls ever more slowly
+        try:
+            path = method.follow(state, x)
+        except PathError:
+            way = turn - state.separation
+            break
+        drops = np.cumsum([max(0.0, jump.energy_drop) for jump in path.jumps])
+        found = np.flatnonzero(dropped + drops > most)
+        if len(found):
+            way = turn - path.jumps[found[0]].separation
+            break
+        dropped += drops[-1] if len(drops) else 0.0
+        state = path.states[-1]
+    return way if way < longest else math.inf
+
+
+def least_range(
+    valid_range: Any, edge_range: Any, touch_range: Any, turn_range: Any
+) -> NDArray[np.float64]:
+    """Return the least of the four ranges, in m; one that is unknown (NaN) does not count."""
+    ranges = np.broadcast_arrays(valid_range, edge_range, touch_range, turn_range)
     return np.asarray(np.fmin.reduce(np.array(ranges, dtype=np.float64)), dtype=np.float64)
 
 
@@ -263,6 +339,7 @@ def beyond_limit(
     barrier: Any = 0.0,
     edge_range: Any = math.inf,
     touch_range: Any = math.inf,
+    turn_range: Any = math.inf,
     work_of_adhesion_open: Any = 0.0,
 ) -> NDArray[np.bool_]:
     """Mark the losses that an adhesion of finite range may not have; values or arrays of one shape.
@@ -270,7 +347,7 @@ def beyond_limit(
     The least of their ranges is below :data:`DOUBTFUL_RANGE`, or they are more than
     :data:`DOUBTFUL_LOSS` times the work of adhesion of the largest contact, at which its edges
     recede. At a finite strength it is those whose own range of adhesion, γ over the strength, is
-    longer than the edges or the touches allow, those at which the tension inside patches exceeds
+    longer than edges, touches or turns allow, those at which the tension inside patches exceeds
     the strength :data:`DOUBTFUL_EXCESS` times, or whose barriers are more than
     :data:`DOUBTFUL_BARRIER` of them. None is where the strength is unknown (NaN).
     """
@@ -278,10 +355,10 @@ def beyond_limit(
     valid_range, strength = np.asarray(valid_range), np.asarray(strength)
     spent = np.fmax(gamma, work_of_adhesion_open)
     most = DOUBTFUL_LOSS * spent * np.asarray(largest_contact_fraction)
-    short = least_range(valid_range, edge_range, touch_range) < DOUBTFUL_RANGE
+    short = least_range(valid_range, edge_range, touch_range, turn_range) < DOUBTFUL_RANGE
     closed = (short | (loss > most)) & (gamma > 0)
     exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
-    long = gamma > strength * least_range(math.inf, edge_range, touch_range)
+    long = gamma > strength * least_range(math.inf, edge_range, touch_range, turn_range)
     opened = exceeded | long | (np.asarray(barrier) > DOUBTFUL_BARRIER * np.abs(loss))
     return np.asarray(np.where(np.isposinf(strength), closed, np.isfinite(strength) & opened))
 
@@ -290,6 +367,7 @@ _WHAT_A_LONGER_RANGE_DOES = {
     "valid_range": "patches would open from inside and lose less",
     "edge_range": "edges would give way over zones as long as what holds them",
     "touch_range": "surfaces would jump into contact from further away and lose less",
+    "turn_range": "jumps that lie just beyond the turning point would come before it",
 }
 
 
@@ -300,15 +378,16 @@ def range_warnings(
     contact_fraction: Sequence[float] | Array,
     edge_range: float = math.inf,
     touch_range: float = math.inf,
+    turn_range: float = math.inf,
 ) -> list[str]:
     """Return warnings if a loss is that of the zero-range limit alone.
 
     At a finite strength patches open from inside; doubtful is then a tension that exceeds it where
-    no crack grows, and a range of adhesion that edges or touches do not allow. ``range_`` is
+    no crack grows, and a range of adhesion that edges, touches or turns do not allow. ``range_`` is
     ``valid_range``.
     """
     out: list[str] = []
-    bounds = {"edge_range": edge_range, "touch_range": touch_range}
+    bounds = {"edge_range": edge_range, "touch_range": touch_range, "turn_range": turn_range}
     gamma = problem.work_of_adhesion
     if math.isfinite(problem.strength):
         excess = gamma / range_ / problem.strength

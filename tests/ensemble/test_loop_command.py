@@ -94,7 +94,7 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
 # Units of what a JSON document may hold; a number that is none of these is dimensionless.
 DIMENSIONAL = {
     "m": {"h_max", "h_rms", "period", "separation", "patch_length"}
-    | {"valid_range", "edge_range", "touch_range"},
+    | {"valid_range", "edge_range", "touch_range", "turn_range"},
     "m²": {"m0"},
     "1/m²": {"m4"},
     "Pa": {

@@ -769,13 +769,15 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     values["valid_range"][3] = np.inf
     values["touch_range"][5] = 0.4e-9
     values["edge_range"][7] = 0.3e-9
+    values["turn_range"][4] = 0.2e-9
     values["loss"][6] = 21 * 0.02 * 0.5
     path = write(tmp_path / "r.h5", plan, values)
     data, status = aggregate(path), read_status(path)
-    (warning,) = (text for text in findings.quality(data) if "touch_range is below" in text)
-    assert warning.startswith("WARNING: 4 of 8 losses")
-    assert [row["row"] for row in status["beyond_limit"]] == [7, 5, 2, 6]
-    told = "4 losses are doubtful: valid_range, edge_range or touch_range is below 1e-09 m"
+    (warning,) = (text for text in findings.quality(data) if "turn_range is below" in text)
+    assert warning.startswith("WARNING: 5 of 8 losses")
+    assert [row["row"] for row in status["beyond_limit"]] == [4, 7, 5, 2, 6]
+    ranges = "valid_range, edge_range, touch_range or turn_range"
+    told = f"5 losses are doubtful: {ranges} is below 1e-09 m"
     assert told in as_text(status)
     assert "touch_range 4e-10 m" in as_text(status)
     table = loss_tables.losses(data)
@@ -783,7 +785,7 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     shown = [row[names.index("valid_range_least [m]")] for row in table.rows]
     assert shown == pytest.approx([0.5e-9, values["valid_range"][4:].min()])
     shown = [row[names.index("range_least [m]")] for row in table.rows]
-    assert shown == pytest.approx([0.5e-9, 0.3e-9])
+    assert shown == pytest.approx([0.5e-9, 0.2e-9])
 
 
 def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):

@@ -593,3 +593,23 @@ def test_a_plan_expects_no_more_patches_than_crests_that_are_reached(gamma: floa
     ).main
     assert found["patches"] / 3 <= plan.patches <= 3 * found["patches"]
     assert plan.seconds["Δ 0.3"] < plan.seconds["answer"]
+
+
+def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys):
+    """The measure reaches the loops, the page and the document; an unknown one is refused."""
+    rows = [f"{1e6 * a:.4f},{1e6 * b:.5f}" for a, b in zip(X, 5 * PROFILE.at(X), strict=True)]
+    file = tmp_path / "t.csv"
+    file.write_text("x (um),z (um)\n" + "\n".join(rows))
+    words = ["trace", str(file), *CONTACT, "--quick", "--quiet", "--processes", "1"]
+    words = [*words, "--load-steps", "4", "--max-penetration", "0.3", "--accuracy", "1e-2"]
+    found = {}
+    for measure in ("arc", "flat"):
+        out = tmp_path / measure
+        assert main([*words, "--measure", measure, "--to", str(out)]) == 0
+        assert ("(flat)" in capsys.readouterr().out) == (measure == "flat")
+        found[measure] = json.loads((out / "trace.json").read_text())
+        assert found[measure]["measure"] == found[measure]["loop"]["measure"] == measure
+    arc, flat = (found[name]["loop"] for name in ("arc", "flat"))
+    assert 0.02 * arc["m2"] < arc["loss"] / flat["loss"] - 1 < 2 * arc["m2"]
+    assert main([*words, "--measure", "round", "--plan"]) == 2
+    assert "--measure is 'round'" in capsys.readouterr().err

@@ -119,6 +119,11 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["Evaluation length in mm", *TWO],
         {"unit": "um"},
     ),
+    "a mark of UTF-8 behind the header": ([UM, f"\ufeff{TWO[0]}", *TWO[1:]], {}),
+    "decimal commas of three digits": (
+        ["dx: 500 nm", "Z (nm)", *(f"{1e3 * float(z):.3f}".replace(".", ",") for z in ZS)],
+        {},
+    ),
     "Latin-1": ("\n".join(["Höhe x [µm],z [µm]", *TWO]).encode("latin-1"), {}),
 }  # fmt: skip
 
@@ -248,6 +253,29 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         [f"{500 * k:,};{1e3 * float(z):.0f}".replace(",", ".") for k, z in enumerate(ZS)],
         {"unit": "nm"},
         r"numbers such as '1\.000' beside whole ones below 1000: take the signs of thousands out",
+    ),
+    "perhaps thousands by commas": (
+        ["Step: 0.5 um", "z (nm)", *(f"{5e3 + 1e3 * float(z):,.0f}" for z in ZS)],
+        {},
+        r"such as '5,200', and none whose comma is a decimal sign for certain: give decimal",
+    ),
+    "perhaps thousands in both columns": (
+        ["x (nm);z (nm)", *(f"{1000 + 500 * k:,};{9 + float(z):.3f}".replace(".", ",")
+                           for k, z in enumerate(ZS))],
+        {},
+        r"such as '1,000', and none whose comma is a decimal sign for certain: give decimal",
+    ),
+    "a multiple of a unit": (["x (um),z (x10 nm)", *TWO], {}, "states no unit"),
+    "a unit times a number": (["x (um),z [nm × 10]", *TWO], {}, "states no unit"),
+    "UTF-16 without a mark": (
+        "\n".join([UM, *TWO]).encode("utf-16-le"),
+        {"columns": [1, 2]},
+        "columns belongs to texts: .* UTF-16 without a mark is to be saved as UTF-8",
+    ),
+    "numbers within apostrophes": (
+        [UM, *(f"'{x}','{z}'" for x, z in PAIRS)],
+        {},
+        r"no line of numbers: most digits stand on line \d+, .*'\d",
     ),
     "units within the cells": (
         ["x;z", *(f"{x} um;{z} um" for x, z in PAIRS)],

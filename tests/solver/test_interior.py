@@ -30,6 +30,7 @@ from adhesis.solver.loading.zero_range import (
     range_warnings,
     touch_stress,
 )
+from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.peaks import highest_peaks
@@ -356,6 +357,7 @@ def test_the_touch_range_is_that_of_all_jumps_in_which_a_gap_closes():
     assert loop.touch_range == pytest.approx(0.01 * loop.loss / sum(touches))
     numbers = loop.numbers()
     ranges = [numbers[name] for name in ("valid_range", "edge_range", "touch_range")]
+    assert numbers["turn_range"] is None  # it is longer
     assert loop.least_range == min(ranges)
     assert f"less than {1e9 * min(ranges):.3g} nm (tension" in loop.range_summary()
 
@@ -370,3 +372,105 @@ def test_a_soft_control_moves_the_touches_by_what_it_gives():
     assert touch_stress([jump], [1], *states, Control(0.0)) == pytest.approx(0.5 * 0.1)
     free = np.array([1.0, 1.0]), np.array([0.0, 0.0]), np.array([0, 1])
     assert touch_stress([jump], [0], *free, Control(0.0)) == 0
+
+
+# ---------------------------------------------------------------------- range beyond the turn
+
+
+def next_touch() -> float:
+    """Δ/h_max of the second snap-in of a loop, which takes a quarter of its loss."""
+    loop = loop_of(1e7)
+    (_, jump) = (jump for jump in loop.jumps if jump.kind == "snap-in")
+    return float(loop.problem.penetration(jump.separation))
+
+
+def test_a_jump_just_beyond_the_turning_point_bounds_the_range():
+    """A loop that turns by 10 nm deeper loses half as much again: that range is not zero."""
+    method, jump = method_of(rough(), 1e7), next_touch()
+    way = 10e-9 / method.problem.profile.h_max
+    before, after = run_loops(method, max_penetration=[jump - way, jump + way], load_steps=20)
+    assert after.loss > 1.5 * before.loss
+    assert before.turn_range == pytest.approx(10e-9, rel=1e-6)
+    assert before.least_range == before.turn_range < before.touch_range
+    assert after.turn_range == math.inf
+    assert "; beyond the turn: 10 nm)" in before.range_summary()
+    assert "beyond the turn" not in after.range_summary()
+
+
+def test_a_turning_point_within_a_nanometre_of_a_jump_is_doubtful():
+    method, jump = method_of(rough(), 1e7), next_touch()
+    way = 0.5e-9 / method.problem.profile.h_max
+    loop = run_loop(method, max_penetration=jump - way, load_steps=20)
+    (doubt,) = loop.warnings
+    assert doubt.startswith("turn_range is 0.5 nm")
+    assert "jumps that lie just beyond the turning point would come before it" in doubt
+    own = replace(loop.problem, strength=loop.problem.work_of_adhesion / 1e-9)
+    (doubt,) = range_warnings(own, math.inf, loop.loss, loop.contact_fraction, *loop.outer_ranges)
+    assert "1 nm, is longer than turn_range, 0.5 nm" in doubt
+    of_loop = (loop.loss, 0.04, loop.largest_contact_fraction)
+    assert beyond_limit(math.inf, *of_loop, turn_range=loop.turn_range)
+    assert beyond_limit(math.inf, *of_loop, own.strength, turn_range=loop.turn_range)
+    assert not beyond_limit(math.inf, *of_loop)
+
+
+@pytest.mark.parametrize("name", ["sharp", "grid"])
+def test_every_turn_of_a_path_is_followed_beyond(name):
+    """The first of two turns lies before the jump, which the second has passed."""
+    gamma, jump = 0.04, next_touch()
+    method = method_of(rough(), 1e7, gamma, name)
+    way = 10e-9 / method.problem.profile.h_max
+    path = run_path(method, [jump - way, 0.3, 0.6], load_steps=20)
+    # the jump of the grid lies elsewhere by its own error
+    assert path.turn_range == pytest.approx(10e-9, rel=1e-6 if name == "sharp" else 0.5)
+    last = run_path(method, [0.6, 0.3, jump - way], load_steps=20, out=False)
+    assert last.turn_range == math.inf  # the gap is closed already
+
+
+@pytest.mark.parametrize("control", [Control(1e13), Control(0.0)], ids=["stiffness", "load"])
+def test_the_way_beyond_a_turn_is_one_of_the_separation(control):
+    """Under a soft control the same touch comes at the same separation."""
+    loop = loop_of(1e7)
+    before = next(k for k in loop.states_before_jumps()[1:])
+    touch = loop.contact_states[before]
+    problem = replace(loop.problem, control=control)
+    h_max = problem.profile.h_max
+    wanted = control.prescribed(touch.separation, touch.mean_stress)
+    if control.is_load:
+        turn = {"max_stress": -wanted - 20.0}
+    else:
+        turn = {"max_penetration": 1 - wanted / h_max - 5e-3}
+    found = run_loop(make_method("sharp", problem), load_steps=20, **turn)
+    turned = found.separation[found.branch == "unloading"][0]
+    assert found.turn_range == pytest.approx(turned - touch.separation, rel=1e-3)
+    assert 0 < found.turn_range < found.touch_range
+
+
+def test_nothing_is_known_beyond_a_path_that_cannot_be_followed(monkeypatch):
+    """The way up to there counts."""
+    method, jump = method_of(rough(), 1e7), next_touch()
+    loop = run_loop(method, max_penetration=jump - 0.03, load_steps=20)
+    assert loop.turn_range == math.inf
+    h_max, follow = loop.problem.profile.h_max, type(method).follow
+    last = (1 - jump + 0.03) * h_max
+
+    def stopped(self, state, separation):
+        if separation < last - 1e-12 * h_max:
+            raise PathError("no state")
+        return follow(self, state, separation)
+
+    monkeypatch.setattr(type(method), "follow", stopped)
+    loop = run_loop(method, max_penetration=jump - 0.03, load_steps=20)
+    assert loop.turn_range == 0.0
+
+
+def test_full_contact_bounds_the_range_beyond_the_turn():
+    """Nothing is followed into it: at most the mean gap is known to be free of jumps."""
+    loop = run_loop(method_of(rough(), 1e6), max_penetration=0.99, load_steps=20)
+    gap = 0.01 * loop.problem.profile.h_max
+    assert gap < loop.touch_range
+    assert 0 < loop.turn_range < gap
+
+
+def test_without_adhesion_no_jump_lies_beyond():
+    loop = run_loop(method_of(rough(), 1e7, 0.0), max_penetration=0.5, load_steps=4)
+    assert loop.turn_range == math.inf

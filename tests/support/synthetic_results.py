@@ -106,6 +106,7 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "valid_range": 1e-2 * h_max,
         "edge_range": 2e-2 * h_max,
         "touch_range": 3e-2 * h_max,
+        "turn_range": np.full(n, np.inf),
         "largest_interior_tension": gamma / (1e-2 * h_max),
         "interior_tension_position": np.full(n, 0.25 * campaign.profile.period),
         "interior_tension_penetration": np.full(n, 0.1),

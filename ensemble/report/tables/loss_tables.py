@@ -94,6 +94,7 @@ def losses(data: Aggregate) -> Table:
         TableColumn("valid_range_least [m]", lambda cell: least(cell.values["valid_range"])),
         TableColumn("edge_range_least [m]", lambda cell: least(cell.values["edge_range"])),
         TableColumn("touch_range_least [m]", lambda cell: least(cell.values["touch_range"])),
+        TableColumn("turn_range_least [m]", lambda cell: least(cell.values["turn_range"])),
         TableColumn(
             "largest_interior_tension [Pa]",
             lambda cell: largest(cell.values["largest_interior_tension"]),

@@ -35,9 +35,11 @@ _BOTH = re.compile(r"\b(units?|einheit(en)?|unité?s?)\b", re.I)
 
 # A number that stands for itself: not that of "X1" or "Ra2".
 _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
-# A field with a value names no column: "0.5 µm", "Cut-off (mm): 0.8". "Channel 1 (µm)" names one.
+# A field with a value names no column: "0.5 µm", "(x10 nm)", "Cut-off (mm): 0.8". "Channel 1 (µm)"
+# names one.
 _VALUE = re.compile(
     rf"(?<![^\W_])(?:\d+|\d*[.,]\d+\s*[(\[]?)\s*({_WORD})(?![^\W_])"
+    rf"|[x×*·]\s*\d+([.,]\d+)?\s*({_WORD})(?![^\W_])|({_WORD})\s*[x×*·]\s*\d"
     rf"|[:=]\s*[+\-]?[.,]?\d|(?:^|[\s;,]){_NUMBER}\s*$",
     re.IGNORECASE,
 )

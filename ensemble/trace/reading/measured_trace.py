@@ -235,8 +235,10 @@ def read_trace(
         table = read_table(source, delimiter, decimal)
         return _from_table(source.name, table, unit, step, columns, row, f"text, {table.form}")
     _refuse_options(
-        "texts: an instrument's file states its own lengths", unit=unit, step=step, columns=columns
-    )
+        "texts: an instrument's file states its own lengths (a text in UTF-16 without a mark is "
+        "to be saved as UTF-8)",
+        unit=unit, step=step, columns=columns,
+    )  # fmt: skip
     if not available():
         # Without the extra it is not known whether this is a file of an instrument.
         raise InputError(

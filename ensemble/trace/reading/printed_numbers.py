@@ -99,18 +99,22 @@ def flaw_of(fields: Sequence[str]) -> str | None:
     return None
 
 
+def marks_thousands(field: str, sign: str) -> bool:
+    """Return whether a sign may mark the thousands of a number: "1,234" and "-12,345,678"."""
+    return bool(re.fullmatch(rf"[+\-]?[1-9]\d{{0,2}}({re.escape(sign)}\d{{3}})+", field))
+
+
 def has_signs_of_thousands(column: Sequence[str], decimal: str) -> bool:
     """Return whether what is taken for the decimal sign of a column may mark thousands.
 
     It does if it stands before three digits wherever it stands, never behind a leading nought, and
     numbers below 1000 have none: "500", "1.000".
     """
-    grouped = re.compile(rf"[+\-]?[1-9]\d{{0,2}}({re.escape(decimal)}\d{{3}})+")
     marked = 0
     plain = 0
     for field in column:
         if decimal in field:
-            if not grouped.fullmatch(field):
+            if not marks_thousands(field, decimal):
                 return False
             marked += 1
         elif re.fullmatch(r"[+\-]?\d{1,3}", field):

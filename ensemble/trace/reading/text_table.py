@@ -29,6 +29,7 @@ from adhesis.ensemble.trace.reading.printed_numbers import (
     is_grouped,
     is_missing,
     looks_like_numbers,
+    marks_thousands,
     printed_form,
     shown_line,
     split,
@@ -47,6 +48,7 @@ _ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
 _DIGIT = re.compile(r"[+\-]?[.,]?\d")
 # What people and programs write for the minus sign.
+_MARK = "\ufeff"  # of a text in UTF-8
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
 # Blanks that do not break a line mark thousands between digits.
 _THOUSANDS = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
@@ -143,6 +145,7 @@ def _lines(source: Source) -> list[str]:
         except UnicodeDecodeError:
             known = _FOREIGN.sub(lambda found: _UNKNOWN * len(found[0]), data)
             text = known.decode("cp1252", errors="replace")
+    text = text.replace(_MARK, "")  # one of a second file that was appended is no sign of a row
     if not text.isascii():
         # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
         text = _THOUSANDS.sub("’", text)
@@ -215,7 +218,11 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     """Find header and columns in the lines of a file."""
     sample = [line for line in lines if looks_like_numbers(line)]
     if not sample:
-        raise InputError(f"{source} holds no line of numbers")
+        place = max(range(len(lines)), key=lambda k: sum(sign.isdigit() for sign in lines[k]))
+        raise InputError(
+            f"{source} holds no line of numbers: most digits stand on line {place + 1}, "
+            f"{shown_line(lines[place])}"
+        )
     spread = sample[:: max(1, len(sample) // _SAMPLE)]
     is_given = decimal is not None
     delimiter, decimal = find_form(source, spread, delimiter, decimal)
@@ -228,6 +235,8 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     _refuse_numbers_outside(reader, start, places[-1])
     filled = tuple(k for k in range(count) if any(row.fields[k] for row in rows))
     rows, places = _without_empty_rows(reader, rows, places, len(filled))
+    if not is_given and decimal == ",":
+        _refuse_perhaps_thousands(source, rows)
     for k in filled:
         column = [row.fields[k] for row in rows]
         if not is_given and has_signs_of_thousands(column, decimal):
@@ -253,6 +262,16 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         decimal=decimal,
         empty_lines=tuple(place + 1 for place in places if not lines[place].strip()),
     )
+
+
+def _refuse_perhaps_thousands(source: Source, rows: Sequence[_Row]) -> None:
+    """Refuse commas that may be decimal signs or mark thousands, wherever they stand."""
+    marked = [field for row in rows for field in row.fields if "," in field]
+    if marked and all(marks_thousands(field, ",") for field in marked):
+        raise InputError(
+            f"{source} has numbers such as {marked[0]!r}, and none whose comma is a decimal sign "
+            f"for certain: give {parameter('decimal')}, or take signs of thousands out"
+        )
 
 
 def _first_row(reader: _Reader) -> int | None:
