@@ -83,24 +83,14 @@ def untransformed(x: float, skewness: Array, n: int) -> Array:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over realisations and how well it is known; NaN where n is too small.
+    """A mean over realisations and how well it is known; NaN where n is too small."""
 
-    Attributes
-    ----------
-    n : int
-        Realisations.
-    mean, std : float
-        Mean, and standard deviation of one realisation (n - 1 in the denominator; n ≥ 2).
-    sem : float
-        Standard error of the mean, std/sqrt(n); n ≥ 2.
-    low, high : float
-        Interval of the mean at :data:`CONFIDENCE`; n ≥ 2.
-    """
-
-    n: int
+    n: int  # realisations
+    # mean, std: mean, and standard deviation of one realisation (n - 1 in the denominator; n ≥ 2)
     mean: float
     std: float
-    sem: float
+    sem: float  # standard error of the mean, std/sqrt(n); n ≥ 2
+    # low, high: interval of the mean at :data:`CONFIDENCE`; n ≥ 2
     low: float
     high: float
 

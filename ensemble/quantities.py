@@ -42,33 +42,17 @@ class Quantity:
 
     Whether a value is positive and finite is left to its bounds. Sentences of errors begin with
     "is", to follow the name of an option or a key.
-
-    Attributes
-    ----------
-    name : str
-    units : mapping of str to float
-        Size of each unit in the SI unit, which is the first.
-    example : str
-        A value with its unit.
-    rule : str
-        What a text must be.
-    shown : tuple of str
-        Units in which values are shown, from the largest to the smallest.
-    largest : float
-        A larger number without a unit is likely to be in another unit, and is asked about.
-    question : str
-        What to give instead of such a number, which replaces ``{0}``.
-    others : mapping of str to str
-        Units by further names; with them, capitals do not count.
     """
 
     name: str
-    units: Mapping[str, float]
-    example: str
-    rule: str
-    shown: tuple[str, ...]
+    units: Mapping[str, float]  # size of each unit in the SI unit, which is the first
+    example: str  # a value with its unit
+    rule: str  # what a text must be
+    shown: tuple[str, ...]  # units in which values are shown, from the largest to the smallest
+    # A larger number without a unit is likely to be in another unit, and is asked about
     largest: float = math.inf
-    question: str = ""
+    question: str = ""  # what to give instead of such a number, which replaces ``{0}``
+    # Units by further names; with them, capitals do not count
     others: Mapping[str, str] = field(default_factory=dict)
 
     @property

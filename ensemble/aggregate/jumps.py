@@ -29,28 +29,16 @@ BIN_EDGES: Array = np.logspace(
 
 @dataclass(frozen=True, eq=False)
 class JumpStatistics:
-    """Jumps of every cell (in the order of the cells given), by kind.
-
-    Attributes
-    ----------
-    kinds : tuple of str
-    small_scale : bool array, shape (kinds,)
-        Whether jumps of a kind only move edges inside existing patches.
-    number : int array, shape (cells, kinds)
-        Number of jumps in all tasks together.
-    energy : array, shape (cells, kinds)
-        Their drops, J/m² of nominal area, in all tasks together.
-    histogram : int array, shape (cells, kinds, bins)
-        Number of jumps by energy drop, between :data:`BIN_EDGES`.
-    truncated : int array, shape (cells,)
-        Number of tasks that made more jumps than the catalogue holds.
-    """
+    """Jumps of every cell (in the order of the cells given), by kind."""
 
     kinds: tuple[str, ...]
+    # Shape (kinds,); whether jumps of a kind only move edges inside existing patches
     small_scale: NDArray[np.bool_]
-    number: NDArray[np.int64]
-    energy: Array
+    number: NDArray[np.int64]  # shape (cells, kinds); number of jumps in all tasks together
+    energy: Array  # shape (cells, kinds); their drops, J/m² of nominal area, in all tasks together
+    # Shape (cells, kinds, bins); number of jumps by energy drop, between :data:`BIN_EDGES`
     histogram: NDArray[np.int64]
+    # Shape (cells,); number of tasks that made more jumps than the catalogue holds
     truncated: NDArray[np.int64]
 
     def part(self, cells: Sequence[int]) -> JumpStatistics:

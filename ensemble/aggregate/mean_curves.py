@@ -17,19 +17,13 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A quantity on the penetration axis of one branch, over the realisations of a cell.
+    """A quantity on the penetration axis of one branch, over the realisations of a cell."""
 
-    Attributes
-    ----------
-    mean, std : array, shape (points,)
-        std has n - 1 in the denominator; NaN for one realisation.
-        A realisation that has detached is counted, as zero.
-    quantiles : array, shape (len(QUANTILES), points)
-    """
-
+    # mean, std: shape (points,); std has n - 1 in the denominator; NaN for one realisation. A
+    # realisation that has detached is counted, as zero.
     mean: Array
     std: Array
-    quantiles: Array
+    quantiles: Array  # shape (len(QUANTILES), points)
 
 
 def average_curves(

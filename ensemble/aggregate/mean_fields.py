@@ -21,51 +21,33 @@ from adhesis.solver.model.profile import Array
 
 @dataclass(frozen=True, eq=False)
 class DeformedShape:
-    """Fields of one realisation.
+    """Fields of one realisation."""
 
-    Attributes
-    ----------
-    height : array, shape (nodes,)
-        Rigid profile h in m.
-    displacement : array, shape (2, penetrations, nodes)
-        Deformed surface v in m, loading and unloading; NaN where there is no contact.
-    """
-
-    height: Array
+    height: Array  # shape (nodes,); rigid profile h in m
+    # Shape (2, penetrations, nodes); deformed surface v in m, loading and unloading; NaN where
+    # there is no contact
     displacement: Array
 
 
 @dataclass(frozen=True, eq=False)
 class FieldStatistics:
-    """Averages of every cell, in the order of the cells.
+    """Averages of every cell, in the order of the cells."""
 
-    Attributes
-    ----------
-    penetration : array, shape (penetrations,)
-        Δ/h_max of the states, or Δ over the largest one if the campaign has several of these.
-    gap_bin, height_bin : array
-        Middles of the bins: gap/h_max, height/h_rms. Wave numbers, and positions of the nodes of
-        shapes, are in the plan of each cell.
-    psd_height : array, shape (cells, wave numbers)
-        In m³; NaN for a cell without finished tasks.
-    height_density : array, shape (cells, height bins)
-    psd_displacement : array, shape (cells, 2, penetrations, wave numbers)
-        In m³, second axis loading and unloading.
-    gap_density : array, shape (cells, 2, penetrations, gap bins)
-    in_contact : int array, shape (cells, 2, penetrations)
-        Number of realisations averaged in the last two.
-    shapes : tuple of DeformedShape or None
-        Shapes of the first finished realisation whose fields are stored.
-    """
-
+    # Shape (penetrations,); Δ/h_max of the states, or Δ over the largest one if the campaign has
+    # several of these
     penetration: Array
+    # gap_bin, height_bin: middles of the bins: gap/h_max, height/h_rms. Wave numbers, and positions
+    # of the nodes of shapes, are in the plan of each cell.
     gap_bin: Array
     height_bin: Array
-    psd_height: Array
-    height_density: Array
+    psd_height: Array  # shape (cells, wave numbers), in m³; NaN for a cell without finished tasks
+    height_density: Array  # shape (cells, height bins)
+    # Shape (cells, 2, penetrations, wave numbers), in m³, second axis loading and unloading
     psd_displacement: Array
-    gap_density: Array
+    gap_density: Array  # shape (cells, 2, penetrations, gap bins)
+    # Shape (cells, 2, penetrations); number of realisations averaged in the last two
     in_contact: NDArray[np.int64]
+    # Shapes of the first finished realisation whose fields are stored
     shapes: tuple[DeformedShape | None, ...]
 
     def part(self, cells: Sequence[int]) -> FieldStatistics:

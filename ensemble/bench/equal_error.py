@@ -67,41 +67,24 @@ class Ratio:
 
     The errors of ``grid`` come from single jumps and change their sign from one number of nodes to
     the next: a coarse grid can be accurate by chance, which only a reference shows.
-
-    Attributes
-    ----------
-    converged : Quotient
-        Ratio to the coarsest grid that is at least as accurate, as are all finer ones that
-        finished.
-    cheapest : Quotient
-        Ratio to the cheapest grid that is at least as accurate, perhaps by chance.
     """
 
     line: Line
+    # Ratio to the coarsest grid that is at least as accurate, as are all finer ones that finished
     converged: Quotient
-    cheapest: Quotient
+    cheapest: Quotient  # ratio to the cheapest grid that is at least as accurate, perhaps by chance
 
 
 @dataclass(frozen=True)
 class Exponent:
-    """Exponent of a power law of the CPU time of ``sharp``, by least squares in the logarithms.
+    """Exponent of a power law of the CPU time of ``sharp``, by least squares in the logarithms."""
 
-    Attributes
-    ----------
-    among : str
-        Property that the lines share.
-    variable : str
-        Name of the independent variable.
-    least, most : int
-        Range of the variable.
-    of_loop, of_solution : float
-        Exponents of the CPU time of a loop and of a solution.
-    """
-
-    among: str
-    variable: str
+    among: str  # property that the lines share
+    variable: str  # name of the independent variable
+    # least, most: range of the variable
     least: int
     most: int
+    # of_loop, of_solution: exponents of the CPU time of a loop and of a solution
     of_loop: float
     of_solution: float
 

@@ -16,18 +16,10 @@ from adhesis.ensemble.campaign.tasks import Tasks
 
 @dataclass(frozen=True)
 class Changes:
-    """Differences of a campaign from the one of a results file.
+    """Differences of a campaign from the one of a results file."""
 
-    Attributes
-    ----------
-    grown : tuple of str
-        Keys of the sweep that only gained values.
-    other : tuple of str
-        One phrase for each other key that differs: its name and both values.
-    """
-
-    grown: tuple[str, ...]
-    other: tuple[str, ...]
+    grown: tuple[str, ...]  # keys of the sweep that only gained values
+    other: tuple[str, ...]  # one phrase for each other key that differs: its name and both values
 
 
 def differing(one: Campaign, two: Campaign) -> list[str]:

@@ -49,24 +49,13 @@ def fewest(at: Sequence[int]) -> int:
 
 @dataclass(frozen=True)
 class Precision:
-    """Precision of the mean of a cell, and whether it is the wanted one.
+    """Precision of the mean of a cell, and whether it is the wanted one."""
 
-    Attributes
-    ----------
-    quantity : str
-        Column of the results file that ``[stop]`` steers.
-    wanted : float
-        How far the interval may reach from the mean, over the mean.
-    estimate : Estimate
-        The mean and both ends of its interval, in the unit of the quantity; NaN where unknown.
-    finished : bool
-        Whether no realisation of the cell is still to be computed.
-    """
-
-    quantity: str
-    wanted: float
+    quantity: str  # column of the results file that ``[stop]`` steers
+    wanted: float  # how far the interval may reach from the mean, over the mean
+    # The mean and both ends of its interval, in the unit of the quantity; NaN where unknown
     estimate: Estimate
-    finished: bool = True
+    finished: bool = True  # whether no realisation of the cell is still to be computed
 
     @property
     def relative_error(self) -> float:

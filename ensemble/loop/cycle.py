@@ -23,20 +23,12 @@ _MAX_PENETRATION = 0.9
 
 @dataclass(frozen=True)
 class Turns:
-    """Turning points of loops.
+    """Turning points of loops."""
 
-    Attributes
-    ----------
-    points : tuple of float
-        Δ/h_max, u_tot/h_max, or Pa under a load; preloads in Pa, if ``are_preloads``.
-    are_preloads : bool
-    latest : float or None
-        Where a loop turns whose preload is not reached, if it is given.
-    """
-
+    # Δ/h_max, u_tot/h_max, or Pa under a load; preloads in Pa, if ``are_preloads``
     points: tuple[float, ...]
     are_preloads: bool = False
-    latest: float | None = None
+    latest: float | None = None  # where a loop turns whose preload is not reached, if it is given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,20 +37,12 @@ class Cycle(Turns):
 
     The turning points are one for each loop, ascending; those of one path, in order, if
     ``is_path``.
-
-    Attributes
-    ----------
-    control : Control
-    load_steps : int
-    is_path : bool
-    out : bool
-        Whether a path continues until contact is lost.
     """
 
     control: Control
     load_steps: int
     is_path: bool = False
-    out: bool = True
+    out: bool = True  # whether a path continues until contact is lost
 
     def arguments(self, points: object) -> dict[str, Any]:
         """Return the arguments of ``run_loop`` or ``run_loops`` for some of the points."""

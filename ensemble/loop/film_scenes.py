@@ -25,50 +25,29 @@ _NODES = 800  # of the drawn surface: about one a pixel
 
 @dataclass(frozen=True)
 class Scene:
-    """One frame.
+    """One frame."""
 
-    Attributes
-    ----------
-    state : int
-        Number of the state in the result.
-    surface : array, shape (nodes,)
-        Height of the deformed surface above the profile's mean line, in m.
-    patches : array, shape (patches, 2)
-        Ends of the contact patches in m, within the period; one across its end is two.
-    caption : str
-        The state in numbers.
-    announcement : str
-        The jumps since the frame before; empty without any.
-    is_notable : bool
-        Whether those jumps lose a hundredth of all drops or more.
-    """
-
-    state: int
+    state: int  # number of the state in the result
+    # Shape (nodes,); height of the deformed surface above the profile's mean line, in m
     surface: Array
+    # Shape (patches, 2); ends of the contact patches in m, within the period; one across its end is
+    # two
     patches: Array
-    caption: str
-    announcement: str
-    is_notable: bool
+    caption: str  # the state in numbers
+    announcement: str  # the jumps since the frame before; empty without any
+    is_notable: bool  # whether those jumps lose a hundredth of all drops or more
 
 
 @dataclass(frozen=True)
 class Scenes:
-    """All frames of a film.
+    """All frames of a film."""
 
-    Attributes
-    ----------
-    x, height : array, shape (nodes,)
-        Positions in m from 0 to the period, both included, and the rigid profile there in m.
-    scenes : list of Scene
-        In the order of the path.
-    jumps_shown : int
-        Jumps that have a frame before and one after them.
-    """
-
+    # x, height: shape (nodes,); positions in m from 0 to the period, both included, and the rigid
+    # profile there in m
     x: Array
     height: Array
-    scenes: list[Scene]
-    jumps_shown: int
+    scenes: list[Scene]  # in the order of the path
+    jumps_shown: int  # jumps that have a frame before and one after them
 
 
 def scenes_of(

@@ -47,19 +47,14 @@ _COPIED = tuple(
 
 @dataclass(frozen=True)
 class Merged:
-    """Result of a merge: rows by status, how many it took over, and what it left out.
-
-    Attributes
-    ----------
-    doubts : tuple of str
-        A sentence about each file with damaged rows, which are left out, or with rows of several
-        versions or processors.
-    """
+    """Result of a merge: rows by status, how many it took over, and what it left out."""
 
     total: int
     done: int
     failed: int
     taken: int
+    # A sentence about each file with damaged rows, which are left out, or with rows of several
+    # versions or processors
     doubts: tuple[str, ...] = ()
 
 

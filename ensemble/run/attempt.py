@@ -37,26 +37,13 @@ class TimeLimit(BaseException):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a task.
-
-    Attributes
-    ----------
-    task : int
-    rank : int
-        Rank that computed it.
-    seconds : float
-        Wall time.
-    error : str or None
-        Reason of a failure.
-    result : object
-        Return value of ``compute``, until ``deliver`` has stored it.
-    """
+    """Outcome of a task."""
 
     task: int
-    rank: int
-    seconds: float
-    error: str | None = None
-    result: Any = None
+    rank: int  # rank that computed it
+    seconds: float  # wall time
+    error: str | None = None  # reason of a failure
+    result: Any = None  # return value of ``compute``, until ``deliver`` has stored it
 
 
 def attempt(

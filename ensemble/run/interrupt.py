@@ -104,18 +104,10 @@ def parse_duration(text: str) -> float:
 
 @dataclass(frozen=True)
 class Deadline:
-    """Time at which a run has to stop.
+    """Time at which a run has to stop."""
 
-    Attributes
-    ----------
-    at : float
-        Time at which tasks in progress are given up, in s of ``time.time()``.
-    grace : float
-        Time that workers may take from then on, in s.
-    """
-
-    at: float
-    grace: float
+    at: float  # time at which tasks in progress are given up, in s of ``time.time()``
+    grace: float  # time that workers may take from then on, in s
 
 
 def deadline(

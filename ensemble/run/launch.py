@@ -243,22 +243,13 @@ def _described(name: str) -> str:
 
 
 class RanksEnd(NamedTuple):
-    """How ranks have ended.
+    """How ranks have ended."""
 
-    Attributes
-    ----------
-    code : int
-        The one that a rank passed on. Without one: 0 if the launcher ended with it, 2 if the ranks
-        have never met, 75 or 130 after a signal, and 137 otherwise.
-    sentence : str
-        The last message, to be printed.
-    words : tuple of str
-        Lines of the launcher, if it gives the reason.
-    """
-
+    # The one that a rank passed on. Without one: 0 if the launcher ended with it, 2 if the ranks
+    # have never met, 75 or 130 after a signal, and 137 otherwise.
     code: int
-    sentence: str = ""
-    words: tuple[str, ...] = ()
+    sentence: str = ""  # the last message, to be printed
+    words: tuple[str, ...] = ()  # lines of the launcher, if it gives the reason
 
 
 def run_ranks(

@@ -33,16 +33,10 @@ _AGAIN = "; this run computes damaged rows again"
 
 @dataclass(frozen=True)
 class Selection:
-    """Rows to compute again.
-
-    Attributes
-    ----------
-    status : {"failed", "all"}
-    values : mapping of str to numbers
-        By the name of an attribute of tasks; if there are any, only tasks with one of them.
-    """
+    """Rows to compute again."""
 
     status: Literal["failed", "all"]
+    # By the name of an attribute of tasks; if there are any, only tasks with one of them
     values: Mapping[str, Collection[float]] = field(default_factory=dict)
 
     def check(self, tasks: Sequence[Task]) -> None:
@@ -72,28 +66,16 @@ class Selection:
 
 @dataclass(frozen=True)
 class Plan:
-    """Tasks that are left, determined by rank 0 and broadcast to all.
+    """Tasks that are left, determined by rank 0 and broadcast to all."""
 
-    Attributes
-    ----------
-    tasks : Tasks
-        Row by row.
-    rows : list of int
-        Rows to compute.
-    done, failed : int
-        Rows that are.
-    times : dict
-        Of each group of tasks that take about the same time: seconds measured, and tasks.
-    batches : Batches, optional
-        Where the campaign has ``[stop]``: what comes after ``rows``.
-    """
-
-    tasks: Tasks
-    rows: list[int]
+    tasks: Tasks  # row by row
+    rows: list[int]  # rows to compute
+    # done, failed: rows that are
     done: int
     failed: int
+    # Of each group of tasks that take about the same time: seconds measured, and tasks
     times: dict[Group, tuple[float, int]] = field(default_factory=dict)
-    batches: Batches | None = None
+    batches: Batches | None = None  # where the campaign has ``[stop]``: what comes after ``rows``
 
 
 def prepare(

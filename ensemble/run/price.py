@@ -45,57 +45,31 @@ Cell = tuple[float, ...]
 
 @dataclass(frozen=True)
 class CellPrice:
-    """Cost of the tasks of one cell.
+    """Cost of the tasks of one cell."""
 
-    Attributes
-    ----------
-    task : Task
-        One of them.
-    tasks : int
-        Number still to do.
-    seconds : float
-        Mean CPU time of one, in s.
-    measured : int
-        Loops that the mean is over; 0 where it is scaled from other cells.
-    """
-
-    task: Task
-    tasks: int
-    seconds: float
-    measured: int
+    task: Task  # one of them
+    tasks: int  # number still to do
+    seconds: float  # mean CPU time of one, in s
+    measured: int  # loops that the mean is over; 0 where it is scaled from other cells
 
 
 @dataclass(frozen=True, repr=False)
 class Price:
-    """Cost of a campaign.
+    """Cost of a campaign."""
 
-    Attributes
-    ----------
-    tasks, done : int
-        Tasks of the campaign or part, and those of them that have a result.
-    cells : tuple of CellPrice
-    longest : float
-        Estimated CPU time of the longest task, or of the longest set of tasks that share a loading
-        branch, in s.
-    file_bytes, rank_bytes : int
-        Of the results file; of one rank's memory, as this process has had it.
-    pilots : int
-        Loops that were computed to find out.
-    pilot_seconds : float
-        Their CPU time.
-    stop : str
-        With ``[stop]``: for how many realisations a cell the price is, and why.
-    """
-
+    # tasks, done: tasks of the campaign or part, and those of them that have a result
     tasks: int
     done: int
     cells: tuple[CellPrice, ...]
+    # Estimated CPU time of the longest task, or of the longest set of tasks that share a loading
+    # branch, in s
     longest: float
+    # file_bytes, rank_bytes: of the results file; of one rank's memory, as this process has had it
     file_bytes: int
     rank_bytes: int
-    pilots: int
-    pilot_seconds: float
-    stop: str = ""
+    pilots: int  # loops that were computed to find out
+    pilot_seconds: float  # their CPU time
+    stop: str = ""  # with ``[stop]``: for how many realisations a cell the price is, and why
 
     def __str__(self) -> str:
         """Return the lines of ``adhesis run --dry-run``."""

@@ -104,17 +104,10 @@ class Uncertain:
 
 @dataclass(frozen=True)
 class Change:
-    """Change of the loss by one loop.
-
-    Attributes
-    ----------
-    run : Run
-    factor : float
-        Its loss over that of the loop with which it is compared; 0 if it loses nothing.
-    """
+    """Change of the loss by one loop."""
 
     run: Run
-    factor: float
+    factor: float  # its loss over that of the loop with which it is compared; 0 if it loses nothing
 
     @property
     def size(self) -> float:

@@ -55,26 +55,16 @@ class Run:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(ByValue):
-    """Runs, jobs and expected cost.
-
-    Attributes
-    ----------
-    seconds : dict
-        Expected CPU seconds by run.
-    waves, patches : int
-        Number of waves of the answer's loop, and expected number of patches.
-    wall : float
-        Expected wall seconds on this machine's cores.
-    hints : tuple of str
-    """
+    """Runs, jobs and expected cost."""
 
     runs: tuple[Run, ...]
     jobs: tuple[Job, ...]
-    seconds: dict[str, float]
+    seconds: dict[str, float]  # expected CPU seconds by run
+    # waves, patches: number of waves of the answer's loop, and expected number of patches
     waves: int
     patches: int
     processes: int
-    wall: float
+    wall: float  # expected wall seconds on this machine's cores
     hints: tuple[str, ...]
 
     @property

@@ -18,34 +18,18 @@ from adhesis.ensemble.report.paper import PaperFigure
 
 @dataclass(frozen=True)
 class Illustration:
-    """One figure of the report.
+    """One figure of the report."""
 
-    Attributes
-    ----------
-    name : str
-        Stem of its files.
-    title : str
-    caption : str
-        What it shows, as a sentence or two.
-    draw : callable
-    of_paper : str
-        The figure or table of the paper that shows the same, if there is one.
-    beside_paper : callable, optional
-        Returns a sentence for the caption on what the paper shows there and the figure does not;
-        used where the campaign is the paper's.
-    whole : bool
-        Whether it draws all cells, and not those of :attr:`Aggregate.shown`.
-    is_worth : callable
-        Returns whether there is something to see: more than one point, or fields.
-    """
-
-    name: str
+    name: str  # stem of its files
     title: str
-    caption: str
+    caption: str  # what it shows, as a sentence or two
     draw: Callable[[Aggregate], PublishedFigure]
-    of_paper: str = ""
+    of_paper: str = ""  # the figure or table of the paper that shows the same, if there is one
+    # Returns a sentence for the caption on what the paper shows there and the figure does not; used
+    # where the campaign is the paper's
     beside_paper: Callable[[Aggregate], str] | None = None
-    whole: bool = False
+    whole: bool = False  # whether it draws all cells, and not those of :attr:`Aggregate.shown`
+    # Returns whether there is something to see: more than one point, or fields
     is_worth: Callable[[Aggregate], bool] = lambda data: True
 
 

@@ -145,13 +145,9 @@ class PublishedFigure(Figure):
 
     Also when it is saved outside of :func:`style`: publishers refuse the Type 3 fonts that
     matplotlib writes by default.
-
-    Attributes
-    ----------
-    given : tuple of Axes
-        Those of :func:`drawn_into`, which take the place of its first panels.
     """
 
+    # Those of :func:`drawn_into`, which take the place of its first panels
     given: tuple[Axes, ...] = ()
 
     @property

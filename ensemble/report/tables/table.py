@@ -43,30 +43,14 @@ def fixed(digits: int) -> Format:
 
 @dataclass(frozen=True)
 class TableColumn:
-    """One column of a table.
+    """One column of a table."""
 
-    Attributes
-    ----------
-    name : str
-        In the CSV file, with its unit in brackets unless dimensionless.
-    value : callable
-        Takes its value from what a row is about.
-    heading : str
-        For people; empty if the column is for the CSV file only.
-    show : callable
-        Turns a value into text.
-    only_if_any : bool
-        For people only if a row has a value that is not zero.
-    last : bool
-        For people behind the others.
-    """
-
-    name: str
-    value: Callable[[Any], Value]
-    heading: str = ""
-    show: Format = plain
-    only_if_any: bool = False
-    last: bool = False
+    name: str  # in the CSV file, with its unit in brackets unless dimensionless
+    value: Callable[[Any], Value]  # takes its value from what a row is about
+    heading: str = ""  # for people; empty if the column is for the CSV file only
+    show: Format = plain  # turns a value into text
+    only_if_any: bool = False  # for people only if a row has a value that is not zero
+    last: bool = False  # for people behind the others
 
 
 @dataclass(frozen=True)

@@ -52,18 +52,10 @@ _OTHER_TEXTS = {
 
 @dataclass(frozen=True)
 class Source:
-    """A file of measurements, or what a stream held.
+    """A file of measurements, or what a stream held."""
 
-    Attributes
-    ----------
-    name : str
-        In messages; its ending may decide the format.
-    content : bytes or None
-        Of a stream; None for a file, whose name is its path.
-    """
-
-    name: str
-    content: bytes | None = None
+    name: str  # in messages; its ending may decide the format
+    content: bytes | None = None  # of a stream; None for a file, whose name is its path
 
     def __str__(self) -> str:
         return self.name

@@ -62,32 +62,17 @@ _NAME_AND_UNIT = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The numbers of a text file.
+    """The numbers of a text file."""
 
-    Attributes
-    ----------
-    columns : array, shape (k, n)
-        NaN where a number is missing.
-    filled : tuple of int
-        Columns that are not empty from top to bottom.
-    header : tuple of str
-        Lines before the numbers, without their comment signs.
-    fields : tuple of tuple of str
-        Those header lines that have as many fields as the numbers, split up.
-    lines : int array, shape (n,)
-        Line of the file that each row stands on, from 1.
-    delimiter, decimal : str
-    empty_lines : tuple of int
-        Lines of a single column that are empty, each a missing height.
-    """
-
-    columns: Array
-    filled: tuple[int, ...]
-    header: tuple[str, ...]
+    columns: Array  # shape (k, n); NaN where a number is missing
+    filled: tuple[int, ...]  # columns that are not empty from top to bottom
+    header: tuple[str, ...]  # lines before the numbers, without their comment signs
+    # Those header lines that have as many fields as the numbers, split up
     fields: tuple[tuple[str, ...], ...]
-    lines: Array
+    lines: Array  # shape (n,); line of the file that each row stands on, from 1
     delimiter: str
     decimal: str
+    # Lines of a single column that are empty, each a missing height
     empty_lines: tuple[int, ...] = ()
 
     @property
