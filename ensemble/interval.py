@@ -35,17 +35,9 @@ def interval_method(n: int) -> str:
 
 
 def interval(values: ArrayLike) -> tuple[Array, Array]:
-    """Interval of the mean over the last axis.
+    """Return low and high ends of the interval of the mean over the last axis of finite values.
 
-    Parameters
-    ----------
-    values : array, shape (…, n)
-        Finite.
-
-    Returns
-    -------
-    low, high : array, shape (…)
-        NaN for n < 2; both the mean where all values are equal.
+    NaN for fewer than two values; both the mean where all values are equal.
     """
     values = np.asarray(values, dtype=np.float64)
     n = values.shape[-1]

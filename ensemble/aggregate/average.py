@@ -134,10 +134,7 @@ class Aggregate:
 def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     """Average a results file over realisations; ``beside`` are files to compare with it.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read, is no results file, or holds no finished task.
+    InputError if a file cannot be read, is no results file, or holds no finished task.
     """
     with Results(path) as results:
         status = results.status()

@@ -121,13 +121,7 @@ class Cell:
 
 
 def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
-    """Read every cell, by H, then γ, then further axes, ascending; without curves.
-
-    Raises
-    ------
-    InputError
-        If no task is finished.
-    """
+    """Read every cell by H, γ, further axes, ascending; InputError if no task is finished."""
     if not np.any(status == DONE):
         damaged = results.damaged().size
         raise InputError(

@@ -65,13 +65,7 @@ class LossDifference:
 
 
 def read_companion(path: Path | str, campaign: Campaign) -> Companion:
-    """Read another results file and the keys in which its campaign differs.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no results file, or holds no finished task.
-    """
+    """Read another results file and the keys in which its campaign differs (InputError)."""
     with Results(path) as results:
         other, cells = results.campaign, read_cells(results, results.status())
         doubts = results.doubts()

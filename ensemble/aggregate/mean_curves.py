@@ -33,22 +33,10 @@ def average_curves(
     rows: Sequence[NDArray[np.intp]],
     scales: Mapping[str, Sequence[Array]],
 ) -> dict[str, list[Curve]]:
-    """Average the dataset ``branch_name`` over the rows of every cell.
+    """Average the dataset ``branch_name`` over the rows of every cell; NaN for a cell without rows.
 
-    Parameters
-    ----------
-    results : Results
-    branch : {"loading", "unloading"}
-    name : str
-    rows : sequence of int array
-        Rows of each cell.
-    scales : mapping of sequences of array
-        Curves to make of the dataset; one array for each cell, with the factor of each row.
-
-    Returns
-    -------
-    dict of lists
-        For every curve in ``scales`` one :class:`Curve` for each cell; NaN where it has no rows.
+    ``scales`` holds, by curve to make of the dataset, one array for each cell: the factor of each
+    row.
     """
     points = results.column(f"{branch}_penetration").size
     done = np.sort(np.concatenate(rows))

@@ -95,16 +95,10 @@ def benchmark(
     seconds: float = 360.0,
     on_line: Callable[[Line], None] | None = None,
 ) -> list[Line]:
-    """Measure the methods on the scenes.
+    """Measure the methods on the scenes; ``on_line`` is called with every line when it is measured.
 
-    Parameters
-    ----------
-    scenes : sequence of Scene
-    seconds : float
-        CPU seconds after which a run is given up. A grid that would take longer, estimated from the
-        one before it, is left out. Both give lines with a note.
-    on_line : callable, optional
-        Called with every line after it is measured.
+    A run is given up after so many CPU seconds. A grid that would take longer, estimated from the
+    one before it, is left out. Both give lines with a note.
     """
     lines: list[Line] = []
     _fill_caches()

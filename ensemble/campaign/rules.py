@@ -24,13 +24,7 @@ class Rule:
     bounds: Bounds | None = None  # of the number, or of each one of a list
 
     def __call__(self, where: str, value: object) -> Any:
-        """Return the value as it will be used.
-
-        Raises
-        ------
-        InputError
-            "WHERE is VALUE: it must be RULE".
-        """
+        """Return the value as it will be used; InputError "WHERE is VALUE: it must be RULE"."""
         try:
             return self.read(value)
         except UnitError as error:

@@ -316,13 +316,8 @@ class Campaign:
     """A checked campaign. Built by :mod:`adhesis.ensemble.campaign.file`.
 
     Equal if they mean the same; ``text`` is the TOML as it was written. Where a key of the profile,
-    material or cycle is a list, its table holds the smallest value, and :meth:`at` gives the
-    campaign with the values of a task.
-
-    Attributes
-    ----------
-    lists : tuple
-        The other axes than H and γ, as they were given: (table, name, values).
+    material or cycle is a list, its table holds the smallest value, ``lists`` all of them as given
+    (table, name, values), and :meth:`at` gives the campaign with the values of a task.
     """
 
     profile: ProfileTable

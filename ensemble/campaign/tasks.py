@@ -136,12 +136,7 @@ class Part:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the part that "3/20" names.
-
-        Raises
-        ------
-        InputError
-        """
+        """Return the part that "3/20" names (InputError)."""
         match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text.strip())
         if match and 1 <= int(match[1]) <= int(match[2]):
             return cls(int(match[1]), int(match[2]))

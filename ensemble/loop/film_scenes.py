@@ -55,22 +55,10 @@ def scenes_of(
     frames: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Scenes:
-    """Compute the frames of a result.
+    """Compute the frames of a result: evenly spaced ones, and on top those of jumps.
 
-    Parameters
-    ----------
-    result : LoopResult or PathResult
-    frames : int
-        Evenly spaced along the path; those of jumps come on top, up to :data:`MOST_FRAMES`.
-    progress : callable, optional
-        Called with the number of frames that are done and that of all.
-
-    Raises
-    ------
-    ValueError
-        If ``frames`` is out of range, or the result holds no contact states.
-    TypeError
-        If ``frames`` is no whole number, or ``progress`` no function.
+    ``progress`` is called with the numbers of frames done and in all. ValueError if ``frames`` is
+    out of range, or the result holds no contact states.
     """
     frames = whole("frames", frames, _FRAMES)
     function("progress", progress)

@@ -29,20 +29,10 @@ from adhesis.solver.model.profile import Array, Profile
 
 
 def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) -> Figure:
-    """Draw loops that share their loading branch, or one path.
+    """Draw loops of ascending turning points that share their loading branch, or one path.
 
-    Parameters
-    ----------
-    results : sequence of LoopResult, ascending turning points; or PathResult
-    ax : Axes or sequence of Axes, optional
-        One for the mean stress, or two for mean stress and contact fraction.
-
-    Raises
-    ------
-    TypeError
-        If ``ax`` is neither.
-    ValueError
-        If it holds more than two.
+    ``ax`` is one Axes for the mean stress, or two for mean stress and contact fraction (TypeError,
+    ValueError).
     """
     with drawn_into(ax):
         figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)

@@ -231,12 +231,7 @@ def _state_at(
 def fields_at_stresses(loop: LoopResult, stresses: Sequence[float], n: int) -> dict[str, Any]:
     """Return the fields on n nodes at mean stresses in Pa, as :func:`fields_at_penetrations`.
 
-    A branch that does not have a mean stress is left out.
-
-    Raises
-    ------
-    InputError
-        If neither branch has it.
+    A branch that does not have a mean stress is left out; InputError if neither branch has it.
     """
     found: list[FieldsOfState] = []
     absent = dict.fromkeys(stresses, 0)

@@ -19,27 +19,11 @@ def write_report(
     beside: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda part: None,
 ) -> Aggregate:
-    """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``; print.
+    """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``.
 
-    Parameters
-    ----------
-    path : path
-        The results file, finished or not.
-    directory : path
-        Made if missing; files of the same names are replaced.
-    stream : text stream, optional
-        Where the tables go; standard output by default.
-    beside : sequence of path
-        Results files of other campaigns to compare with.
-    progress : callable
-        Called with the name of each part of the report before it is made.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to report.
-    WriteError
-        If the directory cannot be written; what was there is left as it was.
+    ``beside`` are results files to compare with; tables are printed to ``stream``. ``progress`` is
+    called with the name of each part before it is made. InputError if there is nothing to report,
+    WriteError if the directory cannot be written; what was there is left as it was.
     """
     progress("averages")
     data = aggregate(path, beside)

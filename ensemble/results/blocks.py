@@ -25,13 +25,9 @@ def row_blocks(rows: int, width: int) -> Iterator[slice]:
 def column_blocks(
     results: Results, name: str, rows: NDArray[np.intp], points: int
 ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-    """Values of ascending ``rows`` of a dataset (task × points), a few columns at a time.
+    """Yield the values of ascending ``rows`` of a dataset (task × points), a few columns at a time.
 
-    Yields
-    ------
-    columns : slice
-    values : array, shape (rows, columns)
-        At most :data:`HELD_AT_ONCE` numbers, at least one column.
+    At most :data:`HELD_AT_ONCE` numbers, at least one column.
     """
     width = max(1, min(points, HELD_AT_ONCE // max(1, rows.size)))
     for start in range(0, points, width):

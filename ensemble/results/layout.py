@@ -78,26 +78,10 @@ def create(
 ) -> None:
     """Lay out a results file at full size, by one process; all or nothing.
 
-    Signals are held back meanwhile: h5py would drop what their handlers raise.
-
-    Parameters
-    ----------
-    path : path
-        Replaced if it exists; of a symbolic link, the file that it leads to.
-    campaign : Campaign
-    part : Part, optional
-        Rows to lay out, if not all.
-    versions : mapping of str, optional
-        Root attributes with the versions of what computes (``mpi``, ``hdf5``, ``fftw``, …).
-    grown_from : Results, optional
-        An older file of a campaign that this one extends; its rows are copied.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written or the disk is too small.
-    WriteError
-        If the disk does not take it.
+    It is replaced if it exists; of a symbolic link, the file that it leads to. Of ``grown_from``, a
+    file of a campaign that this one extends, the rows are copied. Signals are held back meanwhile:
+    h5py would drop what their handlers raise. InputError if the file cannot be written or the disk
+    is too small, WriteError if the disk does not take it.
     """
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")

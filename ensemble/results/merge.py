@@ -87,21 +87,10 @@ class _Source:
 def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
     """Take over the finished rows of several results files of one campaign.
 
-    Parameters
-    ----------
-    parts : sequence of path
-        Parts of the campaign, or whole files of it, finished or not.
-    out : path
-        Made if it does not exist; else a file of the same campaign, or of one that grew from it.
-        The caller holds its lock.
-
-    Raises
-    ------
-    InputError
-        Before anything is written, if a file is damaged or foreign, or if two hold a row with
-        different bits.
-    WriteError
-        If the disk does not take it; the same merge goes on.
+    ``out`` is made, or is a file of the same campaign, or of one that grew from it; the caller
+    holds its lock. InputError before anything is written, if a file is damaged or foreign, or if
+    two hold a row with different bits; WriteError if the disk does not take it: the same merge goes
+    on.
     """
     out = Path(out)
     with ExitStack() as stack:

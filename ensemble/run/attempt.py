@@ -51,21 +51,8 @@ def attempt(
 ) -> Outcome:
     """Compute one task; failures become part of the outcome.
 
-    Parameters
-    ----------
-    compute : callable
-    task, rank : int
-    stop : callable
-        Takes the note of the task's last check, or None; returns whether to give it up.
-    limit : float, optional
-        Longest time of the task, in s.
-
-    Raises
-    ------
-    GivenUp
-        If ``stop`` returned True while it ran.
-    Exception
-        One that the handler of a signal raised meanwhile.
+    ``stop`` takes the note of the task's last check, or None, and returns whether to give it up:
+    GivenUp is then raised. ``limit`` is in s. What the handler of a signal raises meanwhile passes.
     """
     started = time.perf_counter()
     end = started + (math.inf if limit is None else limit)

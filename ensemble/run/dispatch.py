@@ -133,17 +133,10 @@ class Master:
         return sum(len(tasks) for tasks in self._sent.values())
 
     def run(self) -> str | None:
-        """Hand out until nothing waits and everything is answered.
+        """Hand out until everything is answered; return why it stopped early, or None.
 
-        Returns
-        -------
-        str or None
-            Why it stopped early.
-
-        Raises
-        ------
-        Unresponsive
-            If a worker was silent for too long, or did not answer a stop within the grace time.
+        Unresponsive if a worker was silent for too long, or did not answer a stop within the grace
+        time.
         """
         pause = SHORTEST_PAUSE
         self._consider_stopping()
@@ -350,11 +343,6 @@ class OwnWorker:
     """Channel of a master whose own process works: on a task each time it looks for a message.
 
     Both ends of it are this object: the worker alone looks for urgent messages.
-
-    Parameters
-    ----------
-    compute, deliver : callable
-    limits : Limits
     """
 
     def __init__(self, compute: Compute, deliver: Deliver, limits: Limits) -> None:

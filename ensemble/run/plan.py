@@ -40,12 +40,7 @@ class Selection:
     values: Mapping[str, Collection[float]] = field(default_factory=dict)
 
     def check(self, tasks: Sequence[Task]) -> None:
-        """Refuse values that the campaign does not have.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse values that the campaign does not have (InputError)."""
         for name, chosen in self.values.items():
             known = {getattr(task, name) for task in tasks}
             for value in chosen:
@@ -92,31 +87,9 @@ def prepare(
 ) -> Plan:
     """Lock, check everything, make or extend the file, and find what is to be done; by rank 0.
 
-    Only tasks that are to be computed are checked, as that loads the solver.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    path : path
-        The results file.
-    lock : RunLock
-        Taken here.
-    size : int
-        Ranks of the run.
-    part : Part, optional
-        The share of the tasks to compute, if not all.
-    redo : Selection, optional
-        Rows to compute again.
-    patience : float
-        How long to wait for another run to let go of the file, in s.
-    say : callable
-        Gets a line about what was found.
-    check : callable
-        Raises InputError if a task cannot be set up.
-
-    Raises
-    ------
-    InputError
+    Only tasks that are to be computed are checked, as that loads the solver. ``size`` is the number
+    of ranks; ``patience`` how long to wait for another run, in s; ``say`` gets a line about what
+    was found; ``check`` raises InputError if a task cannot be set up.
     """
     tasks = campaign.tasks(part)
     if part != WHOLE and campaign.stop.relative_error is not None:

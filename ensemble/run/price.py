@@ -140,30 +140,11 @@ def price(
     """Estimate what a campaign costs; writes nothing.
 
     Cells of which loops are done in the results file cost what those did. Of the others loops are
-    tried out, the first realisation of each, then the second …, until the time is up; what was not
+    tried out for ``seconds``, the first realisation of each, then the second …; what was not
     reached is extrapolated by how the tasks of such cells usually compare. Loops that share a
-    loading branch are tried out together.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    path : path, optional
-        Its results file, if there is one.
-    part : Part, optional
-    seconds : float
-        How long loops are tried out.
-    compute : callable, optional
-        Computes a task.
-    prepare : callable
-        Called with the first task still to do of each cell, if there are any, before one is tried
-        out.
-    on_pilot : callable
-        Called after each loop that was tried out, with its CPU time in s.
-
-    Raises
-    ------
-    InputError
-        If the results file is damaged, or holds another campaign.
+    loading branch are tried out together. ``prepare`` is called with the first task still to do of
+    each cell before one is tried out, ``on_pilot`` after each loop with its CPU time in s.
+    InputError if the results file is damaged, or holds another campaign.
     """
     compute = compute or Runner()
     tasks = campaign.tasks(part)

@@ -45,15 +45,9 @@ def _interval(elapsed: float) -> float:
 
 
 class ProgressLine(StatusLine):
-    """Report the progress of a run, on rank 0.
+    """Report the progress of a run, on rank 0, from counts that the run keeps up to date.
 
-    Parameters
-    ----------
-    counts : Counts
-        Kept up to date by the run.
-    time_left : callable
-        Estimated seconds until the end, or None while nothing is known.
-    stream : text stream
+    ``time_left`` returns the estimated seconds until the end, or None while nothing is known.
     """
 
     def __init__(

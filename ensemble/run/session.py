@@ -105,30 +105,15 @@ def run_campaign(
 ) -> Summary:
     """Compute what is missing of a campaign in its results file.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    path : path
-        The results file; made, resumed or extended as it is found.
-    comm : MPI communicator, optional
-        Called on every rank of it: rank 0 hands out, the others compute. Without it, or with one
-        rank, this process computes, or hands out to processes that it starts.
-    options : Options, optional
-    say : callable
-        Gets a line about what was found and what will be done, on rank 0.
-    engine : Engine, optional
-        Loops into a results file, if not given.
-    stream : text stream, optional
-        Where progress is reported; stderr, if not given.
+    The file is made, resumed or extended. Called on every rank of ``comm``: rank 0 hands out, the
+    others compute. Without it, or with one rank, this process computes, or hands out to processes
+    that it starts. ``say`` gets a line about what was found and what will be done, on rank 0;
+    progress goes to ``stream``, or stderr.
 
-    Raises
-    ------
-    InputError
-        On every rank, before any work, if the campaign cannot be computed or the file is foreign,
-        damaged, of another campaign, in use or not writable.
-    adhesis.ensemble.run.dispatch.Unresponsive
-        On rank 0, if a worker does not answer; the results file is sound. The other ranks wait:
-        the caller has to end the job.
+    InputError on every rank, before any work, if the campaign cannot be computed or the file is
+    foreign, damaged, of another campaign, in use or not writable. Unresponsive on rank 0, if a
+    worker does not answer; the results file is sound. The other ranks wait: the caller has to end
+    the job.
     """
     options, engine = options or Options(), engine or Engine()
     path = target_of(path)

@@ -23,13 +23,7 @@ from adhesis.solver.registry import make_method
 
 
 def make_problem(campaign: Campaign, task: Task) -> Problem:
-    """Build the profile, half-space and work of adhesion of a task.
-
-    Raises
-    ------
-    ValueError
-        If no such problem exists.
-    """
+    """Build the profile, half-space and work of adhesion of a task (ValueError)."""
     campaign = campaign.at(task)
     table = campaign.profile
     profile = self_affine_profile(
@@ -62,13 +56,7 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
 
 
 def check_task(campaign: Campaign, task: Task) -> None:
-    """Check that a task can be set up, before any work.
-
-    Raises
-    ------
-    InputError
-        If it cannot; the message is the solver's.
-    """
+    """Raise InputError, with the solver's message, if a task cannot be set up."""
     try:
         _make_method(campaign, task)
     except (ValueError, NotImplementedError, ArithmeticError) as error:

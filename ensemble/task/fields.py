@@ -114,11 +114,7 @@ class FieldPlan:
 def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale, ...]:
     """Return the dimensions of the datasets of fields.
 
-    Parameters
-    ----------
-    plan : FieldPlan
-    several : collection of str
-        Keys that have several values; lengths are then in units of these.
+    Lengths are in units of the keys that have ``several`` values.
     """
     if "period" in several:
         waves = Scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
@@ -216,13 +212,7 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
 class FieldRecorder:
     """Recorder of the fields of one loop; :meth:`on_state` is passed to ``run_loop``.
 
-    Parameters
-    ----------
-    plan : FieldPlan
-    method : Method
-        The one that runs the loop.
-    keep : bool
-        Whether the fields themselves are stored.
+    ``keep`` is whether the fields themselves are stored.
     """
 
     def __init__(self, plan: FieldPlan, method: Method, keep: bool) -> None:

@@ -211,16 +211,9 @@ def row_of(
 ) -> Row:
     """Return the row of a loop, without its times and fields.
 
-    Parameters
-    ----------
-    loop : LoopResult
-    sizes : mapping of int
-        Lengths of the dimensions of :func:`row_scales`. Curves are zero after detachment and cut
-        where their axis ends; of more jumps than the catalogue holds those with the largest drops
-        are kept, in the order of the path.
-    axes : mapping of arrays, optional
-        Penetrations (:meth:`adhesis.solver.loading.loop_result.LoopResult.at`) of the curves of
-        each branch, where these are not the loop's load steps.
+    Curves are zero after detachment and cut where their axis ends; of more jumps than the catalogue
+    holds those with the largest drops are kept, in the order of the path. ``axes`` are the
+    penetrations of the curves of each branch, where these are not the loop's load steps.
     """
     row: Row = {d.name: d.value(loop) for d in (*NUMBERS, JUMP_COUNT) if d.value is not None}
     for branch, curves in CURVES.items():

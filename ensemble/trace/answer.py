@@ -417,13 +417,7 @@ def make_cycle(
     latest: float | None = None,
     work_of_adhesion_open: float | None = None,
 ) -> Cycle:
-    """Make contact and cycle, with the values of both tables.
-
-    Raises
-    ------
-    TypeError, ValueError
-        What the solver would refuse of them.
-    """
+    """Make contact and cycle, with the values of both tables (TypeError, ValueError)."""
     checks.choice("method", method, METHOD_NAMES)
     checks.real("accuracy", accuracy, checks.ACCURACY)
     control = control or Control()

@@ -74,16 +74,9 @@ def excluding(begin: float, end: float) -> str:
 
 
 def single_features(level: Array, step: float, start: float) -> tuple[Feature, ...]:
-    """Find the single crests and troughs of level heights, by position.
+    """Find the single crests and troughs of level heights (m), by position.
 
-    Parameters
-    ----------
-    level : array, shape (n,)
-        In m.
-    step : float
-        In m.
-    start : float
-        Position of the first height in the trace, in m.
+    ``step`` is in m, ``start`` the position of the first height in the trace, in m.
     """
     found = []
     for sign in (1.0, -1.0):

@@ -84,14 +84,8 @@ def make_plan(
 ) -> Plan:
     """List the loops of an answer and estimate their cost; none is run.
 
-    Parameters
-    ----------
-    prepared : Prepared
-    cycle : Cycle
-    quick : bool
-        Leave out the tables against γ and turning point.
-    processes : int, optional
-        Number of processes side by side, 0 for this one alone; without it one a core.
+    ``quick`` leaves out the tables against γ and turning point; without ``processes`` one a core, 0
+    for this one alone.
     """
     processes = cores() if processes is None else processes
     runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]

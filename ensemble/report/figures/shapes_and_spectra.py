@@ -54,12 +54,7 @@ def shapes(data: Aggregate) -> PublishedFigure:
     """Fig. 3: rigid profile and elastic surface above it of one realisation on both branches.
 
     Heights are those of the profile: on a machine or under a load the two branches have different
-    separations at one prescribed value.
-
-    Raises
-    ------
-    ValueError
-        If no cell has kept its fields.
+    separations at one prescribed value. ValueError if no cell has kept its fields.
     """
     fields = data.fields
     kept = [cell for cell in data.cells if fields.shapes[data.cells.index(cell)] is not None]

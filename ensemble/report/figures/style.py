@@ -118,15 +118,8 @@ _given: ContextVar[tuple[Axes, ...]] = ContextVar("_given", default=())
 def drawn_into(ax: object) -> Iterator[None]:
     """Let the first panels of a figure be axes that a user gives, in the user's own style.
 
-    Parameters
-    ----------
-    ax : Axes or array of Axes, or None
-        Without them, all panels are the figure's, in the style of the product.
-
-    Raises
-    ------
-    TypeError
-        If it is anything else.
+    Without them, all panels are the figure's, in the style of the product. TypeError if ``ax`` is
+    neither None nor one or several Axes.
     """
     found = () if ax is None else np.ravel(np.array(ax, dtype=object))
     given = tuple(panel for panel in found if isinstance(panel, Axes))
@@ -179,13 +172,7 @@ class PublishedFigure(Figure):
 def new_figure(
     rows: int, columns: int, width: float, height: float, **options: Any
 ) -> PublishedFigure:
-    """Return a figure of the given width and height (inches) with a grid of panels.
-
-    Raises
-    ------
-    ValueError
-        If more axes are given than it has panels.
-    """
+    """Return a figure of this size (inches) with panels; ValueError for more given axes."""
     given = _given.get()
     if len(given) > rows * columns:
         raise ValueError(

@@ -91,13 +91,7 @@ class Source:
         return next((name for known, name in _OTHER_TEXTS.items() if known.match(begin)), None)
 
     def holds_zero_bytes(self) -> bool:
-        """Return whether there is a zero byte anywhere: a text has none.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read.
-        """
+        """Return whether there is a zero byte anywhere: a text has none (InputError)."""
         try:
             with self.open() as stream:
                 return any(b"\0" in block for block in iter(lambda: stream.read(_BLOCK), b""))
@@ -109,13 +103,7 @@ class Source:
         return open_regular(self.name) if self.content is None else io.BytesIO(self.content)
 
     def read(self) -> bytes:
-        """Return its whole content.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read, or is too large for a text.
-        """
+        """Return its whole content; InputError if it cannot be read, or is too large for a text."""
         try:
             size = os.stat(self.name).st_size if self.content is None else len(self.content)
             if size > MOST_BYTES:
@@ -130,11 +118,8 @@ class Source:
     def beginning(self) -> bytes:
         """Return its first bytes.
 
-        Raises
-        ------
-        InputError
-            If it is missing, no regular file, unreadable, empty, or has to be unpacked or exported
-            first.
+        InputError if it is missing, no regular file, unreadable, empty, or has to be unpacked or
+        exported first.
         """
         try:
             if self.content is None:
@@ -185,13 +170,7 @@ def _of_workbook(source: Source) -> str:
 
 
 def source_of(given: Any) -> Source:
-    """Return the source of a path, or of an open file or other stream, which is read to its end.
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
-    """
+    """Return the source of a path, or of a stream, read to its end (TypeError)."""
     if isinstance(given, str | os.PathLike):
         return Source(str(checks.path("source", given)))
     if not hasattr(given, "read"):

@@ -86,23 +86,14 @@ class Table:
 def read_table(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
     """Read a text of numbers in columns, whatever its header, delimiter and decimal sign.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no text, holds no columns of numbers or several blocks of
-        them, or can be read in two ways; the sentence says which line, and what would settle it.
+    InputError if the file cannot be read, is no text, holds no columns of numbers or several blocks
+    of them, or can be read in two ways; the sentence says which line, and what would settle it.
     """
     return _table(source, _lines(source), delimiter, decimal)
 
 
 def read_column(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
-    """Read a text of one column, as :func:`read_table` does; its numbers may stand in one row.
-
-    Raises
-    ------
-    InputError
-        As :func:`read_table`.
-    """
+    """Read a text of one column, as :func:`read_table` does; its numbers may stand in one row."""
     lines = _lines(source)
     rows = [place for place, line in enumerate(lines) if looks_like_numbers(line)]
     if len(rows) == 1:
@@ -416,17 +407,9 @@ def _refuse_parts(
 
 
 def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tuple[str, ...]:
-    """Fields of a line of the header, which need not be set apart as the numbers are.
+    """Split a line of the header into fields, which need not be set apart as the numbers are.
 
-    Parameters
-    ----------
-    line : str
-    delimiter : str
-        That of the numbers.
-    count : int
-        Number of columns, with those that are empty.
-    filled : sequence of int
-        Columns that are not empty.
+    ``count`` is the number of columns, ``filled`` are those that are not empty.
     """
     fields = _split_names(line, delimiter)
     while fields and not fields[-1]:
