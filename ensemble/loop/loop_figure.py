@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
-    LOOKS,
     MM,
     TWO_COLUMNS,
+    colour,
     drawn_into,
     new_figure,
     style,
@@ -63,10 +63,9 @@ def _plot(panels: Sequence[Axes], x: Array, stress: Array, contact: Array, **opt
 def _draw_path(panels: Sequence[Axes], path: PathResult) -> None:
     for leg in range(int(path.leg.max()) + 1):
         rows = path.leg == leg
-        look = LOOKS[leg % len(LOOKS)]
         branch = str(path.branch[rows][0])
         label = f"leg {leg + 1}, {branch}"
-        options = {"color": look.colour, "ls": LINE_OF_BRANCH[branch], "label": label}
+        options = {"color": colour(leg), "ls": LINE_OF_BRANCH[branch], "label": label}
         _plot(panels, *_curve(path, rows), **options)
 
 
@@ -78,9 +77,8 @@ def _draw_each(panels: Sequence[Axes], loops: Sequence[LoopResult]) -> None:
     deepest = loops[-1]
     for k, loop in enumerate(loops):
         rows = loop.states("unloading")
-        colour = LOOKS[k % len(LOOKS)].colour
         label = f"unloading from {loop.penetration[rows[0]]:.3g}"
-        options = {"color": colour, "ls": LINE_OF_BRANCH["unloading"], "label": label}
+        options = {"color": colour(k), "ls": LINE_OF_BRANCH["unloading"], "label": label}
         _plot(panels, *_curve(loop, rows), **options)
     rows = deepest.states("loading")
     options = {"color": "k", "ls": LINE_OF_BRANCH["loading"], "label": "loading"}

@@ -67,7 +67,7 @@ def _write_files(
         along_axes,
     )
     from adhesis.ensemble.report.figures.loss_figures import of_penetration
-    from adhesis.ensemble.report.figures.style import save, say_below, style
+    from adhesis.ensemble.report.figures.style import save, style
     from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
@@ -102,7 +102,7 @@ def _write_files(
         with style():
             figure = item.draw(data if item.whole else data.shown)
             if not item.whole:
-                say_below(figure, below(data, common(data.shown)))
+                figure.say_below(below(data, common(data.shown)))
         save(figure, directory / item.name)
     progress("pages")
     page = write_page(data, sections)

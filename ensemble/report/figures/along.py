@@ -20,12 +20,8 @@ from adhesis.ensemble.report.figures.style import (
     PublishedFigure,
     gamma_label,
     label_panel,
-    legend_above,
     new_figure,
-    panels,
-    say_below,
     spread_out,
-    with_x_label,
 )
 from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, symbols, together
 
@@ -53,11 +49,7 @@ def with_figure(data: Aggregate) -> list[Axis]:
 
 def along(axis: Axis) -> Callable[[Aggregate], PublishedFigure]:
     """Return the function that draws the figure of one axis."""
-
-    def loss_along(data: Aggregate) -> PublishedFigure:
-        return _draw(data, axis)
-
-    return loss_along
+    return lambda data: _draw(data, axis)
 
 
 def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
@@ -66,7 +58,8 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
     With one more: a column for each (H, γ), a line for each of its values. Else a column for each
     H, a line for each γ.
     """
-    second = _second_axis(data, axis)
+    moving = together(data, axis)
+    second = next((other for other in data.further if other.name not in moving), None)
     fixed, lines = _lines(data, axis, second)
     titles = list(dict.fromkeys(title for title, _ in lines))
     titles = [titles[round(k)] for k in spread_out(range(len(titles)), MOST_PANELS)]
@@ -78,7 +71,7 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
     figure = new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
     low, high = min(axis.values), max(axis.values)
     logarithmic = low > 0 and high > _LOG_FROM * low
-    grid = panels(figure, len(rows), len(titles))
+    grid = figure.rows
     axis_text, axis_unit = axis_label(axis)
     for row, (name, label, unit) in zip(grid, rows, strict=True):
         for axes, title in zip(row, titles, strict=True):
@@ -102,23 +95,17 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
     for axes, title in zip(grid[0], titles, strict=True):
         label_panel(axes, title)
     ticks = [value / axis_unit for value in axis.values]
-    for axes in with_x_label(figure, len(titles), len(rows) * len(titles)):
-        axes.set_xlabel(axis_text)
+    figure.label(axis_text)
+    for axes in (*grid[-1], *figure.given):
         if logarithmic:
             axes.set_xscale("log")
         elif len(ticks) <= _MOST_TICKS:
             axes.set_xticks(ticks)
     handles, texts = grid[0][0].get_legend_handles_labels()
     if any(texts):
-        legend_above(figure, handles, 3 if second is None else 2)
-    say_below(figure, below(data, fixed))
+        figure.legend_above(handles, 3 if second is None else 2)
+    figure.say_below(below(data, fixed))
     return figure
-
-
-def _second_axis(data: Aggregate, axis: Axis) -> Axis | None:
-    """Return the further axis whose values are the lines of a figure along another one."""
-    moving = together(data, axis)
-    return next((other for other in data.further if other.name not in moving), None)
 
 
 def _lines(
