@@ -26,11 +26,12 @@ from adhesis.solver.model.profile import Array
 Rows = NDArray[np.intp]
 
 _PER_TASK = tuple(dataset.name for dataset in (*TIMES, *NUMBERS, JUMP_COUNT))
+RANGES = ("valid_range", "edge_range", "touch_range")
 # Of these the least or the largest of a cell counts, as a range or a strength may be infinite; or
 # they belong to the place of one tension.
 _NOT_AVERAGED = frozenset(
     (
-        *("valid_range", "edge_range", "touch_range", "opening_strength"),
+        *(*RANGES, "opening_strength"),
         *("largest_interior_tension", "interior_tension_position", "interior_tension_penetration"),
     )
 )
@@ -96,9 +97,7 @@ class Cell:
     @property
     def least_range(self) -> Array:
         """Least of the three ranges of adhesion of each done task, in m, shape (done,)."""
-        return least_range(
-            *(self.values[name] for name in ("valid_range", "edge_range", "touch_range"))
-        )
+        return least_range(*(self.values[name] for name in RANGES))
 
     @property
     def doubtful(self) -> NDArray[np.bool_]:

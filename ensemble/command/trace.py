@@ -62,7 +62,7 @@ def execute(args: argparse.Namespace) -> int:
     except NoAnswer as error:
         print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
         return 1
-    from adhesis.ensemble.trace.trace_page import summary, write_page
+    from adhesis.ensemble.trace.trace_page import trace_summary, write_page
 
     writing = Writing()
     with writing.output("--to", args.to / "trace.json"):
@@ -75,7 +75,7 @@ def execute(args: argparse.Namespace) -> int:
         staged_folder(args.to, FIGURE_FILES) as folder,
     ):
         write_page(answer, folder)
-    print(summary(answer))
+    print(trace_summary(answer))
     if not writing.failures:
         print(f"wrote       {args.to / 'trace.html'}, trace.md, trace.json and the figures")
     writing.finish()

@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,25 +59,15 @@ def film(
     return made
 
 
-def to_dataframe(result: Result, of: str) -> Any:
-    """Return states or jumps as a table; see :meth:`adhesis.LoopResult.to_dataframe`."""
-    from adhesis.ensemble.loop.saved import to_dataframe
-
-    return to_dataframe(result, of)
+# Made by other modules, and loaded when they are asked for.
+_ELSEWHERE = dict.fromkeys(("to_dataframe", "to_xarray", "save"), "adhesis.ensemble.loop.saved")
+_ELSEWHERE["trace_summary"] = "adhesis.ensemble.trace.trace_page"
 
 
-def to_xarray(result: Result) -> Any:
-    """Return a labelled dataset; see :meth:`adhesis.LoopResult.to_xarray`."""
-    from adhesis.ensemble.loop.saved import to_xarray
-
-    return to_xarray(result)
-
-
-def save(result: Result, path: str | os.PathLike[str]) -> None:
-    """Write a netCDF file; see :meth:`adhesis.LoopResult.save`."""
-    from adhesis.ensemble.loop.saved import save
-
-    save(result, path)
+def __getattr__(name: str) -> Any:
+    if name not in _ELSEWHERE:
+        raise AttributeError(name)
+    return getattr(import_module(_ELSEWHERE[name]), name)
 
 
 # ---------------------------------------------------------------------- in notebooks
@@ -91,13 +82,6 @@ def page(shown: Any) -> str:
         return table_of(_rows_of_result(shown)) + picture_of(plot(shown))
     figure = draw_shape(shown)
     return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))
-
-
-def trace_summary(answer: Answer) -> str:
-    """Return the summary of an answer as text."""
-    from adhesis.ensemble.trace.trace_page import summary
-
-    return summary(answer)
 
 
 def trace_page(answer: Answer) -> str:

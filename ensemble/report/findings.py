@@ -21,7 +21,7 @@ from adhesis.ensemble.report.further_axes import (
     short_of_preload,
     together,
 )
-from adhesis.ensemble.report.tables.loss_tables import least
+from adhesis.ensemble.report.tables.loss_tables import extreme
 from adhesis.ensemble.task.doubt import why_beyond
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
@@ -277,7 +277,8 @@ def _preload(data: Aggregate) -> list[str]:
 
 def _limit(data: Aggregate) -> list[str]:
     """Sentences on the ranges of adhesion below which the zero-range limit holds."""
-    found = [(value, cell) for cell in data.cells if (value := least(cell.least_range)) is not None]
+    ranges = ((extreme(np.min, cell.least_range), cell) for cell in data.cells)
+    found = [(value, cell) for value, cell in ranges if value is not None]
     if not found:
         return []
     opens = data.campaign.material.opens
