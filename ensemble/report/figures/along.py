@@ -10,19 +10,8 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
+from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.figures.loss_figures import errorbar
-from adhesis.ensemble.report.figures.style import (
-    MM,
-    MOST_CURVES,
-    MOST_PANELS,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    PublishedFigure,
-    gamma_label,
-    label_panel,
-    new_figure,
-    spread_out,
-)
 from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, symbols, together
 
 _MOST_TICKS = 5
@@ -47,12 +36,12 @@ def with_figure(data: Aggregate) -> list[Axis]:
     ]
 
 
-def along(axis: Axis) -> Callable[[Aggregate], PublishedFigure]:
+def along(axis: Axis) -> Callable[[Aggregate], style.PublishedFigure]:
     """Return the function that draws the figure of one axis."""
     return lambda data: _draw(data, axis)
 
 
-def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
+def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     """Means with intervals against an axis, every cell of it and of one more further axis.
 
     With one more: a column for each (H, γ), a line for each of its values. Else a column for each
@@ -62,13 +51,13 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
     second = next((other for other in data.further if other.name not in moving), None)
     fixed, lines = _lines(data, axis, second)
     titles = list(dict.fromkeys(title for title, _ in lines))
-    titles = [titles[round(k)] for k in spread_out(range(len(titles)), MOST_PANELS)]
+    titles = [titles[round(k)] for k in style.spread_out(range(len(titles)), style.MOST_PANELS)]
     labels = list(dict.fromkeys(label for _, label in lines))
-    labels = [labels[round(k)] for k in spread_out(range(len(labels)), MOST_CURVES)]
+    labels = [labels[round(k)] for k in style.spread_out(range(len(labels)), style.MOST_CURVES)]
     rows = [_LOSS, *(_OF_TURNING_POINT if axis.name in TURNING_POINTS else ())]
-    width = ONE_COLUMN if len(titles) == 1 else TWO_COLUMNS
-    height = (22 + 40 * len(rows)) * MM
-    figure = new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
+    width = style.ONE_COLUMN if len(titles) == 1 else style.TWO_COLUMNS
+    height = (22 + 40 * len(rows)) * style.MM
+    figure = style.new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
     low, high = min(axis.values), max(axis.values)
     logarithmic = low > 0 and high > _LOG_FROM * low
     grid = figure.rows
@@ -93,7 +82,7 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
             axes.set_ylim(bottom=0)  # when the panels, which share it, are all drawn
         row[0].set_ylabel(label)
     for axes, title in zip(grid[0], titles, strict=True):
-        label_panel(axes, title)
+        style.label_panel(axes, title)
     ticks = [value / axis_unit for value in axis.values]
     figure.label(axis_text)
     for axes in (*grid[-1], *figure.given):
@@ -127,7 +116,7 @@ def _lines(
         cell = line[0]
         if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
             continue
-        title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
+        title, label = f"H = {cell.hurst:g}", style.gamma_label(cell.work_of_adhesion)
         if second is not None:
             value = dict(cell.others)[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])

@@ -7,23 +7,7 @@ from matplotlib.axes import Axes
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
-from adhesis.ensemble.report.figures.style import (
-    LINE_OF_BRANCH,
-    MM,
-    MOST_CURVES,
-    MOST_PANELS,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    PublishedFigure,
-    colour,
-    gamma_label,
-    key,
-    label_panel,
-    look,
-    new_figure,
-    shown_gammas,
-    spread_out,
-)
+from adhesis.ensemble.report.figures import style
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
@@ -31,10 +15,12 @@ _MARKERS_PER_CURVE = 8
 _INTERVALS, _FINE = 60, 50  # of a band, and places between two points that are sorted into them
 
 
-def contact_against_stress(data: Aggregate) -> PublishedFigure:
+def contact_against_stress(data: Aggregate) -> style.PublishedFigure:
     """Fig. 6: A/A0 against σ~/sqrt(m2), one panel for each H, means over realisations."""
-    hursts = spread_out(data.hursts, MOST_PANELS)
-    figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 46 * len(hursts)) * MM, sharex=True)
+    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
+    figure = style.new_figure(
+        len(hursts), 1, style.ONE_COLUMN, (16 + 46 * len(hursts)) * style.MM, sharex=True
+    )
     for (axes,), hurst in zip(figure.rows, hursts, strict=True):
         for k, cell in _curves_of(data, hurst):
             for branch in BRANCHES:
@@ -42,9 +28,9 @@ def contact_against_stress(data: Aggregate) -> PublishedFigure:
                 area = cell.curves[f"{branch}_contact_fraction"]
                 if cell.done > 1:
                     for band in _bands(stress, area.mean - area.std, area.mean + area.std):
-                        axes.fill_between(*band, color=colour(k), alpha=0.13, linewidth=0)
+                        axes.fill_between(*band, color=style.colour(k), alpha=0.13, linewidth=0)
                 _plot(axes, stress, area.mean, cell, branch, k)
-        label_panel(axes, f"H = {hurst:g}")
+        style.label_panel(axes, f"H = {hurst:g}")
         axes.set_ylim(bottom=0)
     figure.label(r"mean stress $\tilde\sigma/\sqrt{m_2}$", "contact fraction $A/A_0$")
     _legend(data, figure, 3)
@@ -83,17 +69,17 @@ def _envelope(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
     return middle[crossed], np.maximum(lower[crossed], 0), upper[crossed]
 
 
-def loop_against_penetration(data: Aggregate) -> PublishedFigure:
+def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
     """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations."""
-    hursts = spread_out(data.hursts, MOST_PANELS)
-    height = (13 + 46 * len(hursts)) * MM
-    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True)
+    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
+    height = (13 + 46 * len(hursts)) * style.MM
+    figure = style.new_figure(len(hursts), 2, style.TWO_COLUMNS, height, sharex=True)
     for row, hurst in zip(figure.rows, hursts, strict=True):
         for axes, name in zip(row, ("mean_stress_dimensionless", "contact_fraction"), strict=True):
             for k, cell in _curves_of(data, hurst):
                 for branch in BRANCHES:
                     _with_spread(axes, cell, branch, name, k)
-            label_panel(axes, f"H = {hurst:g}")
+            style.label_panel(axes, f"H = {hurst:g}")
         row[0].axhline(0, color="0.5", linewidth=0.5)
         row[1].set_ylim(bottom=0)
     label = r"penetration $\tilde\Delta = \Delta/h_\mathrm{max}$"
@@ -106,7 +92,7 @@ def loop_against_penetration(data: Aggregate) -> PublishedFigure:
 
 def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, Cell]]:
     """Cells of one H that have finished tasks, each with the place of its γ among those shown."""
-    cells = ((k, data.cell(hurst, gamma)) for k, gamma in shown_gammas(data))
+    cells = ((k, data.cell(hurst, gamma)) for k, gamma in style.shown_gammas(data))
     return [(k, cell) for k, cell in cells if cell is not None and cell.done]
 
 
@@ -125,10 +111,10 @@ def _plot(axes: Axes, x: Array, y: Array, cell: Cell, branch: str, k: int) -> No
     every = max(1, (part.stop - part.start) // _MARKERS_PER_CURVE)
     axes.plot(
         *(x, y),
-        linestyle=LINE_OF_BRANCH[branch],
-        markevery=(k * every // MOST_CURVES, every),
-        label=f"{gamma_label(cell.work_of_adhesion)}, {branch}",
-        **look(k),
+        linestyle=style.LINE_OF_BRANCH[branch],
+        markevery=(k * every // style.MOST_CURVES, every),
+        label=f"{style.gamma_label(cell.work_of_adhesion)}, {branch}",
+        **style.look(k),
     )
 
 
@@ -139,11 +125,16 @@ def _with_spread(axes: Axes, cell: Cell, branch: str, name: str, k: int) -> None
     mean, std = curve.mean[part], curve.std[part]
     _plot(axes, axis, mean, cell, branch, k)
     if cell.done > 1:
-        axes.fill_between(axis, mean - std, mean + std, color=colour(k), alpha=0.18, linewidth=0)
+        axes.fill_between(
+            axis, mean - std, mean + std, color=style.colour(k), alpha=0.18, linewidth=0
+        )
 
 
-def _legend(data: Aggregate, figure: PublishedFigure, columns: int) -> None:
+def _legend(data: Aggregate, figure: style.PublishedFigure, columns: int) -> None:
     """One entry for each γ, one for each branch."""
-    handles = [key(gamma_label(gamma), **look(k)) for k, gamma in shown_gammas(data)]
-    handles += [key(b, color="0.3", linestyle=LINE_OF_BRANCH[b]) for b in BRANCHES]
+    handles = [
+        style.key(style.gamma_label(gamma), **style.look(k))
+        for k, gamma in style.shown_gammas(data)
+    ]
+    handles += [style.key(b, color="0.3", linestyle=style.LINE_OF_BRANCH[b]) for b in BRANCHES]
     figure.legend_above(handles, columns)

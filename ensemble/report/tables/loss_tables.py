@@ -44,15 +44,18 @@ def losses(data: Aggregate) -> Table:
         _estimated("loss_dimensionless", "ci_low", "95 % from", at_least_0, last=True),
         _estimated("loss_dimensionless", "ci_high", "to", number(), last=True),
         TableColumn(
-            *("loss_dimensionless_error_numerical", estimate("loss_error_dimensionless")),
+            "loss_dimensionless_error_numerical",
+            estimate("loss_error_dimensionless"),
             *("± loop", number(1), True, True),
         ),
         TableColumn(
-            *("loss_dimensionless_error_load_steps", partial(_error_of_load_steps, data)),
+            "loss_dimensionless_error_load_steps",
+            partial(_error_of_load_steps, data),
             *("± steps", number(1), False, True),
         ),
         TableColumn(
-            *("loss_dimensionless_error_resolution", partial(_deviation, "resolution", data)),
+            "loss_dimensionless_error_resolution",
+            partial(_deviation, "resolution", data),
             *("± method", number(1), True, True),
         ),
         TableColumn("loss_dimensionless_paper", papers_loss, "paper", fixed(2), True, True),
@@ -68,16 +71,19 @@ def losses(data: Aggregate) -> Table:
         _estimated("audit_residual", "mean"),
         TableColumn("audit_residual_rms", _of_audit(lambda audit: np.sqrt(np.mean(audit**2)))),
         TableColumn(
-            *("audit_residual_largest", _of_audit(lambda audit: np.max(np.abs(audit)))),
+            "audit_residual_largest",
+            _of_audit(lambda audit: np.max(np.abs(audit))),
             *("audit", percent),
         ),
         TableColumn(
-            *("races", lambda cell: int(cell.values["races"].sum()) if cell.done else None),
+            "races",
+            lambda cell: int(cell.values["races"].sum()) if cell.done else None,
             *("races", plain, True),
         ),
         _estimated("energy_at_stake_dimensionless", "mean"),
         TableColumn(
-            *("range_least [m]", lambda cell: extreme(np.min, cell.least_range)),
+            "range_least [m]",
+            lambda cell: extreme(np.min, cell.least_range),
             *("range (nm)", number(unit=1e-9), True),
         ),
         *(TableColumn(f"{name}_least [m]", partial(_least_of, name)) for name in RANGES),
@@ -85,22 +91,13 @@ def losses(data: Aggregate) -> Table:
             "largest_interior_tension [Pa]",
             lambda cell: extreme(np.max, cell.values["largest_interior_tension"]),
         ),
-        _estimated("loss_small_scale", "mean [J/m^2]"),
-        _estimated("loss_small_scale", "sem [J/m^2]"),
-        _estimated("loss_large_scale", "mean [J/m^2]"),
-        _estimated("loss_large_scale", "sem [J/m^2]"),
-        _estimated("small_scale_share", "mean"),
-        _estimated("small_scale_share", "ci_low"),
-        _estimated("small_scale_share", "ci_high"),
-        _estimated("pull_off_stress", "mean [Pa]"),
-        _estimated("pull_off_stress", "sem [Pa]"),
-        _estimated("pull_off_stress", "ci_low [Pa]"),
-        _estimated("pull_off_stress", "ci_high [Pa]"),
+        *_for_programs("loss_small_scale", "mean sem", " [J/m^2]"),
+        *_for_programs("loss_large_scale", "mean sem", " [J/m^2]"),
+        *_for_programs("small_scale_share", "mean ci_low ci_high"),
+        *_for_programs("pull_off_stress", "mean sem ci_low ci_high", " [Pa]"),
         TableColumn("pull_off_stress_dimensionless_mean", _if_done(_pull_off_stress)),
-        _estimated("pull_off_penetration", "mean"),
-        _estimated("pull_off_penetration", "sem"),
-        _estimated("h_max", "mean [m]"),
-        _estimated("h_rms", "mean [m]"),
+        *_for_programs("pull_off_penetration", "mean sem"),
+        *(_estimated(name, "mean [m]") for name in ("h_max", "h_rms")),
         _estimated("m0", "mean [m^2]"),
         _estimated("m2", "mean"),
         _estimated("m4", "mean [1/m^2]"),
@@ -131,6 +128,11 @@ def _estimated(
     """Return the column of a part of a cell's estimate: "mean", or "ci_low [J/m^2]"."""
     which = part.split(" ")[0].removeprefix("ci_")
     return TableColumn(f"{quantity}_{part}", estimate(quantity, which), heading, show, last=last)
+
+
+def _for_programs(quantity: str, parts: str, unit: str = "") -> tuple[TableColumn, ...]:
+    """Return columns of the CSV file alone, of several parts of a cell's estimate."""
+    return tuple(_estimated(quantity, f"{part}{unit}") for part in parts.split())
 
 
 def _if_done(value: Callable[[Cell], Any]) -> Callable[[Cell], float | None]:
