@@ -308,10 +308,12 @@ def _table_1(data: Aggregate) -> list[str]:
     inside = sum(loss.low <= value <= loss.high for loss, value in known)
     here = f"; {inside} of {len(known)} lie inside the 95 % interval of the mean here"
     intervals = here if known else ""
-    low, high, rms = 100 * min(found), 100 * max(found), 100 * np.sqrt(np.mean(np.square(found)))
+    low, high = 100 * min(found), 100 * max(found)
+    rms = 100 * np.sqrt(np.mean(np.square(found)))
     return [
         f"Of the {len(paper.TABLE_1)} losses of the paper's Table 1, {len(found)} have a cell "
-        f"here: W~ is off by {low:+.1f} % to {high:+.1f} %, root mean square {rms:.1f} %{intervals}."
+        f"here: W~ is off by {low:+.1f} % to {high:+.1f} %, root mean square {rms:.1f} %"
+        f"{intervals}."
     ]
 
 

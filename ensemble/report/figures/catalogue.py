@@ -205,7 +205,8 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
 
 def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
     with_it = together(data, axis) - {axis.name}
-    caption = "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a little."
+    caption = "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
+    caption += "little."
     if axis.name in TURNING_POINTS:
         caption += " Contact: the largest of the loop; loss per contact: over that largest area."
     if axis.name == "max_penetration":
