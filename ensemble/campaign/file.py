@@ -222,9 +222,8 @@ def _check_zip(sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...
         if len({length[name] for name in group}) > 1:
             lengths = ", ".join(f"{name} {length[name]}" for name in group)
             raise InputError(
-                f"[sweep] zip joins lists of different lengths ({lengths}): they must "
-                "have "
-                "as many values each"
+                f"[sweep] zip joins lists of different lengths ({lengths}): they must have as many "
+                "values each"
             )
 
 
@@ -294,9 +293,8 @@ def _check_together(campaign: Campaign) -> None:
     for value in campaign.output.field_penetrations or ():
         if not cycle.unloading_until <= value <= cycle.turning_point:
             raise InputError(
-                f"[output] field_penetrations holds {value}: it must lie between "
-                f"unloading_until ({cycle.unloading_until:g}) and max_penetration "
-                f"({cycle.turning_point:g})"
+                f"[output] field_penetrations holds {value}: it must lie between unloading_until "
+                f"({cycle.unloading_until:g}) and max_penetration ({cycle.turning_point:g})"
             )
     length = cycle.load_steps * (1 - cycle.unloading_until / cycle.deepest)
     if length > _LONGEST_AXIS:

@@ -350,9 +350,8 @@ def _progress(step: float, load: bool) -> Progress:
     def show(branch: Branch, drive: float, state: ContactState) -> None:
         line.show(
             lambda: (
-                f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  "
-                f"A/A0 {state.contact_fraction:.4f}  patches {state.patches:>4}  "
-                f"{line.seconds:.0f} s"
+                f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  A/A0 "
+                f"{state.contact_fraction:.4f}  patches {state.patches:>4}  {line.seconds:.0f} s"
             ),
             last=branch == "unloading" and not state.patches,
         )

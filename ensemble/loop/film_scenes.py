@@ -145,11 +145,10 @@ def _caption(result: LoopResult | PathResult, index: int, jumps: int) -> str:
     lost = _drop(result.jumps[:jumps])
     patches = int(result.patches[index])
     return (
-        f"{result.branch[index]}: Δ/h_max {result.penetration[index]:.3f}, "
-        f"mean stress {result.mean_stress[index]:.4g} Pa, "
-        f"A/A0 {result.contact_fraction[index]:.3f}, "
-        f"{patches} {'patch' if patches == 1 else 'patches'}; "
-        f"{jumps} of {len(result.jumps)} jumps so far lost {lost:.3g} J/m²"
+        f"{result.branch[index]}: Δ/h_max {result.penetration[index]:.3f}, mean stress "
+        f"{result.mean_stress[index]:.4g} Pa, A/A0 {result.contact_fraction[index]:.3f}, {patches} "
+        f"{'patch' if patches == 1 else 'patches'}; {jumps} of {len(result.jumps)} jumps so far "
+        f"lost {lost:.3g} J/m²"
     )
 
 

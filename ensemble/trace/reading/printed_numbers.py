@@ -131,9 +131,8 @@ def find_form(
         comma, point = any("," in f for f in rows), any("." in f for f in rows)
         if comma and point:
             raise InputError(
-                f"{source} has commas and points within its numbers: give "
-                f"{parameter('decimal')} and {parameter('delimiter')}, "
-                "and take signs of thousands out"
+                f"{source} has commas and points within its numbers: give {parameter('decimal')} "
+                f"and {parameter('delimiter')}, and take signs of thousands out"
             )
         decimal = "," if comma else "."
     return delimiter, decimal
