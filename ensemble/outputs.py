@@ -15,7 +15,7 @@ import re
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -217,6 +217,18 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def write_new(option: str, path: Path, content: Callable[[], bytes]) -> None:
+    """Write a file that does not exist yet (InputError, WriteError)."""
+    check_outputs({option: path}, {})
+    if os.path.isfile(path):
+        raise InputError(f"{option} is {path}, which exists: give another name")
+    writing = Writing()
+    with writing.output(option, path), whole_file(path) as stream:
+        stream.write(content())
+    writing.finish()
+    print(f"wrote       {path}")
 
 
 def write_json(path: Path, document: dict[str, Any]) -> None:

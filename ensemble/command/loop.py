@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, one_of, refused_as_input
+from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
@@ -84,7 +85,7 @@ def execute(args: argparse.Namespace) -> int:
                 fields = record.fields_at_penetrations(results[0], method, wanted, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
-        return 1
+        return SOME_FAILED
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
@@ -121,7 +122,7 @@ def execute(args: argparse.Namespace) -> int:
     for text in doubts:
         print(f"adhesis loop: {text}", file=sys.stderr)
     writing.finish()
-    return 1 if doubts and args.strict else 0
+    return SOME_FAILED if doubts and args.strict else DONE
 
 
 def _run(

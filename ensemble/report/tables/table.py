@@ -78,14 +78,8 @@ class Table:
         shown = self._shown()
         if stream.isatty():
             from rich.console import Console
-            from rich.table import Table as RichTable
 
-            table = RichTable(title=self.title, title_justify="left")
-            for heading in shown[0]:
-                table.add_column(heading, justify="right")
-            for row in shown[1:]:
-                table.add_row(*row)
-            Console(file=stream).print(table)
+            Console(file=stream).print(rich_table(self.title, shown[0], shown[1:], 0))
             return
         widths = [max(len(cell) for cell in column) for column in zip(*shown, strict=True)]
         print(self.title, file=stream)
@@ -106,6 +100,21 @@ class Table:
             for row in self.rows
         ]
         return [[column.heading for _, column in kept], *body]
+
+
+def rich_table(
+    title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], left_columns: int
+) -> Any:
+    """Return a table for a terminal, numbers in all columns but the first ``left_columns``."""
+    from rich.table import Table as RichTable
+
+    table = RichTable(title=title, title_justify="left")
+    for k, heading in enumerate(headings):
+        is_text = k < left_columns
+        table.add_column(heading, justify="left" if is_text else "right", no_wrap=not is_text)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def make_table(title: str, columns: Sequence[TableColumn], of: Iterable[Any]) -> Table:
