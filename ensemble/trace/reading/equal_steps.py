@@ -122,20 +122,12 @@ def _step_of_rounded(x: Array) -> tuple[float, float] | None:
     def spread(step: float) -> float:
         return float(np.ptp(x - step * k))
 
-    from scipy.optimize import brentq, minimize_scalar  # here: few traces have a use for it
-
     low, high = (float(x[-1] - x[0] + sign * digit) / k[-1] for sign in (-1, 1))
-    exact = {"xatol": 1e-12 * high}
-    best = minimize_scalar(spread, bounds=(low, high), method="bounded", options=exact).x
+    best = _lowest(spread, low, high)
     if spread(best) > allowed:
         return None
-    # a convex function is allowed from the one to the other
-    first, last = (
-        end
-        if spread(end) <= allowed
-        else brentq(lambda s: spread(s) - allowed, best, end, xtol=1e-14 * high)
-        for end in (low, high)
-    )
+    first = _edge(spread, allowed, best, low)
+    last = _edge(spread, allowed, best, high)
     step = _roundest(first, last)
     if step < _FINEST * digit:
         return None
@@ -156,6 +148,36 @@ def _printed_digit(x: Array) -> float | None:
         if whole.any() and np.all(np.abs(multiples - whole) <= 1e-6):
             return float(10.0**-decimals)
     return None
+
+
+def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a convex function is lowest, by a golden section."""
+    ratio = (np.sqrt(5) - 1) / 2
+    left, right = high - ratio * (high - low), low + ratio * (high - low)
+    at_left, at_right = function(left), function(right)
+    for _ in range(60):
+        if at_left < at_right:
+            high, right, at_right = right, left, at_left
+            left = high - ratio * (high - low)
+            at_left = function(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + ratio * (high - low)
+            at_right = function(right)
+    return float(left if at_left < at_right else right)
+
+
+def _edge(function: Callable[[float], float], allowed: float, inside: float, end: float) -> float:
+    """Return how far from a value inside towards an end a convex function is allowed."""
+    if function(end) <= allowed:
+        return end
+    for _ in range(50):
+        middle = (inside + end) / 2
+        if function(middle) <= allowed:
+            inside = middle
+        else:
+            end = middle
+    return inside
 
 
 def _roundest(low: float, high: float) -> float:
