@@ -189,19 +189,9 @@ def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:
         )
         if not low.size:
             continue
-        loss, dimensionless = estimates(
-            np.array(
-                [
-                    upper.values[name][high] - lower.values[name][low]
-                    for name in ("loss", "loss_dimensionless")
-                ]
-            )
-        )
+        names = ("loss", "loss_dimensionless")
+        grown = [upper.values[name][high] - lower.values[name][low] for name in names]
         yield PairedDifference(
-            lower.hurst,
-            lower.others,
-            lower.work_of_adhesion,
-            upper.work_of_adhesion,
-            loss,
-            dimensionless,
+            *(lower.hurst, lower.others, lower.work_of_adhesion, upper.work_of_adhesion),
+            *estimates(np.array(grown)),
         )

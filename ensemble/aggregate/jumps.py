@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import row_blocks
+from adhesis.ensemble.results.blocks import cells_of_rows, row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
 from adhesis.solver.model.profile import Array
@@ -43,22 +43,14 @@ class JumpStatistics:
 
     def part(self, cells: Sequence[int]) -> JumpStatistics:
         """Return the statistics of some of the cells."""
-        chosen = list(cells)
-        return replace(
-            self,
-            number=self.number[chosen],
-            energy=self.energy[chosen],
-            histogram=self.histogram[chosen],
-            truncated=self.truncated[chosen],
-        )
+        names, chosen = ("number", "energy", "histogram", "truncated"), list(cells)
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
 def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpStatistics:
     """Count the jumps of the given rows, one array of rows for each cell."""
     tasks, slots = len(results), results.campaign.output.jumps
-    cell_of = np.full(tasks, -1)
-    for k, mine in enumerate(rows):
-        cell_of[mine] = k
+    cell_of = cells_of_rows(rows, tasks)
     bins = BIN_EDGES.size - 1
     shape = (len(rows), len(JUMP_KINDS))
     number = np.zeros(shape, dtype=np.int64)

@@ -61,8 +61,5 @@ def average_curves(
 
 
 def _empty(points: int) -> Curve:
-    return Curve(
-        mean=np.full(points, np.nan),
-        std=np.full(points, np.nan),
-        quantiles=np.full((len(QUANTILES), points), np.nan),
-    )
+    shapes = (points, points, (len(QUANTILES), points))
+    return Curve(*(np.full(shape, np.nan) for shape in shapes))

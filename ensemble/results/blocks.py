@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,14 @@ def row_blocks(rows: int, width: int) -> Iterator[slice]:
     step = max(1, READ_AT_ONCE // max(1, width))
     for start in range(0, rows, step):
         yield slice(start, min(rows, start + step))
+
+
+def cells_of_rows(rows: Sequence[NDArray[np.intp]], count: int) -> NDArray[np.int64]:
+    """Return the cell of each of ``count`` rows, from the rows of each cell; -1 for none."""
+    out = np.full(count, -1)
+    for k, mine in enumerate(rows):
+        out[mine] = k
+    return out
 
 
 def column_blocks(

@@ -187,19 +187,12 @@ RESULT_DATASETS: tuple[Dataset, ...] = (
 
 def row_scales(campaign: Campaign) -> tuple[Scale, ...]:
     """Return the dimensions of the rows of a campaign."""
-    depth = "max_penetration" if campaign.has_axis("max_penetration") else "h_max"
+    several = campaign.has_axis("max_penetration")
+    depth = f"penetration/{'max_penetration' if several else 'h_max'}"
     return (
+        Scale("loading_penetration", campaign.loading_penetration, "1", f"{depth} on loading"),
         Scale(
-            "loading_penetration",
-            campaign.loading_penetration,
-            "1",
-            f"penetration/{depth} on loading",
-        ),
-        Scale(
-            "unloading_penetration",
-            campaign.unloading_penetration,
-            "1",
-            f"penetration/{depth} on unloading",
+            "unloading_penetration", campaign.unloading_penetration, "1", f"{depth} on unloading"
         ),
         Scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
         *field_scales(field_plan(campaign), {axis.name for axis in campaign.axes[2:]}),
