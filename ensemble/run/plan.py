@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
@@ -119,27 +119,22 @@ def prepare(
         say(f"{path}: {len(rows)} tasks to do{' at first' if batches else ''}")
         return Plan(tasks, rows, 0, 0, batches=batches)
     with Results(path) as old:
-        difference = compare(old.campaign, campaign)
-        if difference.other:
-            raise InputError(
-                f"{path} holds another campaign: {'; '.join(difference.other)} "
-                "(here: this campaign, there: the file)"
-            )
+        grown_keys = growth(path, old.campaign, campaign)
         if old.part != part:
             held = "the whole campaign" if old.part == WHOLE else f"part {old.part} of it"
             raise InputError(f"{path} holds {held}, and part {part} is wanted")
-        if difference.grown and part != WHOLE:
+        if grown_keys and part != WHOLE:
             raise InputError(
                 f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "
                 "parts are merged into does"
             )
-        if difference.grown and not same_rows(old.campaign, campaign):
+        if grown_keys and not same_rows(old.campaign, campaign):
             raise InputError(
-                f"{path} cannot grow by {', '.join(difference.grown)}: the bins of its "
+                f"{path} cannot grow by {', '.join(grown_keys)}: the bins of its "
                 "spectra would change (they follow the highest n0 · ratio of the campaign)"
             )
         before = len(old)
-        if difference.grown:
+        if grown_keys:
             check_space(path, campaign, part)
             check_cells(tasks)
             create(path, campaign, part=part, versions=versions(), grown_from=old)
@@ -167,7 +162,7 @@ def prepare(
                 writer.mark([row for row in spare if status[row] == PENDING], needed=False)
                 wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
                 writer.mark(sorted(wanted), needed=True)
-    grown = f", {len(plan.tasks) - before} of them new" if difference.grown else ""
+    grown = f", {len(plan.tasks) - before} of them new" if grown_keys else ""
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
         f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"

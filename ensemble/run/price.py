@@ -14,11 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
-from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import duration, percent
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
@@ -195,12 +194,7 @@ def _left(campaign: Campaign, path: Path, tasks: Tasks, known: _Known) -> tuple[
     left = np.zeros(campaign.task_count, bool)
     left[tasks.rows] = True
     with Results(path) as results:
-        difference = compare(results.campaign, campaign)
-        if difference.other:
-            raise InputError(
-                f"{path} holds another campaign: {'; '.join(difference.other)} "
-                "(here: this campaign, there: the file)"
-            )
+        growth(path, results.campaign, campaign)
         rows = zip(
             results.tasks(),
             results.status().tolist(),
