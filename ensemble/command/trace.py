@@ -63,7 +63,7 @@ def execute(args: argparse.Namespace) -> int:
     except NoAnswer as error:
         print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
-    from adhesis.ensemble.trace.trace_page import trace_summary, write_page
+    from adhesis.ensemble.trace.trace_page import summary, write_page
 
     writing = Writing()
     with writing.output("--to", args.to / "trace.json"):
@@ -76,7 +76,7 @@ def execute(args: argparse.Namespace) -> int:
         staged_folder(args.to, FIGURE_FILES) as folder,
     ):
         write_page(answer, folder)
-    print(trace_summary(answer))
+    print(summary(answer))
     if not writing.failures:
         print(f"wrote       {args.to / 'trace.html'}, trace.md, trace.json and the figures")
     writing.finish()

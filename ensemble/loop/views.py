@@ -61,7 +61,6 @@ def film(
 
 # Made by other modules, and loaded when they are asked for.
 _ELSEWHERE = dict.fromkeys(("to_dataframe", "to_xarray", "save"), "adhesis.ensemble.loop.saved")
-_ELSEWHERE["trace_summary"] = "adhesis.ensemble.trace.trace_page"
 
 
 def __getattr__(name: str) -> Any:
@@ -82,6 +81,13 @@ def page(shown: Any) -> str:
         return table_of(_rows_of_result(shown)) + picture_of(plot(shown))
     figure = draw_shape(shown)
     return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))
+
+
+def trace_summary(answer: Answer) -> str:
+    """Return the summary of an answer as text."""
+    from adhesis.ensemble.trace.trace_page import summary
+
+    return summary(answer)
 
 
 def trace_page(answer: Answer) -> str:

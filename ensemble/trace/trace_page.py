@@ -24,7 +24,7 @@ from adhesis.solver.checks import counted
 from adhesis.solver.loading.equilibrium_path import friction_text
 
 
-def trace_summary(answer: Answer) -> str:
+def summary(answer: Answer) -> str:
     """The answer in a few lines for the terminal."""
     loop = answer.main
     lines = [
