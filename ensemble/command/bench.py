@@ -72,10 +72,10 @@ def execute(args: argparse.Namespace) -> int:
         chosen = [line for line in lines if line.run.scene is scene]
         title = f"{scene.title}; reference: {chosen[0].reference.text}"
         rows = [cells(line, LINE_COLUMNS) for line in chosen]
-        console.print(rich_table(title, LINE_COLUMNS, rows, 2))
+        console.print(rich_table(title, LINE_COLUMNS, rows, slice(2, None)))
     if grown:
         rows = [cells(line, GROWTH_COLUMNS) for line in grown]
-        console.print(rich_table("How the cost grows", GROWTH_COLUMNS, rows, 2))
+        console.print(rich_table("How the cost grows", GROWTH_COLUMNS, rows, slice(2, None)))
     compared = ratios(lines)
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
     text = page(lines, grown, compared, exponents(grown), f"`{command}` on {_machine()}")

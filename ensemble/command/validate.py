@@ -65,7 +65,7 @@ def execute(args: argparse.Namespace) -> int:
 
         title = "Methods against exact references"
         headings = ("claim", "method", "resolution", "error", "bound", "", "note")
-        Console().print(rich_table(title, headings, map(_cells, rows), 3))
+        Console().print(rich_table(title, headings, map(_cells, rows), slice(3, 5)))
     failed = [row for row in rows if not row.passed]
     if not args.json:
         print(f"{len(rows) - len(failed)} of {len(rows)} claims hold")

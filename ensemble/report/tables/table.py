@@ -79,7 +79,8 @@ class Table:
         if stream.isatty():
             from rich.console import Console
 
-            Console(file=stream).print(rich_table(self.title, shown[0], shown[1:], 0))
+            table = rich_table(self.title, shown[0], shown[1:], slice(None), wrap=True)
+            Console(file=stream).print(table)
             return
         widths = [max(len(cell) for cell in column) for column in zip(*shown, strict=True)]
         print(self.title, file=stream)
@@ -103,15 +104,22 @@ class Table:
 
 
 def rich_table(
-    title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], left_columns: int
+    title: str,
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    numbers: slice,
+    *,
+    wrap: bool = False,
 ) -> Any:
-    """Return a table for a terminal, numbers in all columns but the first ``left_columns``."""
+    """Return a table for a terminal; columns of numbers are to the right, and may be wrapped."""
     from rich.table import Table as RichTable
 
     table = RichTable(title=title, title_justify="left")
+    to_the_right = range(len(headings))[numbers]
     for k, heading in enumerate(headings):
-        is_text = k < left_columns
-        table.add_column(heading, justify="left" if is_text else "right", no_wrap=not is_text)
+        is_number = k in to_the_right
+        justify: Any = "right" if is_number else "left"
+        table.add_column(heading, justify=justify, no_wrap=is_number and not wrap)
     for row in rows:
         table.add_row(*row)
     return table
