@@ -7,7 +7,6 @@ does not count. The full benchmark takes three quarters of an hour, --quick less
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import platform
 import sys
@@ -45,10 +44,10 @@ def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
     from rich.console import Console
 
-    from adhesis.ensemble.bench.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, cells, page
+    from adhesis.ensemble.bench.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, RECORD, cells, page
     from adhesis.ensemble.bench.equal_error import benchmark, exponents, growth, ratios
     from adhesis.ensemble.bench.scenes import FULL, QUICK
-    from adhesis.ensemble.report.tables.table import rich_table
+    from adhesis.ensemble.report.tables.table import make_table, rich_table
     from adhesis.ensemble.warm import warm_missing
     from adhesis.solver.precompile import COMPILED_METHODS
 
@@ -81,22 +80,12 @@ def execute(args: argparse.Namespace) -> int:
     text = page(lines, grown, compared, exponents(grown), f"`{command}` on {_machine()}")
     writing = Writing()
     with writing.output("the benchmark in", args.to), staged_folder(args.to) as folder:
-        _write_csv(folder / "benchmark.csv", [*lines, *grown])
+        make_table("", RECORD, [*lines, *grown]).write_csv(folder / "benchmark.csv")
         (folder / "benchmark.md").write_text(text, encoding="utf-8")
         _draw(lines, folder / "benchmark")
     writing.finish()
     console.print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
     return 0
-
-
-def _write_csv(path: Path, lines: list[Line]) -> None:
-    from adhesis.ensemble.bench.bench_page import record
-
-    records = [record(line) for line in lines]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(records[0]))
-        writer.writeheader()
-        writer.writerows(records)
 
 
 def _draw(lines: list[Line], stem: Path) -> None:
