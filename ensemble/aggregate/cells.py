@@ -31,7 +31,8 @@ RANGES = ("valid_range", "edge_range", "touch_range")
 # they belong to the place of one tension.
 _NOT_AVERAGED = frozenset(
     (
-        *(*RANGES, "opening_strength"),
+        *RANGES,
+        "opening_strength",
         *("largest_interior_tension", "interior_tension_position", "interior_tension_penetration"),
     )
 )

@@ -36,8 +36,9 @@ def summary(answer: Answer) -> str:
         f"changes     {_largest_changes(answer)}",
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
         f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
-        f"{length_text(loop['h_max'], 4)}; {loop['waves']} waves, {loop['patches']} "
-        f"patch{'es' if loop['patches'] != 1 else ''} at most, {counted(loop['jumps'], 'jump')}, "
+        f"{length_text(loop['h_max'], 4)}; "
+        f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
+        f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
         *(f"friction    {text}" for text in _friction(answer)),
         f"scope       {_scope(answer)}",
@@ -173,9 +174,10 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         f"Scope: {_scope(answer)}.",
         f"Range: {_range(answer)} (least of the loop and its variants).",
         "## How far it can be trusted",
-        "Each doubt is measured by running the loop with the decision made otherwise. Standard "
-        f"uncertainty: the root mean square of the changes; the interval is {COVERAGE:g} times the "
-        f"root of the sum of their squares, at least {100 * LEAST:g} %. It is about this trace, "
+        "Each doubt is measured by running the loop with the decision made otherwise. "
+        "Standard uncertainty: the root mean square of the changes; the interval is "
+        f"{COVERAGE:g} times the root of the sum of their squares, at least {100 * LEAST:g} %. "
+        "It is about this trace, "
         "closed to one period; other places of the same surface have other losses.",
         markdown_table(*_doubt_rows(answer), left_columns=1),
         markdown_table(*_variant_rows(answer), left_columns=1),
