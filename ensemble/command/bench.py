@@ -14,19 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.option_table import add_options
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import following
 
 if TYPE_CHECKING:
     from adhesis.ensemble.bench.equal_error import Line
 
-_OPTIONS = """
---to DIR path=out/benchmark: directory for benchmark.csv, benchmark.md and the figure (default
-    out/benchmark)
---quick: small scenes only, under a minute
---budget SECONDS float=360: CPU time after which a run is given up (default 360)
-"""
+_DEFAULT = Path("out/benchmark")
 _WIDTH = 120
 EXAMPLES = (
     "adhesis bench --quick",
@@ -37,7 +31,21 @@ _FILES = tuple(f"benchmark.{suffix}" for suffix in ("csv", "md", "png", "pdf"))
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``adhesis bench``."""
-    add_options(parser, _OPTIONS)
+    parser.add_argument(
+        "--to",
+        type=Path,
+        default=_DEFAULT,
+        metavar="DIR",
+        help=f"directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})",
+    )
+    parser.add_argument("--quick", action="store_true", help="small scenes only, under a minute")
+    parser.add_argument(
+        "--budget",
+        type=float,
+        default=360.0,
+        metavar="SECONDS",
+        help="CPU time after which a run is given up (default 360)",
+    )
 
 
 def execute(args: argparse.Namespace) -> int:

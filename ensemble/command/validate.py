@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
-from adhesis.ensemble.option_table import add_options
 from adhesis.ensemble.reporter import following
 
 if TYPE_CHECKING:
@@ -24,15 +23,17 @@ EXAMPLES = (
     "adhesis validate",
     "adhesis validate --method sharp --json",
 )
-_OPTIONS = """
---method NAME +: method to validate, may be repeated (default: all)
---json: print the rows as JSON
-"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``adhesis validate``."""
-    add_options(parser, _OPTIONS)
+    parser.add_argument(
+        "--method",
+        action="append",
+        metavar="NAME",
+        help="method to validate, may be repeated (default: all)",
+    )
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
 
 
 def execute(args: argparse.Namespace) -> int:

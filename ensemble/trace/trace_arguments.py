@@ -10,58 +10,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.option_table import add_options
-from adhesis.ensemble.quantities import STRESS
+from adhesis.ensemble.quantities import LENGTH, STIFFNESS, STRESS, WORK_OF_ADHESION
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
     "adhesis trace trace.csv --work-of-adhesion 0.02,0.04 --young 1e6 --poisson 0.5 --plan",
 )
-
-
-_OUTPUT = """
---to DIR path: for the page, its figures and JSON
---plan: print the plan, and stop
---quick: without tables of γ and turning point
---processes N int: side by side (default: cores)
---quiet: no progress on stderr
-"""
-_CYCLE = """
---adhesion-range D length: range of adhesion, 0.3nm; patches open from inside at the strength G/D
-    (default: zero range, they never do)
---strength S stress: instead, that strength, 10MPa
---max-penetration D[,D…]: turning points in h_max (default 0.9); with --stiffness those of the far
-    side, u_tot/h_max; with --preload, where a loop turns at the latest
---preload P[,P…]: instead, a machine turns where the mean stress reaches this: in Pa, or 20kPa
---max-stress P[,P…]: instead, under a weight (--stiffness 0): turning points in Pa, or 20kPa
---stiffness K stiffness: in Pa/m of nominal area, or 1GPa/m, of what holds the solid; 0 is load
-    control, that of a weight (default: fixed separation)
---layer D length: instead: the stiffness of a layer of this thickness, 1mm
---load-steps N int=40: (default 40)
-"""
-_OPEN = """
---work-of-adhesion-open G work: where an edge recedes, at least that where it advances,
-    --work-of-adhesion; between both it is pinned (default: the same)
-"""
-_READING = """
---unit U: unit of a text: um, or mm,um for positions and heights
---step S length: step, for heights without positions: 0.5um
---columns X,Z: columns of a text, from 1; Z: heights alone
---delimiter C: of a text, if it is not found out
-"""
-_MAP = """
---row K int: row of a map, from 0
---channel K int: of an instrument's file, from 0
-"""
-_PREPARING = """
---degree N int: polynomial subtracted (default 1, or as is seen)
---cut-off W length: shortest wave kept: 5um (default from step, noise and tip)
---tip-radius R length: of the stylus or probe: 2um
---longest-gap G length: drop-outs up to this length are interpolated: 20um
---exclude A:B +: a range of positions to bridge, 1.2mm:1.3mm; may be given several times
---keep-outliers: leave spikes in
---invert: z points into the sample: turn it
-"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,29 +37,119 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_cycle_arguments(contact)
     add_method_arguments(contact, "of each loop (default 1e-3)")
     add_reading_arguments(parser)
-    add_options(parser.add_argument_group("output"), _OUTPUT)
+    output = parser.add_argument_group("output")
+    output.add_argument("--to", type=Path, metavar="DIR", help="for the page, its figures and JSON")
+    output.add_argument("--plan", action="store_true", help="print the plan, and stop")
+    output.add_argument(
+        "--quick", action="store_true", help="without tables of γ and turning point"
+    )
+    output.add_argument("--processes", type=int, metavar="N", help="side by side (default: cores)")
+    output.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
 
 def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
     """Declare strength, turning points and control, which ``adhesis loop`` shares."""
-    add_options(group, _CYCLE)
+    group.add_argument(
+        "--adhesion-range",
+        type=LENGTH.option,
+        metavar="D",
+        help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
+        "(default: zero range, they never do)",
+    )
+    group.add_argument(
+        "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"
+    )
+    group.add_argument(
+        "--max-penetration",
+        metavar="D[,D…]",
+        help="turning points in h_max (default 0.9); with --stiffness those of the far side, "
+        "u_tot/h_max; with --preload, where a loop turns at the latest",
+    )
+    group.add_argument(
+        "--preload",
+        metavar="P[,P…]",
+        help="instead, a machine turns where the mean stress reaches this: in Pa, or 20kPa",
+    )
+    group.add_argument(
+        "--max-stress",
+        metavar="P[,P…]",
+        help="instead, under a weight (--stiffness 0): turning points in Pa, or 20kPa",
+    )
+    group.add_argument(
+        "--stiffness",
+        type=STIFFNESS.option,
+        metavar="K",
+        help="in Pa/m of nominal area, or 1GPa/m, of what holds the solid; 0 is load control, that "
+        "of a weight (default: fixed separation)",
+    )
+    group.add_argument(
+        "--layer",
+        type=LENGTH.option,
+        metavar="D",
+        help="instead: the stiffness of a layer of this thickness, 1mm",
+    )
+    group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
 
 
 def add_open_argument(group: argparse._ArgumentGroup) -> None:
     """Declare the work of adhesion of an edge that recedes; ``adhesis loop`` shares it."""
-    add_options(group, _OPEN)
+    group.add_argument(
+        "--work-of-adhesion-open",
+        type=WORK_OF_ADHESION.option,
+        metavar="G",
+        help="where an edge recedes, at least that where it advances, --work-of-adhesion; between "
+        "both it is pinned (default: the same)",
+    )
 
 
 def add_method_arguments(group: argparse._ArgumentGroup, accuracy: str) -> None:
     """Declare method and accuracy; ``adhesis loop`` shares them."""
-    method = "--method NAME text=auto: grid, sharp or auto (default auto)"
-    add_options(group, f"{method}\n--accuracy ACCURACY float=1e-3: {accuracy}")
+    group.add_argument(
+        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
+    )
+    group.add_argument("--accuracy", type=float, default=1e-3, help=accuracy)
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare how a trace is read and prepared; ``adhesis loop --trace`` shares them."""
     reading = parser.add_argument_group("reading a trace")
-    add_options(reading, _READING)
+    reading.add_argument(
+        "--unit", metavar="U", help="unit of a text: um, or mm,um for positions and heights"
+    )
+    reading.add_argument(
+        "--step", type=LENGTH.option, metavar="S", help="step, for heights without positions: 0.5um"
+    )
+    reading.add_argument(
+        "--columns", metavar="X,Z", help="columns of a text, from 1; Z: heights alone"
+    )
+    reading.add_argument("--delimiter", metavar="C", help="of a text, if it is not found out")
     reading.add_argument("--decimal", choices=[",", "."], help="decimal sign, if not found out")
-    add_options(reading, _MAP)
-    add_options(parser.add_argument_group("preparing a trace"), _PREPARING)
+    reading.add_argument("--row", type=int, metavar="K", help="row of a map, from 0")
+    reading.add_argument("--channel", type=int, metavar="K", help="of an instrument's file, from 0")
+    making = parser.add_argument_group("preparing a trace")
+    making.add_argument(
+        "--degree", type=int, metavar="N", help="polynomial subtracted (default 1, or as is seen)"
+    )
+    making.add_argument(
+        "--cut-off",
+        type=LENGTH.option,
+        metavar="W",
+        help="shortest wave kept: 5um (default from step, noise and tip)",
+    )
+    making.add_argument(
+        "--tip-radius", type=LENGTH.option, metavar="R", help="of the stylus or probe: 2um"
+    )
+    making.add_argument(
+        "--longest-gap",
+        type=LENGTH.option,
+        metavar="G",
+        help="drop-outs up to this length are interpolated: 20um",
+    )
+    making.add_argument(
+        "--exclude",
+        action="append",
+        metavar="A:B",
+        help="a range of positions to bridge, 1.2mm:1.3mm; may be given several times",
+    )
+    making.add_argument("--keep-outliers", action="store_true", help="leave spikes in")
+    making.add_argument("--invert", action="store_true", help="z points into the sample: turn it")

@@ -31,7 +31,7 @@ from adhesis.ensemble.exit_codes import (
     TOO_FEW_RESOURCES,
     WRITE_FAILED,
 )
-from adhesis.ensemble.option_table import add_options
+from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import log
 
 if TYPE_CHECKING:
@@ -42,36 +42,74 @@ if TYPE_CHECKING:
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
 _MOST = 2**31 - 1
+_NUMBER = within(0, _MOST, "a number that is not negative")
+_WHOLE = within(0, _MOST, "a whole number that is not negative", int)
 EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
 )
 
 
-_OPTIONS = """
---out FILE.h5 path: results file (default: the campaign's name, here)
---ranks N ranks: start N ranks here, without MPI as processes (one more than cores is right: rank 0
-    only waits)
---dry-run: estimate the cost from a minute of pilot loops at most, and write nothing
---part K/N: compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)
---walltime TIME: stop in time for this walltime, as 3600, 1h30m or 12:00:00 (default: what Slurm or
-    Torque say)
---max-failures N whole=20: stop after so many failed tasks; 0: never (default: 20)
---redo WHICH: compute tasks again: those that failed (failed), or done ones too (all)
---hurst VALUE number+: with --redo: only tasks of this H; may be repeated
---work-of-adhesion VALUE work+: with --redo: only tasks of this γ in J/m²; may be repeated
---realisation VALUE whole+: with --redo: only this realisation; may be repeated
---patience SECONDS number=10: how long to wait for another run to let go of FILE.h5 (default: 10)
-"""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="the campaign file")
-    whole = within(0, _MOST, "a whole number that is not negative", int)
-    number = within(0, _MOST, "a number that is not negative")
-    ranks = within(1, _MOST, "a whole number of at least 1", int)
-    add_options(parser, _OPTIONS, ranks=ranks, whole=whole, number=number)
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.h5",
+        help="results file (default: the campaign's name, here)",
+    )
+    parser.add_argument(
+        "--ranks",
+        type=within(1, _MOST, "a whole number of at least 1", int),
+        metavar="N",
+        help="start N ranks here, without MPI as processes (one more than cores is right: rank 0 "
+        "only waits)",
+    )
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="estimate the cost from a minute of pilot loops at most, and write nothing",
+    )
+    parser.add_argument(
+        "--part",
+        metavar="K/N",
+        help="compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)",
+    )
+    parser.add_argument(
+        "--walltime",
+        metavar="TIME",
+        help="stop in time for this walltime, as 3600, 1h30m or 12:00:00 "
+        "(default: what Slurm or Torque say)",
+    )
+    parser.add_argument(
+        "--max-failures",
+        type=_WHOLE,
+        metavar="N",
+        default=20,
+        help="stop after so many failed tasks; 0: never (default: 20)",
+    )
+    parser.add_argument(
+        "--redo",
+        metavar="WHICH",
+        help="compute tasks again: those that failed (failed), or done ones too (all)",
+    )
+    gamma = WORK_OF_ADHESION.option
+    for name, kind, text in (
+        ("--hurst", _NUMBER, "with --redo: only tasks of this H; may be repeated"),
+        ("--work-of-adhesion", gamma, "with --redo: only tasks of this γ in J/m²; may be repeated"),
+        ("--realisation", _WHOLE, "with --redo: only this realisation; may be repeated"),
+    ):
+        parser.add_argument(
+            name, type=kind, metavar="VALUE", action="append", default=[], help=text
+        )
+    parser.add_argument(
+        "--patience",
+        type=_NUMBER,
+        metavar="SECONDS",
+        default=10.0,
+        help="how long to wait for another run to let go of FILE.h5 (default: 10)",
+    )
 
 
 def execute(
@@ -290,8 +328,7 @@ def _tell_price(
 def _selection(args: argparse.Namespace) -> Any:
     from adhesis.ensemble.run.plan import Selection
 
-    names = ("hurst", "work_of_adhesion", "realisation")
-    values = {name: getattr(args, name) or [] for name in names}
+    values = {name: getattr(args, name) for name in ("hurst", "work_of_adhesion", "realisation")}
     if args.redo is None:
         for name in filter(values.get, values):
             option = "--" + name.replace("_", "-")

@@ -11,24 +11,25 @@ from typing import Any
 
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.option_table import add_options
 
 EXAMPLES = (
     "adhesis status paper.h5",
     "adhesis status paper.h5 --watch --interval 10",
 )
-_OPTIONS = """
---json: everything, as JSON
---watch: repeat the status until all is done
---interval SECONDS seconds=2: with --watch: how often (default: 2)
-"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("file", type=Path, metavar="FILE.h5", help="the results file")
-    seconds = within(0.1, 86_400, "a number of seconds between 0.1 and 86400")
-    add_options(parser, _OPTIONS, seconds=seconds)
+    parser.add_argument("--json", action="store_true", help="everything, as JSON")
+    parser.add_argument("--watch", action="store_true", help="repeat the status until all is done")
+    parser.add_argument(
+        "--interval",
+        type=within(0.1, 86_400, "a number of seconds between 0.1 and 86400"),
+        metavar="SECONDS",
+        default=2.0,
+        help="with --watch: how often (default: 2)",
+    )
 
 
 def execute(args: argparse.Namespace) -> int:
