@@ -89,12 +89,7 @@ _LEAST_MEMORY = 1e9  # bytes
 
 
 def check_memory() -> None:
-    """Refuse a limit of memory under which the libraries of numerics cannot be relied on.
-
-    Raises
-    ------
-    MemoryError
-    """
+    """Raise MemoryError under a limit of memory that numerical libraries cannot live with."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _LEAST_MEMORY:
         raise MemoryError(f"ulimit -v is {limit / 1e6:.0f} MB, not {_LEAST_MEMORY / 1e9:g} GB")
@@ -120,20 +115,11 @@ def parameter(name: str) -> str:
 
 @contextmanager
 def refused_as_input(options: Container[str] = (), **names: str) -> Iterator[None]:
-    """Raise what the solver refuses as an InputError; other errors pass.
+    """Raise what the solver refuses, or an overflow, as an InputError; other errors pass.
 
-    Parameters
-    ----------
-    options : container of str
-        Names of a command's options ("work_of_adhesion"); a sentence that begins with one
-        ("work_of_adhesion is -1: …") then begins with the option (--work-of-adhesion).
-    **names : str
-        Option by the word that such a sentence begins with, where they differ.
-
-    Raises
-    ------
-    InputError
-        For a ValueError, a NotImplementedError, or an overflow.
+    A sentence that begins with one of the ``options`` of a command ("work_of_adhesion is -1: …")
+    then begins with the option itself; ``names`` are options by the word of the sentence, where
+    they differ.
     """
     try:
         yield

@@ -6,7 +6,7 @@ import signal
 
 DONE = 0
 SOME_FAILED = 1
-"""Tasks failed, there is no answer, or what is asked for is not fulfilled."""
+"""Tasks failed, rows are damaged, bounds are exceeded, or there is no answer."""
 PIPE_CLOSED = 1
 BAD_INPUT = 2
 OUR_ERROR = 70  # EX_SOFTWARE

@@ -35,17 +35,9 @@ def interval_method(n: int) -> str:
 
 
 def interval(values: ArrayLike) -> tuple[Array, Array]:
-    """Interval of the mean over the last axis.
+    """Return low and high ends of the interval of the mean over the last axis of finite values.
 
-    Parameters
-    ----------
-    values : array, shape (…, n)
-        Finite.
-
-    Returns
-    -------
-    low, high : array, shape (…)
-        NaN for n < 2; both the mean where all values are equal.
+    NaN for fewer than two values; both the mean where all values are equal.
     """
     values = np.asarray(values, dtype=np.float64)
     n = values.shape[-1]
@@ -83,24 +75,14 @@ def untransformed(x: float, skewness: Array, n: int) -> Array:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over realisations and how well it is known; NaN where n is too small.
+    """A mean over realisations and how well it is known; NaN where n is too small."""
 
-    Attributes
-    ----------
-    n : int
-        Realisations.
-    mean, std : float
-        Mean, and standard deviation of one realisation (n - 1 in the denominator; n ≥ 2).
-    sem : float
-        Standard error of the mean, std/sqrt(n); n ≥ 2.
-    low, high : float
-        Interval of the mean at :data:`CONFIDENCE`; n ≥ 2.
-    """
-
-    n: int
+    n: int  # realisations
+    # mean, std: mean, and standard deviation of one realisation (n - 1 in the denominator; n ≥ 2)
     mean: float
     std: float
-    sem: float
+    sem: float  # standard error of the mean, std/sqrt(n); n ≥ 2
+    # low, high: interval of the mean at :data:`CONFIDENCE`; n ≥ 2
     low: float
     high: float
 

@@ -15,7 +15,7 @@ import re
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -36,13 +36,9 @@ _STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
 def target_of(path: Path | str) -> Path:
     """Return the file that a path leads to: that of a symbolic link, or the path itself.
 
-    Other paths stay as they were given, for messages.
-
-    Raises
-    ------
-    InputError
-        If the link leads in a circle, or another user has put it into a folder in which all may
-        write: it could lead to any file of this user.
+    Other paths stay as they were given, for messages. InputError for a link that leads in a circle,
+    or that another user has put into a folder in which all may write: it could lead to any file of
+    this user.
     """
     path = Path(path)
     link = path
@@ -73,18 +69,7 @@ def _check_link(path: Path, link: Path) -> None:
 
 
 def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> None:
-    """Refuse output files that cannot be written, are the same file, or are an input.
-
-    Parameters
-    ----------
-    outputs, inputs : dict
-        Paths by the option that names them.
-
-    Raises
-    ------
-    InputError
-        One sentence with the option and the path.
-    """
+    """Refuse outputs, by option, that cannot be written or overwrite a file (InputError)."""
     seen: dict[str, Path] = {}
     for option, path in outputs.items():
         with _refusing(option, path):
@@ -108,22 +93,7 @@ def check_output_folder(
 ) -> None:
     """Refuse a folder that cannot be made or written, or in which an input would be overwritten.
 
-    Nothing is made yet.
-
-    Parameters
-    ----------
-    option : str
-        The option that names the folder.
-    folder : Path
-    names : iterable of str
-        Names of the files that are to be written there.
-    inputs : dict
-        Paths of the inputs by the option that names them.
-
-    Raises
-    ------
-    InputError
-        One sentence with the option and the path.
+    Nothing is made yet. ``names`` are those of the files that are to be written there; InputError.
     """
     with _refusing(option, folder):
         target_of(folder)  # not through a link of another user
@@ -199,14 +169,7 @@ def _same_file(one: Path, other: Path) -> bool:
 
 
 class Writing:
-    """Outputs that are written one after the other, and which of them failed.
-
-    Attributes
-    ----------
-    written : list of Path
-    failures : list of str
-        One clause for each output that could not be written.
-    """
+    """Outputs that are written one after the other, and a clause for each that failed."""
 
     def __init__(self) -> None:
         self.written: list[Path] = []
@@ -223,13 +186,7 @@ class Writing:
             self.written.append(path)
 
     def finish(self) -> None:
-        """Raise the failures, if there are any.
-
-        Raises
-        ------
-        WriteError
-            One sentence that names every output that is missing.
-        """
+        """Raise a WriteError that names every output that is missing, if there are any."""
         if self.failures:
             raise WriteError("; ".join(self.failures))
 
@@ -238,12 +195,7 @@ class Writing:
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
     """Open a file to write that appears whole or not at all; streams and devices in place.
 
-    A link is followed: the file that it points to is replaced.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
+    A link is followed: the file that it points to is replaced (OSError).
     """
     descriptor = _descriptor(path)
     if descriptor is not None:
@@ -268,6 +220,18 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         raise
 
 
+def write_new(option: str, path: Path, content: Callable[[], bytes]) -> None:
+    """Write a file that does not exist yet (InputError, WriteError)."""
+    check_outputs({option: path}, {})
+    if os.path.isfile(path):
+        raise InputError(f"{option} is {path}, which exists: give another name")
+    writing = Writing()
+    with writing.output(option, path), whole_file(path) as stream:
+        stream.write(content())
+    writing.finish()
+    print(f"wrote       {path}")
+
+
 def write_json(path: Path, document: dict[str, Any]) -> None:
     """Write a document whole or not at all (OSError)."""
     with whole_file(path) as stream:
@@ -289,18 +253,8 @@ def write_netcdf(path: Path, dataset: xr.Dataset) -> None:
 def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
     """Make a folder and one inside it to write files into, which are then moved to their place.
 
-    If the writing fails, none of the files is moved, and older ones of the same names stay.
-
-    Parameters
-    ----------
-    folder : Path
-    names : iterable of str
-        Names that the writer uses: an older file of one that is not written now is removed.
-
-    Raises
-    ------
-    OSError
-        If something cannot be made, written or moved.
+    If the writing fails, none of the files is moved, and older ones of the same names stay
+    (OSError). An older file of ``names`` that is not written now is removed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(dir=folder, prefix=".writing-"))

@@ -31,16 +31,8 @@ def provenance(
 ) -> dict[str, Any]:
     """Return the entry ``provenance`` of a document.
 
-    Parameters
-    ----------
-    words : sequence of str
-        Command and options, as they were given.
-    source : dict, optional
-        The input file (:func:`input_record`), read before the work.
-    seed : int, optional
-        Seed of the phases of a random profile.
-    document : dict
-        The document, for the units of its numbers.
+    ``words`` are command and options as they were given, ``source`` is the :func:`input_record`,
+    and ``seed`` that of a random profile.
     """
     return {
         **software(),

@@ -42,33 +42,17 @@ class Quantity:
 
     Whether a value is positive and finite is left to its bounds. Sentences of errors begin with
     "is", to follow the name of an option or a key.
-
-    Attributes
-    ----------
-    name : str
-    units : mapping of str to float
-        Size of each unit in the SI unit, which is the first.
-    example : str
-        A value with its unit.
-    rule : str
-        What a text must be.
-    shown : tuple of str
-        Units in which values are shown, from the largest to the smallest.
-    largest : float
-        A larger number without a unit is likely to be in another unit, and is asked about.
-    question : str
-        What to give instead of such a number, which replaces ``{0}``.
-    others : mapping of str to str
-        Units by further names; with them, capitals do not count.
     """
 
     name: str
-    units: Mapping[str, float]
-    example: str
-    rule: str
-    shown: tuple[str, ...]
+    units: Mapping[str, float]  # size of each unit in the SI unit, which is the first
+    example: str  # a value with its unit
+    rule: str  # what a text must be
+    shown: tuple[str, ...]  # units in which values are shown, from the largest to the smallest
+    # A larger number without a unit is likely to be in another unit, and is asked about
     largest: float = math.inf
-    question: str = ""
+    question: str = ""  # what to give instead of such a number, which replaces ``{0}``
+    # Units by further names; with them, capitals do not count
     others: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -89,13 +73,7 @@ class Quantity:
         return name.lower() if self.others else name
 
     def unit_named(self, name: str) -> str:
-        """Return the unit of a name ("um" is "µm").
-
-        Raises
-        ------
-        InputError
-            For a name that is no unit of the quantity.
-        """
+        """Return the unit of a name ("um" is "µm"), or raise InputError."""
         unit = self.spellings.get(self._compared(name))
         if unit is None:
             raise InputError(
@@ -122,13 +100,7 @@ class Quantity:
         return number
 
     def read_with_unit(self, text: str) -> Written:
-        """Read a number and its unit, as in "2 mm".
-
-        Raises
-        ------
-        InputError
-            If it is anything else; UnitError if its unit is none of the quantity.
-        """
+        """Read a number with a unit, "2 mm" (InputError; UnitError for another unit)."""
         named = _QUOTIENT if "/" in self.unit else _WORD
         found = re.fullmatch(
             rf"{_NUMBER}({named})\s*", unicodedata.normalize("NFKC", text), re.IGNORECASE
@@ -231,13 +203,8 @@ _DIGITS = re.compile(r"\d+(?![\d.])")
 def words_of(option: str, text: str) -> list[str]:
     """Return the words of an option that is a list, such as "0.3,0.6".
 
-    A whole number, a comma and digits can be one number with a decimal comma. A list of whole
-    numbers has decimals ("1.0,5.0") or blanks ("1, 5").
-
-    Raises
-    ------
-    InputError
-        If two words can be one number.
+    A whole number, a comma and digits can be one number with a decimal comma, and are refused
+    (InputError). A list of whole numbers has decimals ("1.0,5.0") or blanks ("1, 5").
     """
     words = text.split(",")
     for whole, rest in pairwise(words):
@@ -254,20 +221,9 @@ def words_of(option: str, text: str) -> list[str]:
 def read_words(
     option: str, words: Sequence[str], read: Callable[[str], float] = float, rule: str = ""
 ) -> tuple[float, ...]:
-    """Read the numbers of an option that is a list.
+    """Read the numbers of an option that is a list (InputError).
 
-    Parameters
-    ----------
-    option : str
-    words : sequence of str
-    read : callable
-        Reads one of them; an InputError begins with "is".
-    rule : str
-        What the list must be, for a ``read`` whose ValueError has no sentence.
-
-    Raises
-    ------
-    InputError
+    ``rule`` says what the list must be, for a ``read`` whose ValueError has no sentence.
     """
     try:
         return tuple(read(word) for word in words)
@@ -312,16 +268,9 @@ def with_units(table: Any) -> Any:
 
 
 def shown_unit(name: str, largest: float) -> tuple[str, float]:
-    """Return a unit for a quantity, and that in the SI unit; ("", 1) for a number.
+    """Return a unit for a quantity of :data:`UNITS`, and that in the SI unit; ("", 1) for a number.
 
-    It is the one in which the value was written, or one of its size.
-
-    Parameters
-    ----------
-    name : str
-        As in :data:`UNITS`.
-    largest : float
-        Largest of the values that are shown, in the SI unit.
+    It is the one in which the largest value was written, or one of its size.
     """
     unit = UNITS.get(name, "")
     quantity = QUANTITIES.get(unit)
@@ -430,14 +379,9 @@ def bytes_text(size: float) -> str:
 def with_error(value: float, error: float, least: float = -math.inf, most: float = math.inf) -> str:
     """Return "9700 ± 800" or "0.0351 ± 0.0012".
 
-    The last digit is the first one of the error, or the second where the first is 1 or 2.
-
-    Parameters
-    ----------
-    value, error : float
-    least, most : float
-        Bounds of the quantity. Where the error reaches beyond them, the ends of the interval are
-        given instead: "0.995, from 0.975 to 1".
+    The last digit is the first one of the error, or the second where the first is 1 or 2. Where the
+    error reaches beyond the bounds ``least`` and ``most`` of the quantity, the ends of the interval
+    are given instead: "0.995, from 0.975 to 1".
     """
     if not 0 < error < math.inf:
         return f"{value:.4g} ± {error:g}"

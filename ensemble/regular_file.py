@@ -32,15 +32,7 @@ def irregular(mode: int) -> str | None:
 
 
 def open_regular(path: Path | str) -> BufferedReader:
-    """Open a regular file to read its bytes; links are followed.
-
-    Raises
-    ------
-    InputError
-        If it is a directory, pipe, socket or device, or no file can have this name.
-    OSError
-        If it is missing or cannot be read.
-    """
+    """Open a file to read (OSError), if it is a regular one (InputError)."""
     try:
         mode = os.stat(path).st_mode
     except ValueError:  # a NUL, or characters that no name has

@@ -27,18 +27,10 @@ def log(text: str) -> None:
 def ticking(
     task: Callable[[], str], write: Callable[[str], None] = log, every: float = _EVERY
 ) -> Iterator[None]:
-    """Log at intervals which task is under way, and for how long.
+    """Log at intervals (s) which task is under way, and for how long.
 
-    A task that ends within the first interval is not logged.
-
-    Parameters
-    ----------
-    task : callable
-        Returns the description of the task; it is called by another thread.
-    write : callable
-        Takes a line.
-    every : float
-        Time between lines, in s.
+    ``task`` returns its description; it is called by another thread. A task that ends within the
+    first interval is not logged.
     """
     started = time.monotonic()
     over = threading.Event()
@@ -59,15 +51,9 @@ def ticking(
 class StatusLine:
     """One line: rewritten on a terminal, elsewhere written anew at intervals.
 
-    Parameters
-    ----------
-    every : float or callable
-        Time between lines where there is no terminal, in s; or the same as a function of the time
-        since the start.
-    stream : text stream, optional
-        Where to; stderr without it.
-    at_once : bool
-        Show the first text when it is given, not after the first interval.
+    ``every`` is the time between lines where there is no terminal, in s, or a function of the time
+    since the start. ``at_once`` shows the first text when it is given, not after the first
+    interval.
     """
 
     def __init__(
@@ -130,12 +116,7 @@ class Bar(Protocol):
 def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
     """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals and a last one.
 
-    Parameters
-    ----------
-    what : str
-        Description, until another text is given.
-    remaining : bool
-        Whether the time that is left is estimated, from the pace so far.
+    ``remaining`` estimates the time that is left, from the pace so far.
     """
     line = StatusLine(_EVERY)
     shown = what
@@ -160,13 +141,7 @@ def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
 
 @contextmanager
 def following(what: str) -> Iterator[Bar]:
-    """Show how far a command is: a bar on a terminal, lines at intervals elsewhere.
-
-    Parameters
-    ----------
-    what : str
-        Description, until another text is given.
-    """
+    """Show how far a command is: a bar on a terminal, lines at intervals elsewhere."""
     if sys.stderr.isatty():
         with bar(what) as show:
             yield show

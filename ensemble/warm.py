@@ -32,18 +32,10 @@ def warm_up(
 ) -> Compilation:
     """Compile what the methods need, or load it, and report that if it takes more than a moment.
 
-    Parameters
-    ----------
-    methods : collection of str
-        Names of methods.
-    write : callable
-        Takes a line before, now and then, and after; also why code cannot be kept.
-    to_installation : bool
-        Keep the code for all users of this installation, if it can be written.
-    many_gaps : bool
-        Whether ``sharp`` is compiled for many gaps, too.
-    show_bar : bool
-        Show a bar instead of the lines between the first and the last, if stderr is a terminal.
+    ``write`` takes a line before, now and then, and after; also why code cannot be kept.
+    ``to_installation`` keeps the code for all users of this installation, if it can be written;
+    ``many_gaps`` compiles ``sharp`` for many gaps, too; ``show_bar`` shows a bar on a terminal
+    instead of the lines between.
     """
     total = functions_of(methods, many_gaps=many_gaps)  # 0 for code of an earlier source
     show_bar = show_bar and sys.stderr.isatty()

@@ -51,43 +51,21 @@ class PairedDifference:
 
 @dataclass(frozen=True, eq=False)
 class Aggregate:
-    """Averages and metadata of a results file that a report needs.
-
-    Attributes
-    ----------
-    path : Path
-    campaign : Campaign
-    attributes : dict
-        Root attributes of the file.
-    cells : tuple of Cell
-        By H, then γ, then further axes, ascending.
-    paired : tuple of PairedDifference
-    jumps : JumpStatistics
-        In the order of the cells.
-    fields : FieldStatistics
-        In the order of the cells.
-    failures : tuple of (int, str)
-        Row and error text of the first failed tasks.
-    doubts : tuple of str
-        One sentence for each file, this one or a companion, that has damaged rows (left out), or no
-        checksums.
-    companions : tuple of Companion
-        Other campaigns that the report compares with this one.
-    damaged : int
-        Number of damaged rows of this file.
-    """
+    """Averages and metadata of a results file that a report needs."""
 
     path: Path
     campaign: Campaign
-    attributes: dict[str, Any]
-    cells: tuple[Cell, ...]
+    attributes: dict[str, Any]  # root attributes of the file
+    cells: tuple[Cell, ...]  # by H, then γ, then further axes, ascending
     paired: tuple[PairedDifference, ...]
-    jumps: JumpStatistics
-    fields: FieldStatistics
-    failures: tuple[tuple[int, str], ...]
-    companions: tuple[Companion, ...] = ()
+    jumps: JumpStatistics  # in the order of the cells
+    fields: FieldStatistics  # in the order of the cells
+    failures: tuple[tuple[int, str], ...]  # row and error text of the first failed tasks
+    companions: tuple[Companion, ...] = ()  # other campaigns that the report compares with this one
+    # One sentence for each file, this one or a companion, that has damaged rows (left out), or no
+    # checksums
     doubts: tuple[str, ...] = ()
-    damaged: int = 0
+    damaged: int = 0  # number of damaged rows of this file
 
     @property
     def done(self) -> int:
@@ -156,10 +134,7 @@ class Aggregate:
 def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     """Average a results file over realisations; ``beside`` are files to compare with it.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read, is no results file, or holds no finished task.
+    InputError if a file cannot be read, is no results file, or holds no finished task.
     """
     with Results(path) as results:
         status = results.status()
@@ -214,19 +189,9 @@ def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:
         )
         if not low.size:
             continue
-        loss, dimensionless = estimates(
-            np.array(
-                [
-                    upper.values[name][high] - lower.values[name][low]
-                    for name in ("loss", "loss_dimensionless")
-                ]
-            )
-        )
+        names = ("loss", "loss_dimensionless")
+        grown = [upper.values[name][high] - lower.values[name][low] for name in names]
         yield PairedDifference(
-            lower.hurst,
-            lower.others,
-            lower.work_of_adhesion,
-            upper.work_of_adhesion,
-            loss,
-            dimensionless,
+            *(lower.hurst, lower.others, lower.work_of_adhesion, upper.work_of_adhesion),
+            *estimates(np.array(grown)),
         )

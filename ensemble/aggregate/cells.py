@@ -58,54 +58,35 @@ _PER_CONTACT = {
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """All tasks of one (H, γ) and one value on every further axis of the campaign.
+    """All tasks of one (H, γ) and one value on every further axis of the campaign."""
 
-    Attributes
-    ----------
-    hurst, work_of_adhesion : float
-        H; γ in J/m².
-    others : tuple of (str, number)
-        Names of the further axes, and the values there.
-    campaign : Campaign
-        Its tables hold the values of the cell.
-    penetration : dict of array
-        Δ/h_max of the curves of each branch.
-    plan : FieldPlan
-        States with stored fields: their Δ/h_max, wave numbers, positions.
-    done, failed, pending : int
-        Numbers of tasks.
-    rows : int array, shape (done,)
-        Rows of the done tasks in the file, by realisation.
-    realisation, seed : int array, shape (done,)
-    values : dict of array, each of shape (done,)
-        Per-task numbers under the names of the results file, and ``small_scale_share``
-        (loss_small_scale / loss_from_drops); ``loss_error_dimensionless``,
-        ``energy_at_stake_dimensionless`` (in W~); ``loss_per_contact``,
-        ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
-        spent per largest contact area, in J/m²).
-    estimates : dict of Estimate
-        Means of these, but not of ranges of adhesion, the largest interior tension and its place,
-        and ``opening_strength``. Only losses, pull-off and largest contact have an interval.
-    curves : dict of Curve
-        ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
-        (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,
-        ``energy`` (J/m).
-    """
-
+    # hurst, work_of_adhesion: H; γ in J/m²
     hurst: float
     work_of_adhesion: float
-    others: tuple[tuple[str, float], ...]
-    campaign: Campaign
-    penetration: dict[str, Array]
-    plan: FieldPlan
+    others: tuple[tuple[str, float], ...]  # names of the further axes, and the values there
+    campaign: Campaign  # its tables hold the values of the cell
+    penetration: dict[str, Array]  # Δ/h_max of the curves of each branch
+    plan: FieldPlan  # states with stored fields: their Δ/h_max, wave numbers, positions
+    # done, failed, pending: numbers of tasks
     done: int
     failed: int
     pending: int
-    rows: Rows
+    rows: Rows  # shape (done,); rows of the done tasks in the file, by realisation
+    # realisation, seed: shape (done,)
     realisation: NDArray[np.int64]
     seed: NDArray[np.int64]
+    # Each of shape (done,); per-task numbers under the names of the results file, and
+    # ``small_scale_share`` (loss_small_scale / loss_from_drops); ``loss_error_dimensionless``,
+    # ``energy_at_stake_dimensionless`` (in W~); ``loss_per_contact``,
+    # ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
+    # spent per largest contact area, in J/m²)
     values: dict[str, Array]
+    # Means of these, but not of ranges of adhesion, the largest interior tension and its place, and
+    # ``opening_strength``. Only losses, pull-off and largest contact have an interval.
     estimates: dict[str, Estimate]
+    # ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
+    # (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``, ``energy``
+    # (J/m)
     curves: dict[str, Curve]
 
     @property
@@ -139,13 +120,7 @@ class Cell:
 
 
 def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
-    """Read every cell, by H, then γ, then further axes, ascending; without curves.
-
-    Raises
-    ------
-    InputError
-        If no task is finished.
-    """
+    """Read every cell by H, γ, further axes, ascending; InputError if no task is finished."""
     if not np.any(status == DONE):
         damaged = results.damaged().size
         raise InputError(

@@ -29,31 +29,18 @@ _IGNORED = ("sweep.", "stop.", "output.", "solver.time_limit")
 
 @dataclass(frozen=True, eq=False)
 class Companion:
-    """Campaign that is compared with the reported one.
-
-    Attributes
-    ----------
-    path : Path
-    campaign : Campaign
-    cells : tuple of Cell
-    differs : tuple of str
-        "key = value" of the keys that differ, with the values of this campaign.
-    kind : str
-        Subject of the difference: "resolution" (the solver), "load steps", "penetration" (the
-        largest one, load steps may go with it), "spectrum" (the profile), "other".
-    further : tuple of Axis
-        Axes beside H and γ of the reported campaign.
-    doubts : tuple of str
-        Sentences on damage of the file.
-    """
+    """Campaign that is compared with the reported one."""
 
     path: Path
     campaign: Campaign
     cells: tuple[Cell, ...]
+    # "key = value" of the keys that differ, with the values of this campaign
     differs: tuple[str, ...]
+    # Subject of the difference: "resolution" (the solver), "load steps", "penetration" (the largest
+    # one, load steps may go with it), "spectrum" (the profile), "other"
     kind: Kind
-    further: tuple[Axis, ...] = ()
-    doubts: tuple[str, ...] = ()
+    further: tuple[Axis, ...] = ()  # axes beside H and γ of the reported campaign
+    doubts: tuple[str, ...] = ()  # sentences on damage of the file
 
     def like(self, cell: Cell) -> Cell | None:
         """Return the cell of the same H, γ and values on the further axes of either campaign.
@@ -78,13 +65,7 @@ class LossDifference:
 
 
 def read_companion(path: Path | str, campaign: Campaign) -> Companion:
-    """Read another results file and the keys in which its campaign differs.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no results file, or holds no finished task.
-    """
+    """Read another results file and the keys in which its campaign differs (InputError)."""
     with Results(path) as results:
         other, cells = results.campaign, read_cells(results, results.status())
         doubts = results.doubts()

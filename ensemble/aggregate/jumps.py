@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import row_blocks
+from adhesis.ensemble.results.blocks import cells_of_rows, row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
 from adhesis.solver.model.profile import Array
@@ -29,48 +29,28 @@ BIN_EDGES: Array = np.logspace(
 
 @dataclass(frozen=True, eq=False)
 class JumpStatistics:
-    """Jumps of every cell (in the order of the cells given), by kind.
-
-    Attributes
-    ----------
-    kinds : tuple of str
-    small_scale : bool array, shape (kinds,)
-        Whether jumps of a kind only move edges inside existing patches.
-    number : int array, shape (cells, kinds)
-        Number of jumps in all tasks together.
-    energy : array, shape (cells, kinds)
-        Their drops, J/m² of nominal area, in all tasks together.
-    histogram : int array, shape (cells, kinds, bins)
-        Number of jumps by energy drop, between :data:`BIN_EDGES`.
-    truncated : int array, shape (cells,)
-        Number of tasks that made more jumps than the catalogue holds.
-    """
+    """Jumps of every cell (in the order of the cells given), by kind."""
 
     kinds: tuple[str, ...]
+    # Shape (kinds,); whether jumps of a kind only move edges inside existing patches
     small_scale: NDArray[np.bool_]
-    number: NDArray[np.int64]
-    energy: Array
+    number: NDArray[np.int64]  # shape (cells, kinds); number of jumps in all tasks together
+    energy: Array  # shape (cells, kinds); their drops, J/m² of nominal area, in all tasks together
+    # Shape (cells, kinds, bins); number of jumps by energy drop, between :data:`BIN_EDGES`
     histogram: NDArray[np.int64]
+    # Shape (cells,); number of tasks that made more jumps than the catalogue holds
     truncated: NDArray[np.int64]
 
     def part(self, cells: Sequence[int]) -> JumpStatistics:
         """Return the statistics of some of the cells."""
-        chosen = list(cells)
-        return replace(
-            self,
-            number=self.number[chosen],
-            energy=self.energy[chosen],
-            histogram=self.histogram[chosen],
-            truncated=self.truncated[chosen],
-        )
+        names, chosen = ("number", "energy", "histogram", "truncated"), list(cells)
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
 def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpStatistics:
     """Count the jumps of the given rows, one array of rows for each cell."""
     tasks, slots = len(results), results.campaign.output.jumps
-    cell_of = np.full(tasks, -1)
-    for k, mine in enumerate(rows):
-        cell_of[mine] = k
+    cell_of = cells_of_rows(rows, tasks)
     bins = BIN_EDGES.size - 1
     shape = (len(rows), len(JUMP_KINDS))
     number = np.zeros(shape, dtype=np.int64)

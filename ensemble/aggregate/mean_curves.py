@@ -17,19 +17,13 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A quantity on the penetration axis of one branch, over the realisations of a cell.
+    """A quantity on the penetration axis of one branch, over the realisations of a cell."""
 
-    Attributes
-    ----------
-    mean, std : array, shape (points,)
-        std has n - 1 in the denominator; NaN for one realisation.
-        A realisation that has detached is counted, as zero.
-    quantiles : array, shape (len(QUANTILES), points)
-    """
-
+    # mean, std: shape (points,); std has n - 1 in the denominator; NaN for one realisation. A
+    # realisation that has detached is counted, as zero.
     mean: Array
     std: Array
-    quantiles: Array
+    quantiles: Array  # shape (len(QUANTILES), points)
 
 
 def average_curves(
@@ -39,22 +33,10 @@ def average_curves(
     rows: Sequence[NDArray[np.intp]],
     scales: Mapping[str, Sequence[Array]],
 ) -> dict[str, list[Curve]]:
-    """Average the dataset ``branch_name`` over the rows of every cell.
+    """Average the dataset ``branch_name`` over the rows of every cell; NaN for a cell without rows.
 
-    Parameters
-    ----------
-    results : Results
-    branch : {"loading", "unloading"}
-    name : str
-    rows : sequence of int array
-        Rows of each cell.
-    scales : mapping of sequences of array
-        Curves to make of the dataset; one array for each cell, with the factor of each row.
-
-    Returns
-    -------
-    dict of lists
-        For every curve in ``scales`` one :class:`Curve` for each cell; NaN where it has no rows.
+    ``scales`` holds, by curve to make of the dataset, one array for each cell: the factor of each
+    row.
     """
     points = results.column(f"{branch}_penetration").size
     done = np.sort(np.concatenate(rows))
@@ -79,8 +61,5 @@ def average_curves(
 
 
 def _empty(points: int) -> Curve:
-    return Curve(
-        mean=np.full(points, np.nan),
-        std=np.full(points, np.nan),
-        quantiles=np.full((len(QUANTILES), points), np.nan),
-    )
+    shapes = (points, points, (len(QUANTILES), points))
+    return Curve(*(np.full(shape, np.nan) for shape in shapes))

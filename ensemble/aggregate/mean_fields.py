@@ -8,96 +8,68 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import row_blocks
+from adhesis.ensemble.results.blocks import cells_of_rows, row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.solver.model.profile import Array
 
+_AVERAGED = ("psd_height", "height_density", "psd_displacement", "gap_density")
+
 
 @dataclass(frozen=True, eq=False)
 class DeformedShape:
-    """Fields of one realisation.
+    """Fields of one realisation."""
 
-    Attributes
-    ----------
-    height : array, shape (nodes,)
-        Rigid profile h in m.
-    displacement : array, shape (2, penetrations, nodes)
-        Deformed surface v in m, loading and unloading; NaN where there is no contact.
-    """
-
-    height: Array
+    height: Array  # shape (nodes,); rigid profile h in m
+    # Shape (2, penetrations, nodes); deformed surface v in m, loading and unloading; NaN where
+    # there is no contact
     displacement: Array
 
 
 @dataclass(frozen=True, eq=False)
 class FieldStatistics:
-    """Averages of every cell, in the order of the cells.
+    """Averages of every cell, in the order of the cells."""
 
-    Attributes
-    ----------
-    penetration : array, shape (penetrations,)
-        Δ/h_max of the states, or Δ over the largest one if the campaign has several of these.
-    gap_bin, height_bin : array
-        Middles of the bins: gap/h_max, height/h_rms. Wave numbers, and positions of the nodes of
-        shapes, are in the plan of each cell.
-    psd_height : array, shape (cells, wave numbers)
-        In m³; NaN for a cell without finished tasks.
-    height_density : array, shape (cells, height bins)
-    psd_displacement : array, shape (cells, 2, penetrations, wave numbers)
-        In m³, second axis loading and unloading.
-    gap_density : array, shape (cells, 2, penetrations, gap bins)
-    in_contact : int array, shape (cells, 2, penetrations)
-        Number of realisations averaged in the last two.
-    shapes : tuple of DeformedShape or None
-        Shapes of the first finished realisation whose fields are stored.
-    """
-
+    # Shape (penetrations,); Δ/h_max of the states, or Δ over the largest one if the campaign has
+    # several of these
     penetration: Array
+    # gap_bin, height_bin: middles of the bins: gap/h_max, height/h_rms. Wave numbers, and positions
+    # of the nodes of shapes, are in the plan of each cell.
     gap_bin: Array
     height_bin: Array
-    psd_height: Array
-    height_density: Array
+    psd_height: Array  # shape (cells, wave numbers), in m³; NaN for a cell without finished tasks
+    height_density: Array  # shape (cells, height bins)
+    # Shape (cells, 2, penetrations, wave numbers), in m³, second axis loading and unloading
     psd_displacement: Array
-    gap_density: Array
+    gap_density: Array  # shape (cells, 2, penetrations, gap bins)
+    # Shape (cells, 2, penetrations); number of realisations averaged in the last two
     in_contact: NDArray[np.int64]
+    # Shapes of the first finished realisation whose fields are stored
     shapes: tuple[DeformedShape | None, ...]
 
     def part(self, cells: Sequence[int]) -> FieldStatistics:
         """Return the averages of some of the cells."""
-        chosen = list(cells)
-        return replace(
-            self,
-            psd_height=self.psd_height[chosen],
-            height_density=self.height_density[chosen],
-            psd_displacement=self.psd_displacement[chosen],
-            gap_density=self.gap_density[chosen],
-            in_contact=self.in_contact[chosen],
-            shapes=tuple(self.shapes[k] for k in chosen),
-        )
+        names = (*_AVERAGED, "in_contact")
+        arrays: dict[str, Any] = {name: getattr(self, name)[list(cells)] for name in names}
+        return replace(self, shapes=tuple(self.shapes[k] for k in cells), **arrays)
 
 
 def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> FieldStatistics:
     """Average the given rows, one array of rows for each cell."""
-    psd_height, _ = _average(results, "psd_height", rows)
-    height_density, _ = _average(results, "height_density", rows)
-    psd_displacement, in_contact = _average(results, "psd_displacement", rows)
-    gap_density, _ = _average(results, "gap_density", rows)
+    averages = {name: _average(results, name, rows) for name in _AVERAGED}
     return FieldStatistics(
         penetration=results.column("field_penetration"),
         gap_bin=results.column("gap_bin"),
         height_bin=results.column("height_bin"),
-        psd_height=psd_height,
-        height_density=height_density,
-        psd_displacement=psd_displacement,
-        gap_density=gap_density,
-        in_contact=in_contact,
+        in_contact=averages["psd_displacement"][1],
         shapes=_shapes(results, rows),
+        **{name: mean for name, (mean, _) in averages.items()},
     )
 
 
@@ -130,9 +102,7 @@ def _average(
     shape = results.column(name, slice(0, 1)).shape[1:]
     total = np.zeros((len(rows), *shape))
     count = np.zeros((len(rows), *shape[:-1]), dtype=np.int64)
-    cell_of = np.full(len(results), -1)
-    for k, mine in enumerate(rows):
-        cell_of[mine] = k
+    cell_of = cells_of_rows(rows, len(results))
     for block in row_blocks(len(results), int(np.prod(shape))):
         chosen = np.flatnonzero(cell_of[block] >= 0)
         if not chosen.size:

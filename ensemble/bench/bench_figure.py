@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,9 +15,7 @@ from adhesis.ensemble.report.figures.style import (
     LINES,
     MM,
     TWO_COLUMNS,
-    Look,
     label_panel,
-    legend_above,
     look,
     new_figure,
     plain_decades,
@@ -44,13 +42,9 @@ def draw(lines: Sequence[Line]) -> Figure:
                 axes.set_visible(False)
                 continue
             for method in _METHODS:
-                chosen = [
-                    line
-                    for line in lines
-                    if line.run.scene is scenes[k]
-                    and line.run.method == method
-                    and math.isfinite(line.error)
-                ]
+                of_method = (line for line in lines if line.run.method == method)
+                here = [line for line in of_method if line.run.scene is scenes[k]]
+                chosen = [line for line in here if math.isfinite(line.error)]
                 if chosen:
                     shown[method] = _series(axes, method, chosen)
             label_panel(axes, scenes[k].title)
@@ -63,7 +57,7 @@ def draw(lines: Sequence[Line]) -> Figure:
             axes.set(xscale="log", yscale="log")
             axes.set_xlim(min(seconds) / 2, 2.5 * max(seconds))
             axes.set_ylim(min(errors) / 3, 5 * max(errors))
-        legend_above(figure, list(shown.values()), len(shown))
+        figure.legend_above(list(shown.values()), len(shown))
         plain_decades(figure.axes)
     return figure
 
@@ -72,28 +66,19 @@ def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
     """Draw the runs of one method, each with its setting beside it."""
     k = _METHODS.index(method)
     # sharp has the darkest colour, so that the methods differ in grey too.
-    of_method = {"grid": look(0), "sharp": replace(look(2), marker="s"), "tamaas": look(3)}
-    chosen: Look = of_method[method]
+    of_method = {"grid": look(0), "sharp": {**look(2), "marker": "s"}, "tamaas": look(3)}
     seconds = [line.measured.cpu_seconds for line in lines]
     errors = [_plotted_error(line) for line in lines]
-    (drawn,) = axes.plot(
-        seconds, errors, color=chosen.colour, marker=chosen.marker, ls=LINES[k], label=method
-    )
+    (drawn,) = axes.plot(seconds, errors, ls=LINES[k], label=method, **of_method[method])
     for number, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
         # Left below for sharp; right for the others, alternately above and below, as they lie
         # close.
         left = method == "sharp"
         below = left or number % 2 == 1
-        axes.annotate(
-            _short(line),
-            (x, y),
-            xytext=(-3 if left else 3, -3 if below else 3),
-            textcoords="offset points",
-            ha="right" if left else "left",
-            va="top" if below else "bottom",
-            fontsize=5,
-            color="0.25",
-        )
+        ha, va = ("right" if left else "left"), ("top" if below else "bottom")
+        look_of_text: Any = {"ha": ha, "va": va, "fontsize": 5, "color": "0.25"}
+        aside = (-3 if left else 3, -3 if below else 3)
+        axes.annotate(_short(line), (x, y), aside, textcoords="offset points", **look_of_text)
     return drawn
 
 

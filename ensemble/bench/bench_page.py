@@ -1,12 +1,14 @@
-"""Write the tables of the benchmark as cells, as CSV records and as a Markdown page."""
+"""Write the tables of the benchmark: cells, columns of the CSV file, a Markdown page."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from operator import attrgetter
 
 from adhesis.ensemble.bench.equal_error import Exponent, Line, Quotient, Ratio
 from adhesis.ensemble.escape import markdown_table
+from adhesis.ensemble.report.tables.table import TableColumn
 
 _COLUMNS: dict[str, Callable[[Line], str]] = {
     "scene": lambda line: line.run.scene.title,
@@ -27,6 +29,19 @@ GROWTH_COLUMNS = (
     *("scene", "method", "setting", "CPU s", "MB", "W~", "audit"),
     *("patches", "jumps", "solutions", "ms"),
 )
+_COST = ("cpu_seconds", "megabytes", "megabytes_before", "loss", "loss_dimensionless")
+RECORD = (
+    TableColumn("scene", attrgetter("run.scene.name")),
+    *(TableColumn(n, attrgetter(f"run.{n}")) for n in ("method", "setting", "load_steps")),
+    *(TableColumn(name, attrgetter(f"measured.{name}")) for name in _COST),
+    TableColumn("error", attrgetter("error")),
+    TableColumn("audit_residual", attrgetter("measured.audit_residual")),
+    *(TableColumn(n, attrgetter(f"measured.{n}")) for n in ("solutions", "jumps", "patches")),
+    TableColumn("reference_loss", attrgetter("reference.loss")),
+    TableColumn("reference", attrgetter("reference.text")),
+    TableColumn("note", attrgetter("measured.note")),
+)
+"""Columns of the CSV file."""
 _RATIO_COLUMNS = ("scene", "sharp", "error", "grid / sharp", "cheapest grid / sharp")
 _EXPONENT_COLUMNS = ("among", "grows with", "from", "to", "CPU time of a loop", "of a solution")
 
@@ -37,34 +52,6 @@ def cells(line: Line, columns: Sequence[str]) -> list[str]:
     known = columns[: columns.index("setting") + 1] if note else columns
     found = [_COLUMNS[name](line) for name in known] + ([note] if note else [])
     return found + [""] * (len(columns) - len(found))
-
-
-def record(line: Line) -> dict[str, object]:
-    """Return one line as a CSV record; unknown values are empty."""
-    measured, run = line.measured, line.run
-    fields: dict[str, object] = {
-        "scene": run.scene.name,
-        "method": run.method,
-        "setting": run.setting,
-        "load_steps": run.load_steps,
-        "cpu_seconds": measured.cpu_seconds,
-        "megabytes": measured.megabytes,
-        "megabytes_before": measured.megabytes_before,
-        "loss": measured.loss,
-        "loss_dimensionless": measured.loss_dimensionless,
-        "error": line.error,
-        "audit_residual": measured.audit_residual,
-        "solutions": measured.solutions,
-        "jumps": measured.jumps,
-        "patches": measured.patches,
-        "reference_loss": line.reference.loss,
-        "reference": line.reference.text,
-        "note": measured.note,
-    }
-    return {
-        key: "" if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in fields.items()
-    }
 
 
 def page(

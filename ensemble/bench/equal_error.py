@@ -67,41 +67,24 @@ class Ratio:
 
     The errors of ``grid`` come from single jumps and change their sign from one number of nodes to
     the next: a coarse grid can be accurate by chance, which only a reference shows.
-
-    Attributes
-    ----------
-    converged : Quotient
-        Ratio to the coarsest grid that is at least as accurate, as are all finer ones that
-        finished.
-    cheapest : Quotient
-        Ratio to the cheapest grid that is at least as accurate, perhaps by chance.
     """
 
     line: Line
+    # Ratio to the coarsest grid that is at least as accurate, as are all finer ones that finished
     converged: Quotient
-    cheapest: Quotient
+    cheapest: Quotient  # ratio to the cheapest grid that is at least as accurate, perhaps by chance
 
 
 @dataclass(frozen=True)
 class Exponent:
-    """Exponent of a power law of the CPU time of ``sharp``, by least squares in the logarithms.
+    """Exponent of a power law of the CPU time of ``sharp``, by least squares in the logarithms."""
 
-    Attributes
-    ----------
-    among : str
-        Property that the lines share.
-    variable : str
-        Name of the independent variable.
-    least, most : int
-        Range of the variable.
-    of_loop, of_solution : float
-        Exponents of the CPU time of a loop and of a solution.
-    """
-
-    among: str
-    variable: str
+    among: str  # property that the lines share
+    variable: str  # name of the independent variable
+    # least, most: range of the variable
     least: int
     most: int
+    # of_loop, of_solution: exponents of the CPU time of a loop and of a solution
     of_loop: float
     of_solution: float
 
@@ -112,16 +95,10 @@ def benchmark(
     seconds: float = 360.0,
     on_line: Callable[[Line], None] | None = None,
 ) -> list[Line]:
-    """Measure the methods on the scenes.
+    """Measure the methods on the scenes; ``on_line`` is called with every line when it is measured.
 
-    Parameters
-    ----------
-    scenes : sequence of Scene
-    seconds : float
-        CPU seconds after which a run is given up. A grid that would take longer, estimated from the
-        one before it, is left out. Both give lines with a note.
-    on_line : callable, optional
-        Called with every line after it is measured.
+    A run is given up after so many CPU seconds. A grid that would take longer, estimated from the
+    one before it, is left out. Both give lines with a note.
     """
     lines: list[Line] = []
     _fill_caches()

@@ -38,24 +38,15 @@ _START_LIMIT = 300.0
 
 @dataclass(frozen=True)
 class Run:
-    """Method, setting and limits of a measured loop.
-
-    Attributes
-    ----------
-    method : {"grid", "sharp", "tamaas"}
-    setting : float
-        Nodes per shortest wave of ``grid``, accuracy of ``sharp``, range of adhesion of ``tamaas``
-        in units of h_max.
-    load_steps : int
-    seconds : float
-        CPU seconds after which the run is given up.
-    """
+    """Method, setting and limits of a measured loop."""
 
     scene: Scene
     method: Measured
+    # Nodes per shortest wave of ``grid``, accuracy of ``sharp``, range of adhesion of ``tamaas`` in
+    # units of h_max
     setting: float
     load_steps: int
-    seconds: float
+    seconds: float  # CPU seconds after which the run is given up
 
     @property
     def described(self) -> str:
@@ -69,42 +60,23 @@ class Run:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Cost and result of a run; NaN and zero if it did not finish.
+    """Cost and result of a run; NaN and zero if it did not finish."""
 
-    Attributes
-    ----------
-    cpu_seconds : float
-        Time from the problem to the finished loop.
-    megabytes, megabytes_before : float
-        Largest resident memory of the process, and the same before the loop: interpreter,
-        libraries, compiled code.
-    loss : float
-        Loop integral in J/m² of nominal area.
-    loss_dimensionless : float
-        W~.
-    audit_residual : float
-        (loop integral - sum of drops) / loop integral.
-    solutions : int
-        Number of elastic solutions for given edges or contact sets.
-    jumps, patches : int
-        Number of jumps, and most patches at a time.
-    compiled : bool
-        Whether code was compiled during the loop, so that time and memory are too large.
-    note : str
-        Reason why the run did not finish; else empty.
-    """
-
-    cpu_seconds: float = float("nan")
+    cpu_seconds: float = float("nan")  # time from the problem to the finished loop
+    # megabytes, megabytes_before: largest resident memory of the process, and the same before the
+    # loop: interpreter, libraries, compiled code
     megabytes: float = float("nan")
     megabytes_before: float = float("nan")
-    loss: float = float("nan")
-    loss_dimensionless: float = float("nan")
-    audit_residual: float = float("nan")
-    solutions: int = 0
+    loss: float = float("nan")  # loop integral in J/m² of nominal area
+    loss_dimensionless: float = float("nan")  # W~
+    audit_residual: float = float("nan")  # (loop integral - sum of drops) / loop integral
+    solutions: int = 0  # number of elastic solutions for given edges or contact sets
+    # jumps, patches: number of jumps, and most patches at a time
     jumps: int = 0
     patches: int = 0
+    # Whether code was compiled during the loop, so that time and memory are too large
     compiled: bool = False
-    note: str = ""
+    note: str = ""  # reason why the run did not finish; else empty
 
 
 def measure(run: Run) -> Measurement:

@@ -33,45 +33,28 @@ _HURST, _H_RMS, _SEED = 0.8, 1e-6, 1
 
 @dataclass(frozen=True)
 class Scene:
-    """One problem, its cycle, and the resolutions at which the methods are measured.
-
-    Attributes
-    ----------
-    name, title : str
-    shape : {"one wave", "two waves", "rough"}
-        A cos(q0 x), the same with a ripple, or self-affine (H = 0.8, h_rms = 1 µm, seed 1).
-    work_of_adhesion : float
-        γ in J/m²; not read for one wave, where it follows from α = 0.2.
-    load_steps : int
-        Steps from first touch to ``max_penetration`` (Δ~max).
-    n0, ratio : int
-        Lowest harmonic, and highest over lowest, of the rough shape.
-    grids : tuple of int
-        Lower bounds of the nodes per shortest wave, coarse to fine.
-    accuracies : tuple of float
-        Requested accuracies of the loss, low to high.
-    ranges : tuple of float
-        Ranges of adhesion for tamaas in units of h_max, as small as feasible.
-    tightest : tuple of float
-        Accuracies of the reference run of ``sharp``, best first; the first that succeeds is
-        used. Empty if the loss is known exactly.
-    reference_load_steps : int
-        Load steps of the reference run.
-    """
+    """One problem, its cycle, and the resolutions at which the methods are measured."""
 
     name: str
     title: str
+    # A cos(q0 x), the same with a ripple, or self-affine (H = 0.8, h_rms = 1 µm, seed 1)
     shape: Shape
-    work_of_adhesion: float = 0.0
+    work_of_adhesion: float = 0.0  # γ in J/m²; not read for one wave, where it follows from α = 0.2
     max_penetration: float = 0.9
-    load_steps: int = 40
+    load_steps: int = 40  # steps from first touch to ``max_penetration`` (Δ~max)
+    # n0, ratio: lowest harmonic, and highest over lowest, of the rough shape
     n0: int = 1
     ratio: int = 1
+    # Lower bounds of the nodes per shortest wave, coarse to fine
     grids: tuple[int, ...] = (8, 16, 32, 64)
+    # Requested accuracies of the loss, low to high
     accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+    # Ranges of adhesion for tamaas in units of h_max, as small as feasible
     ranges: tuple[float, ...] = ()
+    # Accuracies of the reference run of ``sharp``, best first; the first that succeeds is used.
+    # Empty if the loss is known exactly.
     tightest: tuple[float, ...] = ()
-    reference_load_steps: int = 80
+    reference_load_steps: int = 80  # load steps of the reference run
 
     def problem(self) -> Problem:
         """Return the problem of this scene."""

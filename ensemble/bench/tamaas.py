@@ -53,10 +53,7 @@ def tamaas_loop(
 ) -> TamaasLoop:
     """Run one complete loop at fixed separations with adhesion of the range ``reach`` (m).
 
-    Raises
-    ------
-    RuntimeError
-        If the contact has not detached after twenty loading strokes.
+    RuntimeError if the contact has not detached after twenty loading strokes.
     """
     solver = _Continuation(importlib.import_module("tamaas"), problem, reach)
     h_max = problem.profile.h_max

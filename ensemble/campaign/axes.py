@@ -12,19 +12,12 @@ Value = float
 
 @dataclass(frozen=True)
 class Axis:
-    """One key of a campaign that has several values (H and γ always are axes).
+    """One key of a campaign that has several values (H and γ always are axes)."""
 
-    Attributes
-    ----------
-    table, name : str
-        Where the key stands: "profile", "ratio".
-    values : tuple
-        As they are combined: ascending, or, where keys vary together, in the order of the first.
-    unit, meaning : str
-    """
-
+    # table, name: where the key stands: "profile", "ratio"
     table: str
     name: str
+    # As they are combined: ascending, or, where keys vary together, in the order of the first
     values: tuple[Value, ...]
     unit: str
     meaning: str

@@ -11,23 +11,15 @@ from typing import Any
 
 from adhesis.ensemble.campaign.rules import shown
 from adhesis.ensemble.campaign.tables import KEYS, TURNING_POINTS, Campaign
-from adhesis.ensemble.campaign.tasks import Tasks
+from adhesis.ensemble.errors import InputError
 
 
 @dataclass(frozen=True)
 class Changes:
-    """Differences of a campaign from the one of a results file.
+    """Differences of a campaign from the one of a results file."""
 
-    Attributes
-    ----------
-    grown : tuple of str
-        Keys of the sweep that only gained values.
-    other : tuple of str
-        One phrase for each other key that differs: its name and both values.
-    """
-
-    grown: tuple[str, ...]
-    other: tuple[str, ...]
+    grown: tuple[str, ...]  # keys of the sweep that only gained values
+    other: tuple[str, ...]  # one phrase for each other key that differs: its name and both values
 
 
 def differing(one: Campaign, two: Campaign) -> list[str]:
@@ -40,9 +32,7 @@ def compare(old: Campaign, new: Campaign) -> Changes:
     """Compare two campaigns; keys that cannot change a result are left out."""
     before, after = old.values(), new.values()
     grown, other = [], []
-    missing = {old.identity(t)[:2] + old.identity(t)[4:] for t in _firsts(old)} - {
-        new.identity(t)[:2] + new.identity(t)[4:] for t in _firsts(new)
-    }
+    missing = _cells(old) - _cells(new)
     for key in differing(old, new):
         was, value = before[key], after[key]
         if KEYS[key].metadata["free"]:
@@ -52,6 +42,17 @@ def compare(old: Campaign, new: Campaign) -> Changes:
         else:
             other.append(f"{key} is {shown(value)} here and {shown(was)} there")
     return Changes(tuple(grown), tuple(other))
+
+
+def growth(path: object, old: Campaign, new: Campaign) -> tuple[str, ...]:
+    """Return the keys by which the campaign of a results file grew; InputError for another one."""
+    changes = compare(old, new)
+    if changes.other:
+        raise InputError(
+            f"{path} holds another campaign: {'; '.join(changes.other)} "
+            "(here: this campaign, there: the file)"
+        )
+    return changes.grown
 
 
 def _extends(key: str, was: Any, now: Any) -> bool:
@@ -72,6 +73,7 @@ def _values(value: Any) -> set[Any]:
     return set(value) if isinstance(value, list) else {value}
 
 
-def _firsts(campaign: Campaign) -> Tasks:
-    """One task of every cell."""
-    return campaign.tasks().of_cells()
+def _cells(campaign: Campaign) -> set[Any]:
+    """Return what identifies each cell, also in a campaign that grew new axes."""
+    found = (campaign.identity(task) for task in campaign.tasks().of_cells())
+    return {identity[:2] + identity[4:] for identity in found}

@@ -33,13 +33,7 @@ _LONGEST_AXIS = 1_000_000
 
 
 def load_campaign(path: Path | str) -> Campaign:
-    """Read and check a campaign file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or breaks a rule; one sentence.
-    """
+    """Read and check a campaign file (InputError)."""
     try:
         with open_regular(path) as stream:
             data = stream.read(_LONGEST_TEXT + len(codecs.BOM_UTF8) + 1)
@@ -51,16 +45,11 @@ def load_campaign(path: Path | str) -> Campaign:
 
 
 def read_campaign(text: str, source: str = "campaign") -> Campaign:
-    """Read and check the text of a campaign that is to be computed.
+    """Read and check the text of a campaign that is to be computed (InputError).
 
     Numbers that can hardly be in SI units are refused, as by the options of the command line. The
     text in a results file is read by :func:`parse_campaign`, which takes them: its loops have been
     computed.
-
-    Raises
-    ------
-    InputError
-        If it breaks a rule; one sentence.
     """
     campaign = parse_campaign(text, source)
     with _of(source):
@@ -98,13 +87,7 @@ def _decoded(data: bytes, source: str) -> str:
 
 
 def parse_campaign(text: str, source: str = "campaign") -> Campaign:
-    """Check the text of a campaign file; ``source`` names it in errors.
-
-    Raises
-    ------
-    InputError
-        If it breaks a rule; one sentence.
-    """
+    """Check the text of a campaign file; ``source`` names it in errors (InputError)."""
     try:
         size = len(text.encode("utf-8"))
     except UnicodeEncodeError as error:
@@ -239,9 +222,8 @@ def _check_zip(sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...
         if len({length[name] for name in group}) > 1:
             lengths = ", ".join(f"{name} {length[name]}" for name in group)
             raise InputError(
-                f"[sweep] zip joins lists of different lengths ({lengths}): they must "
-                "have "
-                "as many values each"
+                f"[sweep] zip joins lists of different lengths ({lengths}): they must have as many "
+                "values each"
             )
 
 
@@ -311,9 +293,8 @@ def _check_together(campaign: Campaign) -> None:
     for value in campaign.output.field_penetrations or ():
         if not cycle.unloading_until <= value <= cycle.turning_point:
             raise InputError(
-                f"[output] field_penetrations holds {value}: it must lie between "
-                f"unloading_until ({cycle.unloading_until:g}) and max_penetration "
-                f"({cycle.turning_point:g})"
+                f"[output] field_penetrations holds {value}: it must lie between unloading_until "
+                f"({cycle.unloading_until:g}) and max_penetration ({cycle.turning_point:g})"
             )
     length = cycle.load_steps * (1 - cycle.unloading_until / cycle.deepest)
     if length > _LONGEST_AXIS:

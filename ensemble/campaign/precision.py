@@ -49,24 +49,13 @@ def fewest(at: Sequence[int]) -> int:
 
 @dataclass(frozen=True)
 class Precision:
-    """Precision of the mean of a cell, and whether it is the wanted one.
+    """Precision of the mean of a cell, and whether it is the wanted one."""
 
-    Attributes
-    ----------
-    quantity : str
-        Column of the results file that ``[stop]`` steers.
-    wanted : float
-        How far the interval may reach from the mean, over the mean.
-    estimate : Estimate
-        The mean and both ends of its interval, in the unit of the quantity; NaN where unknown.
-    finished : bool
-        Whether no realisation of the cell is still to be computed.
-    """
-
-    quantity: str
-    wanted: float
+    quantity: str  # column of the results file that ``[stop]`` steers
+    wanted: float  # how far the interval may reach from the mean, over the mean
+    # The mean and both ends of its interval, in the unit of the quantity; NaN where unknown
     estimate: Estimate
-    finished: bool = True
+    finished: bool = True  # whether no realisation of the cell is still to be computed
 
     @property
     def relative_error(self) -> float:
@@ -102,18 +91,7 @@ class Precision:
 def precision(
     values: Sequence[float] | Array, wanted: float, quantity: str = "", *, finished: bool = True
 ) -> Precision:
-    """Return how well the mean of a cell is known.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        One of each realisation; those that are not finite, of failed tasks, are left out.
-    wanted : float
-    quantity : str, optional
-        What the values are.
-    finished : bool, optional
-        Whether no realisation is still to be computed.
-    """
+    """Return how well the mean of a cell is known; values that are not finite are left out."""
     known = np.asarray(values, np.float64)
     (estimate,) = estimates(known[np.isfinite(known)])
     return Precision(quantity, wanted, estimate, finished)
@@ -122,14 +100,8 @@ def precision(
 def enough(values: Sequence[float] | Array, at: Sequence[int], wanted: float) -> int | None:
     """Return after how many realisations a cell has enough, None if it has not yet.
 
-    Parameters
-    ----------
-    values : sequence of float
-        By realisation, so many as are known without a gap; NaN where the task failed.
-    at : sequence of int
-        Where it is looked at (:func:`looks`).
-    wanted : float
-        How far the interval may reach from the mean, over the mean.
+    ``values`` are those of realisations without a gap, NaN where a task failed; ``at`` is of
+    :func:`looks`.
     """
     row = 0
     for count in at:
@@ -142,14 +114,9 @@ def enough(values: Sequence[float] | Array, at: Sequence[int], wanted: float) ->
 
 
 def precision_lines(cells: Sequence[tuple[str, Precision]]) -> list[str]:
-    """Return lines on which cells have met the wanted precision; none without any cell.
+    """Return lines on which cells (name, precision) have met the wanted precision.
 
     Of many cells only those are listed that have not met it, and of these the first.
-
-    Parameters
-    ----------
-    cells : sequence of (str, Precision)
-        Name of every cell, and how well its mean is known.
     """
     if not cells:
         return []

@@ -14,33 +14,17 @@ from adhesis.solver.checks import Bounds
 
 @dataclass(frozen=True)
 class Rule:
-    """Rule for a value.
+    """Rule for a value."""
 
-    Attributes
-    ----------
-    text : str
-        The rule in words, after "it must be".
-    read : callable
-        Returns the value as it will be used; ValueError if it breaks the rule.
-    quantity : Quantity, optional
-        Of the number, or of each one of a list, if it may have a unit.
-    bounds : Bounds, optional
-        Of the number, or of each one of a list.
-    """
-
-    text: str
+    text: str  # the rule in words, after "it must be"
+    # Returns the value as it will be used; ValueError if it breaks the rule
     read: Callable[[object], Any]
+    # Of the number, or of each one of a list, if it may have a unit
     quantity: Quantity | None = None
-    bounds: Bounds | None = None
+    bounds: Bounds | None = None  # of the number, or of each one of a list
 
     def __call__(self, where: str, value: object) -> Any:
-        """Return the value as it will be used.
-
-        Raises
-        ------
-        InputError
-            "WHERE is VALUE: it must be RULE".
-        """
+        """Return the value as it will be used; InputError "WHERE is VALUE: it must be RULE"."""
         try:
             return self.read(value)
         except UnitError as error:

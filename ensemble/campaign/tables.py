@@ -27,26 +27,7 @@ from adhesis.ensemble.campaign.rules import (
 )
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import HEIGHT
-from adhesis.solver.checks import (
-    ACCURACY,
-    ADHESION_RANGE,
-    FAR_DISPLACEMENT,
-    FULL_PENETRATION,
-    HARMONIC,
-    HURST,
-    LENGTH,
-    LOAD_STEPS,
-    MAX_PENETRATION,
-    MAX_STRESS,
-    NODES_PER_WAVE,
-    POISSON,
-    ROLLOFF,
-    SPRING,
-    STRENGTH,
-    WORK_OF_ADHESION,
-    YOUNG,
-    Bounds,
-)
+from adhesis.solver import checks
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
@@ -70,20 +51,24 @@ def _key(
 
 
 # The far side of a stiffness may go beyond 1; at a fixed separation the file's rules refuse that.
-_DISPLACEMENT = Bounds(0.0, FAR_DISPLACEMENT.high, without_low=True)
+_DISPLACEMENT = checks.Bounds(0.0, checks.FAR_DISPLACEMENT.high, without_low=True)
 # Penetrations at which fields are stored.
-_STORED = Bounds(-1000, 1, without_low=True, without_high=True)
+_STORED = checks.Bounds(-1000, 1, without_low=True, without_high=True)
 
 
 @dataclass(frozen=True)
 class ProfileTable:
     """``[profile]``: the rough profile, by the spectral method."""
 
-    period: float = _key(number_in(LENGTH), "period λ in m", axis="m")
-    n0: int = _key(number_in(HARMONIC), "lowest harmonic: its wave number is n0 · 2π/λ", axis="1")
-    ratio: int = _key(number_in(HARMONIC), "highest over lowest wave number, q_max/q_min", axis="1")
+    period: float = _key(number_in(checks.LENGTH), "period λ in m", axis="m")
+    n0: int = _key(
+        number_in(checks.HARMONIC), "lowest harmonic: its wave number is n0 · 2π/λ", axis="1"
+    )
+    ratio: int = _key(
+        number_in(checks.HARMONIC), "highest over lowest wave number, q_max/q_min", axis="1"
+    )
     rolloff: float = _key(
-        number_in(ROLLOFF),
+        number_in(checks.ROLLOFF),
         "roll-off over lowest wave number, q_r/q_min: the spectrum is flat below",
         1.0,
         axis="1",
@@ -115,20 +100,20 @@ class ProfileTable:
 class MaterialTable:
     """``[material]``: the elastic half-space, and the strength of the interface."""
 
-    young: float = _key(number_in(YOUNG), "Young's modulus E in Pa", axis="Pa")
-    poisson: float = _key(number_in(POISSON), "Poisson's ratio ν", axis="1")
+    young: float = _key(number_in(checks.YOUNG), "Young's modulus E in Pa", axis="Pa")
+    poisson: float = _key(number_in(checks.POISSON), "Poisson's ratio ν", axis="1")
     adhesion_range: float | None = _key(
-        number_in(ADHESION_RANGE),
+        number_in(checks.ADHESION_RANGE),
         "range δ of adhesion in m: patches open from inside at the strength γ/δ; by default zero, "
         "so that they never do",
         None,
         axis="m",
     )
     strength: float | None = _key(
-        number_in(STRENGTH), "instead of adhesion_range, the strength in Pa", None, axis="Pa"
+        number_in(checks.STRENGTH), "instead of adhesion_range, the strength in Pa", None, axis="Pa"
     )
     work_of_adhesion_open: float | None = _key(
-        number_in(WORK_OF_ADHESION),
+        number_in(checks.WORK_OF_ADHESION),
         "work of adhesion in J/m² where an edge recedes, at least γ, at which it advances; between "
         "both it is pinned. By default γ",
         None,
@@ -150,9 +135,9 @@ class MaterialTable:
 class SweepTable:
     """``[sweep]``: one task for every H, γ (and what else is a list) and realisation."""
 
-    hurst: tuple[float, ...] = _key(list_of(number_in(HURST)), "Hurst exponents H")
+    hurst: tuple[float, ...] = _key(list_of(number_in(checks.HURST)), "Hurst exponents H")
     work_of_adhesion: tuple[float, ...] = _key(
-        list_of(number_in(WORK_OF_ADHESION)), "works of adhesion γ in J/m²"
+        list_of(number_in(checks.WORK_OF_ADHESION)), "works of adhesion γ in J/m²"
     )
     realisations: int = _key(
         whole_number(1, 2**31 - 1), "profiles for every cell; with [stop] the first of them"
@@ -173,20 +158,20 @@ class CycleTable:
     """``[cycle]``: the loading path."""
 
     max_penetration: float | None = _key(
-        Rule(number_in(MAX_PENETRATION).text, number_in(_DISPLACEMENT).read),
+        Rule(number_in(checks.MAX_PENETRATION).text, number_in(_DISPLACEMENT).read),
         "Δ~max, the penetration in units of h_max at which unloading starts; with a preload, at "
         "which it starts at the latest",
         None,
         axis="1",
     )
     max_stress: float | None = _key(
-        number_in(MAX_STRESS),
+        number_in(checks.MAX_STRESS),
         "mean stress in Pa at which unloading starts under a load, instead of max_penetration",
         None,
         axis="Pa",
     )
     preload: float | None = _key(
-        number_in(MAX_STRESS),
+        number_in(checks.MAX_STRESS),
         "mean stress in Pa that a machine reaches before it unloads; max_penetration is then the "
         "latest turning point, and the end of the curves (by default 0.999; needed with a "
         "stiffness)",
@@ -196,16 +181,16 @@ class CycleTable:
     control: PathControl = _key(  # noqa: RUF009  # a field
         choice(*get_args(PathControl)), "what is prescribed along the path", "separation"
     )
-    load_steps: int = _key(number_in(LOAD_STEPS), "equal steps of the loading branch")
+    load_steps: int = _key(number_in(checks.LOAD_STEPS), "equal steps of the loading branch")
     stiffness: float | None = _key(
-        number_in(SPRING),
+        number_in(checks.SPRING),
         "stiffness k of what holds the half-space, in Pa/m of nominal area; by default the "
         "separation is fixed. With it, penetrations of the path and of curves are u_tot/h_max",
         None,
         axis="Pa m-1",
     )
     unloading_until: float = _key(
-        number_in(Bounds(-1000, 0.0, without_high=True)),
+        number_in(checks.Bounds(-1000, 0.0, without_high=True)),
         "end of the stored unloading curve, in units of h_max (the loop itself ends at detachment)",
         -8.0,
     )
@@ -232,7 +217,7 @@ class CycleTable:
         """Δ/h_max that the loop does not exceed: its latest turning point; 1 under a load."""
         if self.under_load:
             return 1.0
-        return FULL_PENETRATION if self.max_penetration is None else self.max_penetration
+        return checks.FULL_PENETRATION if self.max_penetration is None else self.max_penetration
 
 
 @dataclass(frozen=True)
@@ -242,12 +227,17 @@ class SolverTable:
     method: MethodName = _key(  # noqa: RUF009  # a field
         choice(*METHOD_NAMES), "how contact states are found; auto chooses", "auto"
     )
-    accuracy: float = _key(number_in(ACCURACY), "wanted relative error of the loss", 1e-3)
+    accuracy: float = _key(number_in(checks.ACCURACY), "wanted relative error of the loss", 1e-3)
     nodes_per_wave: int | None = _key(
-        number_in(NODES_PER_WAVE), "nodes per shortest wave, instead of those of accuracy", None
+        number_in(checks.NODES_PER_WAVE),
+        "nodes per shortest wave, instead of those of accuracy",
+        None,
     )
     time_limit: float | None = _key(
-        number_in(Bounds(1e-30, 1e30, unit="s")), "longest time of one task in s", None, free=True
+        number_in(checks.Bounds(1e-30, 1e30, unit="s")),
+        "longest time of one task in s",
+        None,
+        free=True,
     )
 
 
@@ -281,7 +271,7 @@ class StopTable:
     """``[stop]``: realisations in batches until a mean of every cell is known well enough."""
 
     relative_error: float | None = _key(
-        number_in(Bounds(0, 1, without_low=True, without_high=True)),
+        number_in(checks.Bounds(0, 1, without_low=True, without_high=True)),
         "how far the 95 % interval of the mean of the quantity may reach from it, over it",
         None,
     )
@@ -316,13 +306,8 @@ class Campaign:
     """A checked campaign. Built by :mod:`adhesis.ensemble.campaign.file`.
 
     Equal if they mean the same; ``text`` is the TOML as it was written. Where a key of the profile,
-    material or cycle is a list, its table holds the smallest value, and :meth:`at` gives the
-    campaign with the values of a task.
-
-    Attributes
-    ----------
-    lists : tuple
-        The other axes than H and γ, as they were given: (table, name, values).
+    material or cycle is a list, its table holds the smallest value, ``lists`` all of them as given
+    (table, name, values), and :meth:`at` gives the campaign with the values of a task.
     """
 
     profile: ProfileTable

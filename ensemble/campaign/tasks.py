@@ -40,27 +40,13 @@ def task_seed(campaign_seed: int, realisation: int) -> int:
 
 @dataclass(frozen=True, order=True)
 class Task:
-    """One loop to compute.
+    """One loop to compute."""
 
-    Attributes
-    ----------
-    hurst : float
-        H.
-    work_of_adhesion : float
-        γ in J/m².
-    realisation : int
-        0 … realisations - 1.
-    seed : int
-        Of the profile's phases; ``adhesis loop --seed`` with it gives the same profile.
-    others : tuple of (str, number)
-        Names and values of further axes of the sweep.
-    """
-
-    hurst: float
-    work_of_adhesion: float
-    realisation: int
-    seed: int
-    others: tuple[tuple[str, float], ...] = ()
+    hurst: float  # H
+    work_of_adhesion: float  # γ in J/m²
+    realisation: int  # 0 … realisations - 1
+    seed: int  # of the profile's phases; ``adhesis loop --seed`` with it gives the same profile
+    others: tuple[tuple[str, float], ...] = ()  # names and values of further axes of the sweep
 
     @property
     def cell(self) -> tuple[float, ...]:
@@ -81,26 +67,13 @@ class Tasks(Sequence[Task]):
     """Tasks of a campaign by number; each is made when it is asked for.
 
     So a campaign of millions of tasks can be refused, or priced, before they take memory.
-
-    Attributes
-    ----------
-    cells : sequence of tuple
-        Values on the axes: H, γ, and the others.
-    names : tuple of str
-        Of the others.
-    realisations : int
-        Of each cell.
-    seed : int
-        Of the campaign.
-    rows : int array
-        Numbers of these tasks in the whole campaign, cell by cell, ascending.
     """
 
-    cells: Sequence[tuple[float, ...]]
-    names: tuple[str, ...]
-    realisations: int
-    seed: int
-    rows: NDArray[np.int64]
+    cells: Sequence[tuple[float, ...]]  # values on the axes: H, γ, and the others
+    names: tuple[str, ...]  # of the others
+    realisations: int  # of each cell
+    seed: int  # of the campaign
+    rows: NDArray[np.int64]  # numbers of these tasks in the whole campaign, cell by cell, ascending
 
     def __len__(self) -> int:
         """Return the number of tasks."""
@@ -156,27 +129,14 @@ class Tasks(Sequence[Task]):
 
 @dataclass(frozen=True)
 class Part:
-    """A share of the tasks of a campaign, computed apart: every ``of``-th row.
+    """A share of the tasks of a campaign, computed apart: every ``of``-th row."""
 
-    Attributes
-    ----------
-    number : int
-        1 … of.
-    of : int
-        Number of parts.
-    """
-
-    number: int
-    of: int
+    number: int  # 1 … of
+    of: int  # number of parts
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the part that "3/20" names.
-
-        Raises
-        ------
-        InputError
-        """
+        """Return the part that "3/20" names (InputError)."""
         match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text.strip())
         if match and 1 <= int(match[1]) <= int(match[2]):
             return cls(int(match[1]), int(match[2]))

@@ -7,7 +7,6 @@ does not count. The full benchmark takes three quarters of an hour, --quick less
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import platform
 import sys
@@ -19,8 +18,6 @@ from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import following
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from adhesis.ensemble.bench.equal_error import Line
 
 _DEFAULT = Path("out/benchmark")
@@ -55,9 +52,10 @@ def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
     from rich.console import Console
 
-    from adhesis.ensemble.bench.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, cells, page
+    from adhesis.ensemble.bench.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, RECORD, cells, page
     from adhesis.ensemble.bench.equal_error import benchmark, exponents, growth, ratios
     from adhesis.ensemble.bench.scenes import FULL, QUICK
+    from adhesis.ensemble.report.tables.table import make_table, rich_table
     from adhesis.ensemble.warm import warm_missing
     from adhesis.solver.precompile import COMPILED_METHODS
 
@@ -80,43 +78,22 @@ def execute(args: argparse.Namespace) -> int:
     for scene in dict.fromkeys(line.run.scene for line in lines):
         chosen = [line for line in lines if line.run.scene is scene]
         title = f"{scene.title}; reference: {chosen[0].reference.text}"
-        console.print(_table(title, LINE_COLUMNS, chosen))
+        rows = [cells(line, LINE_COLUMNS) for line in chosen]
+        console.print(rich_table(title, LINE_COLUMNS, rows, slice(2, None)))
     if grown:
-        console.print(_table("How the cost grows", GROWTH_COLUMNS, grown))
+        rows = [cells(line, GROWTH_COLUMNS) for line in grown]
+        console.print(rich_table("How the cost grows", GROWTH_COLUMNS, rows, slice(2, None)))
     compared = ratios(lines)
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
     text = page(lines, grown, compared, exponents(grown), f"`{command}` on {_machine()}")
     writing = Writing()
     with writing.output("the benchmark in", args.to), staged_folder(args.to) as folder:
-        _write_csv(folder / "benchmark.csv", [*lines, *grown])
+        make_table("", RECORD, [*lines, *grown]).write_csv(folder / "benchmark.csv")
         (folder / "benchmark.md").write_text(text, encoding="utf-8")
         _draw(lines, folder / "benchmark")
     writing.finish()
     console.print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
     return 0
-
-
-def _table(title: str, columns: tuple[str, ...], lines: list[Line]) -> Table:
-    from rich.table import Table
-
-    from adhesis.ensemble.bench.bench_page import cells
-
-    table = Table(title=title, title_justify="left")
-    for k, heading in enumerate(columns):
-        table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=True)
-    for line in lines:
-        table.add_row(*cells(line, columns))
-    return table
-
-
-def _write_csv(path: Path, lines: list[Line]) -> None:
-    from adhesis.ensemble.bench.bench_page import record
-
-    records = [record(line) for line in lines]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(records[0]))
-        writer.writeheader()
-        writer.writerows(records)
 
 
 def _draw(lines: list[Line], stem: Path) -> None:

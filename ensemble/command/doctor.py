@@ -12,6 +12,7 @@ from pathlib import Path
 
 from adhesis.ensemble.doctor.examine import Diagnosis, examine
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 
 EXAMPLES = (
     "adhesis doctor",
@@ -42,7 +43,7 @@ def execute(args: argparse.Namespace) -> int:
         print(json.dumps(diagnosis.as_dict(), indent=2))
     else:
         print(_text(diagnosis))
-    return 0 if diagnosis.usable else 1
+    return DONE if diagnosis.usable else SOME_FAILED
 
 
 def _text(diagnosis: Diagnosis) -> str:

@@ -12,17 +12,11 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, one_of, refused_as_input
+from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
+from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
-from adhesis.ensemble.loop.record import (
-    document,
-    fields_at_penetrations,
-    fields_at_stresses,
-    loop_summary,
-    path_summary,
-    write_npz,
-)
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.reporter import StatusLine, following
@@ -86,16 +80,16 @@ def execute(args: argparse.Namespace) -> int:
         if wanted:
             assert isinstance(results, tuple)  # fields are those of one loop
             if at_stresses:
-                fields = fields_at_stresses(results[0], wanted, nodes)
+                fields = record.fields_at_stresses(results[0], wanted, nodes)
             else:
-                fields = fields_at_penetrations(results[0], method, wanted, nodes)
+                fields = record.fields_at_penetrations(results[0], method, wanted, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
-        return 1
+        return SOME_FAILED
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
-            numbers = document(results, warnings)
+            numbers = record.document(results, warnings)
             seed = (args.seed or 0) if source is None else None
             numbers["provenance"] = provenance(args.words, source, seed, numbers)
             write_json(args.json, numbers)
@@ -106,7 +100,7 @@ def execute(args: argparse.Namespace) -> int:
             write_csv(args.csv, results)
     if fields:
         with writing.output("--fields", args.fields):
-            write_npz(args.fields, fields)
+            record.write_npz(args.fields, fields)
     if args.figure is not None:
         with writing.output("--figure", args.figure):
             _draw(results, args.figure)
@@ -116,10 +110,10 @@ def execute(args: argparse.Namespace) -> int:
     loops: tuple[LoopResult | PathResult, ...]
     if isinstance(results, PathResult):
         loops = (results,)
-        print(path_summary(results))
+        print(record.path_summary(results))
     else:
         loops = results
-        print("\n\n".join(map(loop_summary, results)))
+        print("\n\n".join(map(record.loop_summary, results)))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
@@ -128,7 +122,7 @@ def execute(args: argparse.Namespace) -> int:
     for text in doubts:
         print(f"adhesis loop: {text}", file=sys.stderr)
     writing.finish()
-    return 1 if doubts and args.strict else 0
+    return SOME_FAILED if doubts and args.strict else DONE
 
 
 def _run(
@@ -357,9 +351,8 @@ def _progress(step: float, load: bool) -> Progress:
     def show(branch: Branch, drive: float, state: ContactState) -> None:
         line.show(
             lambda: (
-                f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  "
-                f"A/A0 {state.contact_fraction:.4f}  patches {state.patches:>4}  "
-                f"{line.seconds:.0f} s"
+                f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  A/A0 "
+                f"{state.contact_fraction:.4f}  patches {state.patches:>4}  {line.seconds:.0f} s"
             ),
             last=branch == "unloading" and not state.patches,
         )

@@ -17,25 +17,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
+from adhesis.ensemble import errors, exit_codes
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
-from adhesis.ensemble.errors import (
-    InputError,
-    RankError,
-    WriteError,
-    check_memory,
-    lack,
-    naming_options,
-)
-from adhesis.ensemble.exit_codes import (
-    BAD_INPUT,
-    INTERRUPTED,
-    OUR_ERROR,
-    PIPE_CLOSED,
-    TERMINATED,
-    TOO_FEW_RESOURCES,
-    WRITE_FAILED,
-)
 from adhesis.ensemble.run.interrupt import in_main_thread
 from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
 from adhesis.ensemble.run.ranks import launched
@@ -93,8 +77,8 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     with standard_streams():
         code, sentence, error = _run(name, words)
-        if rank > 0 and isinstance(error, InputError):
-            if name == _PARALLEL and not isinstance(error, RankError):
+        if rank > 0 and isinstance(error, errors.InputError):
+            if name == _PARALLEL and not isinstance(error, errors.RankError):
                 return 0  # rank 0 has the same error
             time.sleep(_RANK_0_FIRST)
         if sentence:
@@ -124,23 +108,23 @@ def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | Non
             code = _execute(name, words)
             sys.stdout.flush()
         return code, "", None
-    except InputError as error:
-        return BAD_INPUT, str(error), error
-    except WriteError as error:
-        return WRITE_FAILED, str(error), error
+    except errors.InputError as error:
+        return exit_codes.BAD_INPUT, str(error), error
+    except errors.WriteError as error:
+        return exit_codes.WRITE_FAILED, str(error), error
     except OutputError as error:
-        return WRITE_FAILED, f"stdout could not be written: {error}", error
+        return exit_codes.WRITE_FAILED, f"stdout could not be written: {error}", error
     except BrokenPipeError as error:
-        return PIPE_CLOSED, "", error  # the reader has seen enough
+        return exit_codes.PIPE_CLOSED, "", error  # the reader has seen enough
     except Terminated as error:
-        return TERMINATED, "terminated", error
+        return exit_codes.TERMINATED, "terminated", error
     except KeyboardInterrupt as error:
-        return INTERRUPTED, "interrupted", error
+        return exit_codes.INTERRUPTED, "interrupted", error
     except Exception as error:
-        if sentence := lack(error):
-            return TOO_FEW_RESOURCES, sentence, error
+        if sentence := errors.lack(error):
+            return exit_codes.TOO_FEW_RESOURCES, sentence, error
         traceback.print_exc()
-        return OUR_ERROR, "", error
+        return exit_codes.OUR_ERROR, "", error
 
 
 def _execute(name: str, words: Sequence[str]) -> int:
@@ -153,7 +137,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
         _overview().print_help()
         return 0
     if name not in COMMANDS:
-        raise InputError(f"COMMAND is {name!r}: it must be one of {', '.join(COMMANDS)}")
+        raise errors.InputError(f"COMMAND is {name!r}: it must be one of {', '.join(COMMANDS)}")
     for variable, count in ONE_THREAD.items():
         os.environ.setdefault(variable, count)  # before numpy is loaded
     try:
@@ -162,8 +146,8 @@ def _execute(name: str, words: Sequence[str]) -> int:
         return 0
     args.words = list(words)
     if name not in _WITHOUT_NUMERICS:
-        check_memory()
-    with naming_options():
+        errors.check_memory()
+    with errors.naming_options():
         code: int = importlib.import_module(module_of(name)).execute(args)
     return code
 

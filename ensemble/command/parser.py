@@ -14,16 +14,7 @@ _GIVEN = "_given"  # of a namespace: the options so far
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser of one command: raises InputError instead of printing the usage and exiting.
-
-    Parameters
-    ----------
-    program : str
-        What is called, such as ``adhesis loop``.
-    description : str
-    examples : sequence of str
-        Command lines, at the end of the help.
-    """
+    """Parser of one command: raises InputError instead of printing the usage and exiting."""
 
     def __init__(self, program: str, description: str, examples: Sequence[str]) -> None:
         super().__init__(
@@ -41,15 +32,7 @@ class Parser(argparse.ArgumentParser):
             self.register("type", kind, convert)
 
     def parse(self, words: Sequence[str]) -> argparse.Namespace:
-        """Return the options.
-
-        Raises
-        ------
-        InputError
-            If an option is unknown, missing or of the wrong type.
-        SystemExit
-            After ``--help``.
-        """
+        """Return the options; InputError for a bad one, SystemExit after ``--help``."""
         args = argparse.Namespace(**{_GIVEN: set()})
         try:
             self.parse_args(words, args)

@@ -6,11 +6,9 @@ It is synthetic: 1 mm in steps of 1 µm, rough down to 20 µm, with tilt, bow, n
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
-from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+from adhesis.ensemble.outputs import write_new
 
 SAMPLE = Path(__file__).with_name("sample.csv")
 EXAMPLES = (
@@ -26,14 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
-    check_outputs({"FILE": args.file}, {})
-    if os.path.isfile(args.file):
-        raise InputError(f"FILE is {args.file}, which exists: give another name")
-    writing = Writing()
-    with writing.output("FILE", args.file), whole_file(args.file) as stream:
-        stream.write(SAMPLE.read_bytes())
-    writing.finish()
-    print(f"wrote       {args.file}")
+    write_new("FILE", args.file, SAMPLE.read_bytes)
     print(
         f"next        adhesis trace {args.file} --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 "
         "--to out"

@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from adhesis.ensemble.errors import InputError, refused_as_input
+from adhesis.ensemble.exit_codes import SOME_FAILED
 from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
@@ -61,7 +62,7 @@ def execute(args: argparse.Namespace) -> int:
         answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
     except NoAnswer as error:
         print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
-        return 1
+        return SOME_FAILED
     from adhesis.ensemble.trace.trace_page import summary, write_page
 
     writing = Writing()

@@ -13,14 +13,12 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.reporter import following
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from adhesis.solver.validate.claims import Row
 
-_EXCEEDED = 1
 EXAMPLES = (
     "adhesis validate",
     "adhesis validate --method sharp --json",
@@ -64,11 +62,15 @@ def execute(args: argparse.Namespace) -> int:
     elif not lines:
         from rich.console import Console
 
-        Console().print(_table(rows))
+        from adhesis.ensemble.report.tables.table import rich_table
+
+        title = "Methods against exact references"
+        headings = ("claim", "method", "resolution", "error", "bound", "", "note")
+        Console().print(rich_table(title, headings, map(_cells, rows), slice(3, 5)))
     failed = [row for row in rows if not row.passed]
     if not args.json:
         print(f"{len(rows) - len(failed)} of {len(rows)} claims hold")
-    return _EXCEEDED if failed else 0
+    return SOME_FAILED if failed else DONE
 
 
 def _record(row: Row) -> dict[str, object]:
@@ -89,18 +91,7 @@ def _line(row: Row) -> str:
     )
 
 
-def _table(rows: list[Row]) -> Table:
-    from rich.table import Table
-
-    table = Table(title="Methods against exact references", title_justify="left")
-    for heading in ("claim", "method", "resolution"):
-        table.add_column(heading)
-    for heading in ("error", "bound"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("")
-    table.add_column("note")
-    for row in rows:
-        verdict = "[green]ok[/green]" if row.passed else "[bold red]FAIL[/bold red]"
-        error, bound = f"{row.error:.1e}", f"{row.bound:.1e}"
-        table.add_row(row.claim, row.method, row.resolution, error, bound, verdict, row.note)
-    return table
+def _cells(row: Row) -> tuple[str, ...]:
+    verdict = "[green]ok[/green]" if row.passed else "[bold red]FAIL[/bold red]"
+    error, bound = f"{row.error:.1e}", f"{row.bound:.1e}"
+    return (row.claim, row.method, row.resolution, error, bound, verdict, row.note)

@@ -66,14 +66,7 @@ class Diagnosis:
 
 
 def examine(directory: Path | str | None = None) -> Diagnosis:
-    """Run all checks.
-
-    Parameters
-    ----------
-    directory : path, optional
-        Folder in which two ranks write a file together, and remove it; without it that of temporary
-        files, which can differ from a parallel file system.
-    """
+    """Run all checks; ranks write a file in ``directory``, or where temporary files are."""
     checks = [_loopback()]
     alone = _run_probe([], directory)
     found = alone.reports[0] if alone.reports else {}

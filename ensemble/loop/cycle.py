@@ -23,20 +23,12 @@ _MAX_PENETRATION = 0.9
 
 @dataclass(frozen=True)
 class Turns:
-    """Turning points of loops.
+    """Turning points of loops."""
 
-    Attributes
-    ----------
-    points : tuple of float
-        Δ/h_max, u_tot/h_max, or Pa under a load; preloads in Pa, if ``are_preloads``.
-    are_preloads : bool
-    latest : float or None
-        Where a loop turns whose preload is not reached, if it is given.
-    """
-
+    # Δ/h_max, u_tot/h_max, or Pa under a load; preloads in Pa, if ``are_preloads``
     points: tuple[float, ...]
     are_preloads: bool = False
-    latest: float | None = None
+    latest: float | None = None  # where a loop turns whose preload is not reached, if it is given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,20 +37,12 @@ class Cycle(Turns):
 
     The turning points are one for each loop, ascending; those of one path, in order, if
     ``is_path``.
-
-    Attributes
-    ----------
-    control : Control
-    load_steps : int
-    is_path : bool
-    out : bool
-        Whether a path continues until contact is lost.
     """
 
     control: Control
     load_steps: int
     is_path: bool = False
-    out: bool = True
+    out: bool = True  # whether a path continues until contact is lost
 
     def arguments(self, points: object) -> dict[str, Any]:
         """Return the arguments of ``run_loop`` or ``run_loops`` for some of the points."""
@@ -72,13 +56,7 @@ class Cycle(Turns):
         return largest
 
     def check(self, problem: Problem) -> None:
-        """Check that the cycle can be followed.
-
-        Raises
-        ------
-        ValueError
-            If it breaks a rule, which the message gives.
-        """
+        """Check that the cycle can be followed; the ValueError gives the rule that it breaks."""
         if self.is_path:
             check_path(self.points, self.load_steps, problem, self.out)
         elif self.are_preloads:
@@ -91,15 +69,7 @@ class Cycle(Turns):
 
 
 def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
-    """Read the cycle from the options.
-
-    Raises
-    ------
-    InputError
-        If the options contradict one another or are no numbers.
-    ValueError
-        If stiffness or layer break their rule.
-    """
+    """Read the cycle from the options (InputError; ValueError for stiffness or layer)."""
     control = control_of(args, half_space)
     if args.path is not None:
         _refuse_several(args, "path", *_TURNS)
@@ -117,13 +87,7 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
 
 
 def turns_of(args: argparse.Namespace, control: Control) -> Turns:
-    """Read the turning points of a control, in the given order.
-
-    Raises
-    ------
-    InputError
-        If they belong to another control, are no numbers, or one is given twice.
-    """
+    """Read the turning points of a control, in the given order (InputError)."""
     _refuse_several(args, "max_stress", "preload")
     if control.is_load:
         if args.preload is not None:
@@ -172,12 +136,7 @@ def _distinct(
 def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
     """Read the control: a fixed separation, a stiffness, that of a layer, or a load.
 
-    Raises
-    ------
-    InputError
-        If both a stiffness and a layer are given.
-    ValueError
-        If one of them breaks its rule.
+    InputError if both a stiffness and a layer are given, ValueError if one breaks its rule.
     """
     if args.layer is not None:
         if args.stiffness is not None:

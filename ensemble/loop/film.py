@@ -60,20 +60,9 @@ _LOOK: Any = {
 
 
 def check_film(name: str, path: str | os.PathLike[str]) -> Path:
-    """Return the path of a film that can be made here.
+    """Return the path of a film that can be made here; ``name`` is the option or parameter.
 
-    Parameters
-    ----------
-    name : str
-        The option or parameter, for messages.
-    path : path
-
-    Raises
-    ------
-    InputError
-        If its ending is none of :data:`FORMATS`, or ffmpeg is missing.
-    TypeError
-        If it is no path.
+    InputError for an ending that is none of :data:`FORMATS`, or without ffmpeg for .mp4.
     """
     path = Path(checks.path(name, path))
     ending = path.suffix.lower()

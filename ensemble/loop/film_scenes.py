@@ -25,50 +25,29 @@ _NODES = 800  # of the drawn surface: about one a pixel
 
 @dataclass(frozen=True)
 class Scene:
-    """One frame.
+    """One frame."""
 
-    Attributes
-    ----------
-    state : int
-        Number of the state in the result.
-    surface : array, shape (nodes,)
-        Height of the deformed surface above the profile's mean line, in m.
-    patches : array, shape (patches, 2)
-        Ends of the contact patches in m, within the period; one across its end is two.
-    caption : str
-        The state in numbers.
-    announcement : str
-        The jumps since the frame before; empty without any.
-    is_notable : bool
-        Whether those jumps lose a hundredth of all drops or more.
-    """
-
-    state: int
+    state: int  # number of the state in the result
+    # Shape (nodes,); height of the deformed surface above the profile's mean line, in m
     surface: Array
+    # Shape (patches, 2); ends of the contact patches in m, within the period; one across its end is
+    # two
     patches: Array
-    caption: str
-    announcement: str
-    is_notable: bool
+    caption: str  # the state in numbers
+    announcement: str  # the jumps since the frame before; empty without any
+    is_notable: bool  # whether those jumps lose a hundredth of all drops or more
 
 
 @dataclass(frozen=True)
 class Scenes:
-    """All frames of a film.
+    """All frames of a film."""
 
-    Attributes
-    ----------
-    x, height : array, shape (nodes,)
-        Positions in m from 0 to the period, both included, and the rigid profile there in m.
-    scenes : list of Scene
-        In the order of the path.
-    jumps_shown : int
-        Jumps that have a frame before and one after them.
-    """
-
+    # x, height: shape (nodes,); positions in m from 0 to the period, both included, and the rigid
+    # profile there in m
     x: Array
     height: Array
-    scenes: list[Scene]
-    jumps_shown: int
+    scenes: list[Scene]  # in the order of the path
+    jumps_shown: int  # jumps that have a frame before and one after them
 
 
 def scenes_of(
@@ -76,22 +55,10 @@ def scenes_of(
     frames: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Scenes:
-    """Compute the frames of a result.
+    """Compute the frames of a result: evenly spaced ones, and on top those of jumps.
 
-    Parameters
-    ----------
-    result : LoopResult or PathResult
-    frames : int
-        Evenly spaced along the path; those of jumps come on top, up to :data:`MOST_FRAMES`.
-    progress : callable, optional
-        Called with the number of frames that are done and that of all.
-
-    Raises
-    ------
-    ValueError
-        If ``frames`` is out of range, or the result holds no contact states.
-    TypeError
-        If ``frames`` is no whole number, or ``progress`` no function.
+    ``progress`` is called with the numbers of frames done and in all. ValueError if ``frames`` is
+    out of range, or the result holds no contact states.
     """
     frames = whole("frames", frames, _FRAMES)
     function("progress", progress)
@@ -178,11 +145,10 @@ def _caption(result: LoopResult | PathResult, index: int, jumps: int) -> str:
     lost = _drop(result.jumps[:jumps])
     patches = int(result.patches[index])
     return (
-        f"{result.branch[index]}: Δ/h_max {result.penetration[index]:.3f}, "
-        f"mean stress {result.mean_stress[index]:.4g} Pa, "
-        f"A/A0 {result.contact_fraction[index]:.3f}, "
-        f"{patches} {'patch' if patches == 1 else 'patches'}; "
-        f"{jumps} of {len(result.jumps)} jumps so far lost {lost:.3g} J/m²"
+        f"{result.branch[index]}: Δ/h_max {result.penetration[index]:.3f}, mean stress "
+        f"{result.mean_stress[index]:.4g} Pa, A/A0 {result.contact_fraction[index]:.3f}, {patches} "
+        f"{'patch' if patches == 1 else 'patches'}; {jumps} of {len(result.jumps)} jumps so far "
+        f"lost {lost:.3g} J/m²"
     )
 
 

@@ -35,27 +35,10 @@ def read_heights(
     delimiter: str | None = None,
     decimal: str | None = None,
 ) -> Array:
-    """Read the heights of one period from a .npy or a text of one column (or one row).
+    """Read the heights of one period in m from a .npy or a text of one column (or one row).
 
-    Parameters
-    ----------
-    path : path
-    unit : str, optional
-        Unit of the heights; without it that of the header. Without either they are in metres if
-        they range over at most 1 mm, and otherwise refused.
-    delimiter, decimal : str, optional
-        Delimiter and decimal sign, where a text can be read in two ways.
-
-    Returns
-    -------
-    array, shape (n,)
-        In m.
-
-    Raises
-    ------
-    InputError
-        If the file holds anything but one column of finite numbers, or its header leaves their unit
-        unclear.
+    Without ``unit`` the header's counts. Without either they are in metres if they range over at
+    most 1 mm, and otherwise refused. InputError for anything but one column of finite numbers.
     """
     given = None if unit is None else _unit(unit)
     source = source_of(path)
@@ -144,15 +127,7 @@ def few_heights_warning(heights: Array, name: str) -> str | None:
 
 
 def closure_warning(heights: Array, name: str) -> str | None:
-    """Return a warning if the ends of one period do not meet, else None.
-
-    Parameters
-    ----------
-    heights : array, shape (n,)
-        In m, equally spaced; the first one follows the last.
-    name : str
-        Name of the heights in the warning.
-    """
+    """Return a warning if the ends of one period of heights (m) do not meet, else None."""
     if heights.size < _MIN_POINTS:
         return None
     # A median of three keeps edges and removes single spikes, which would hide the jump.

@@ -12,13 +12,7 @@ import math
 from pathlib import Path
 
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, STRESS, WORK_OF_ADHESION
-from adhesis.ensemble.trace.trace_arguments import (
-    add_cycle_arguments,
-    add_measure_argument,
-    add_method_arguments,
-    add_open_argument,
-    add_reading_arguments,
-)
+from adhesis.ensemble.trace import trace_arguments
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6
@@ -57,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
     shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
     shape.add_argument("--amplitudes", metavar="KIND", help="deterministic (default) or rayleigh")
-    add_reading_arguments(parser)
+    trace_arguments.add_reading_arguments(parser)
     contact = parser.add_argument_group("contact and cycle")
     contact.add_argument(
         "--work-of-adhesion",
@@ -72,9 +66,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in Pa, or 1MPa (likewise; with --hurst 1e6)",
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
-    add_open_argument(contact)
-    add_measure_argument(contact)
-    add_cycle_arguments(contact)
+    trace_arguments.add_open_argument(contact)
+    trace_arguments.add_measure_argument(contact)
+    trace_arguments.add_cycle_arguments(contact)
     contact.add_argument(
         "--path",
         metavar="A,B,…,out",
@@ -82,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in contact",
     )
     method = parser.add_argument_group("method")
-    add_method_arguments(method, "relative error of the loss (default 1e-3)")
+    trace_arguments.add_method_arguments(method, "relative error of the loss (default 1e-3)")
     method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
     output = parser.add_argument_group("output")
     output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
-    LOOKS,
     MM,
     TWO_COLUMNS,
+    colour,
     drawn_into,
     new_figure,
     style,
@@ -29,20 +29,10 @@ from adhesis.solver.model.profile import Array, Profile
 
 
 def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) -> Figure:
-    """Draw loops that share their loading branch, or one path.
+    """Draw loops of ascending turning points that share their loading branch, or one path.
 
-    Parameters
-    ----------
-    results : sequence of LoopResult, ascending turning points; or PathResult
-    ax : Axes or sequence of Axes, optional
-        One for the mean stress, or two for mean stress and contact fraction.
-
-    Raises
-    ------
-    TypeError
-        If ``ax`` is neither.
-    ValueError
-        If it holds more than two.
+    ``ax`` is one Axes for the mean stress, or two for mean stress and contact fraction (TypeError,
+    ValueError).
     """
     with drawn_into(ax):
         figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
@@ -73,10 +63,9 @@ def _plot(panels: Sequence[Axes], x: Array, stress: Array, contact: Array, **opt
 def _draw_path(panels: Sequence[Axes], path: PathResult) -> None:
     for leg in range(int(path.leg.max()) + 1):
         rows = path.leg == leg
-        look = LOOKS[leg % len(LOOKS)]
         branch = str(path.branch[rows][0])
         label = f"leg {leg + 1}, {branch}"
-        options = {"color": look.colour, "ls": LINE_OF_BRANCH[branch], "label": label}
+        options = {"color": colour(leg), "ls": LINE_OF_BRANCH[branch], "label": label}
         _plot(panels, *_curve(path, rows), **options)
 
 
@@ -88,9 +77,8 @@ def _draw_each(panels: Sequence[Axes], loops: Sequence[LoopResult]) -> None:
     deepest = loops[-1]
     for k, loop in enumerate(loops):
         rows = loop.states("unloading")
-        colour = LOOKS[k % len(LOOKS)].colour
         label = f"unloading from {loop.penetration[rows[0]]:.3g}"
-        options = {"color": colour, "ls": LINE_OF_BRANCH["unloading"], "label": label}
+        options = {"color": colour(k), "ls": LINE_OF_BRANCH["unloading"], "label": label}
         _plot(panels, *_curve(loop, rows), **options)
     rows = deepest.states("loading")
     options = {"color": "k", "ls": LINE_OF_BRANCH["loading"], "label": "loading"}

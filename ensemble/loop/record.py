@@ -119,10 +119,9 @@ def loop_summary(result: LoopResult) -> str:
             f"h_rms {profile.h_rms:.4g} m, h_max {profile.h_max:.4g} m, m2 {profile.m2:.4g}",
             f"contact     E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
             f"work of adhesion {problem.work_of_adhesion:.4g} J/m²",
-            f"cycle       {_turn(result)} in {result.load_steps} load steps, "
-            f"detached by {result.pull_off_penetration:.4g} h_max; "
-            f"largest contact fraction {result.contact_fraction.max():.4g}, "
-            f"most patches {result.patches.max()}",
+            f"cycle       {_turn(result)} in {result.load_steps} load steps, detached by "
+            f"{result.pull_off_penetration:.4g} h_max; largest contact fraction "
+            f"{result.contact_fraction.max():.4g}, most patches {result.patches.max()}",
             f"loss        {result.loss:.6g} J/m²"
             f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)} "
             f"(dimensionless {result.loss_dimensionless:.6g})"
@@ -231,12 +230,7 @@ def _state_at(
 def fields_at_stresses(loop: LoopResult, stresses: Sequence[float], n: int) -> dict[str, Any]:
     """Return the fields on n nodes at mean stresses in Pa, as :func:`fields_at_penetrations`.
 
-    A branch that does not have a mean stress is left out.
-
-    Raises
-    ------
-    InputError
-        If neither branch has it.
+    A branch that does not have a mean stress is left out; InputError if neither branch has it.
     """
     found: list[FieldsOfState] = []
     absent = dict.fromkeys(stresses, 0)

@@ -59,14 +59,9 @@ _MEMBERS = frozenset(
 
 @dataclass(frozen=True)
 class SavedReport(MethodReport):
-    """Report of a method on itself from before its loop was saved.
+    """Report of a method on itself from before its loop was saved."""
 
-    Attributes
-    ----------
-    details : dict
-        Settings and counters by name; each is an attribute as well.
-    """
-
+    # Settings and counters by name; each is an attribute as well
     details: dict[str, Any] = field(default_factory=dict)
 
     def __getattr__(self, name: str) -> Any:

@@ -36,19 +36,8 @@ def _seal(content: bytes) -> bytes:
 def read_sealed(path: Path, names: frozenset[str]) -> xr.Dataset:
     """Read a netCDF file that was sealed, as it stands there: nothing is scaled or decoded.
 
-    Parameters
-    ----------
-    path : Path
-    names : set of str
-        Variables and dimensions that it may hold.
-
-    Raises
-    ------
-    InputError
-        If it has no checksum or another one, or is no regular file; or if it holds something else,
-        or what would be read from another file.
-    OSError
-        If it is missing or cannot be read.
+    InputError without its checksum, or if it holds variables or dimensions beside ``names``, or
+    what would be read from another file.
     """
     with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size

@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,25 +59,14 @@ def film(
     return made
 
 
-def to_dataframe(result: Result, of: str) -> Any:
-    """Return states or jumps as a table; see :meth:`adhesis.LoopResult.to_dataframe`."""
-    from adhesis.ensemble.loop.saved import to_dataframe
-
-    return to_dataframe(result, of)
+# Made by other modules, and loaded when they are asked for.
+_ELSEWHERE = dict.fromkeys(("to_dataframe", "to_xarray", "save"), "adhesis.ensemble.loop.saved")
 
 
-def to_xarray(result: Result) -> Any:
-    """Return a labelled dataset; see :meth:`adhesis.LoopResult.to_xarray`."""
-    from adhesis.ensemble.loop.saved import to_xarray
-
-    return to_xarray(result)
-
-
-def save(result: Result, path: str | os.PathLike[str]) -> None:
-    """Write a netCDF file; see :meth:`adhesis.LoopResult.save`."""
-    from adhesis.ensemble.loop.saved import save
-
-    save(result, path)
+def __getattr__(name: str) -> Any:
+    if name not in _ELSEWHERE:
+        raise AttributeError(name)
+    return getattr(import_module(_ELSEWHERE[name]), name)
 
 
 # ---------------------------------------------------------------------- in notebooks

@@ -39,20 +39,17 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
         for cell in data.cells
     ]
     key_dims, shape = tuple(axes), tuple(map(len, axes.values()))
-    depth = "max_penetration" if data.campaign.has_axis("max_penetration") else "h_max"
     campaign = data.campaign
+    several = campaign.has_axis("max_penetration")
+    depth = f"penetration/{'max_penetration' if several else 'h_max'}"
     coordinates: list[tuple[str, Any, str, str]] = [
         ("hurst", axes["hurst"], "1", "Hurst exponent"),
         ("work_of_adhesion", axes["work_of_adhesion"], "J m-2", "work of adhesion"),
         *((axis.name, axes[axis.name], axis.unit, axis.meaning) for axis in data.further),
         ("quantile", list(QUANTILES), "1", "quantile over realisations"),
         *(
-            (f"{branch}_penetration", values, "1", f"penetration/{depth} on {branch}")
-            for branch, values in zip(
-                BRANCHES,
-                (campaign.loading_penetration, campaign.unloading_penetration),
-                strict=True,
-            )
+            (f"{b}_penetration", getattr(campaign, f"{b}_penetration"), "1", f"{depth} on {b}")
+            for b in BRANCHES
         ),
     ]
     out = xr.Dataset(

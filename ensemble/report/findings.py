@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import place
+from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import (
@@ -21,7 +23,7 @@ from adhesis.ensemble.report.further_axes import (
     short_of_preload,
     together,
 )
-from adhesis.ensemble.report.tables.loss_tables import least
+from adhesis.ensemble.report.tables.loss_tables import extreme
 from adhesis.ensemble.task.doubt import why_beyond
 from adhesis.solver.loading.zero_range import ANY_RANGE
 
@@ -36,10 +38,8 @@ def verdict(data: Aggregate) -> list[str]:
 
 
 def _outcome(data: Aggregate) -> str:
-    cells = sorted(
-        (cell for cell in data.cells if cell.done),
-        key=lambda cell: cell.estimates["loss"].mean,
-    )
+    cells = [cell for cell in data.cells if cell.done]
+    cells.sort(key=lambda cell: cell.estimates["loss"].mean)
     cycle = data.campaign.cycle
     top = f"A loop to {turning_point(data)} and back until detached loses"
     if cycle.under_load:
@@ -64,14 +64,13 @@ def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
     """Return a clause on the friction of edges; empty for one work of adhesion."""
     if data.campaign.material.work_of_adhesion_open is None:
         return ""
-    share = [
-        cell.estimates["friction"].mean / loss
-        for cell in cells
-        if (loss := cell.estimates["loss"].mean) > 0
-    ]
-    if not share:
-        return ""
-    return f"; {percent(*sorted({min(share), max(share)}))} is friction of receding edges"
+    pairs = ((cell.estimates["friction"].mean, cell.estimates["loss"].mean) for cell in cells)
+    share = [friction / loss for friction, loss in pairs if loss > 0]
+    return f"; {_from_to(share)} is friction of receding edges" if share else ""
+
+
+def _from_to(shares: Sequence[float]) -> str:
+    return percent(*sorted({min(shares), max(shares)}))
 
 
 def turning_point(data: Aggregate) -> str:
@@ -99,40 +98,38 @@ def _loss(cell: Cell) -> str:
 
 
 def _statistical(data: Aggregate) -> str:
-    errors = [
-        error for cell in data.cells if np.isfinite(error := cell.estimates["loss"].relative_error)
-    ]
+    errors = [cell.estimates["loss"].relative_error for cell in data.cells]
+    errors = [error for error in errors if np.isfinite(error)]
     counts = sorted({cell.done for cell in data.cells if cell.done})
     many = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
     plural = "realisations" if counts[-1] > 1 else "realisation"
     point = "cell" if data.further else "(H, γ)"
     if not errors:
         return f"With {many} {plural} of each {point}, the error of the mean is unknown."
-    reach = percent(*sorted({min(errors), max(errors)}))
     return (
         f"With {many} {plural} of each {point}, the 95 % interval of the mean loss in J/m² reaches "
-        f"{reach} "
-        "from it, on the further side."
+        f"{_from_to(errors)} from it, on the further side."
     )
 
 
 def _numerical(data: Aggregate) -> str:
     loss, audit = _all(data, "loss"), np.abs(_all(data, "audit_residual"))
     error, races = _all(data, "loss_error"), _all(data, "races")
-    share = np.divide(error, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
-    raced = int(np.sum(races > 0))
-    stake = _all(data, "energy_at_stake")
-    most = np.max(np.divide(stake, np.abs(loss), out=np.zeros_like(loss), where=loss != 0))
-    parts = [
-        f"the estimated numerical error of a loss is at most {percent(share.max())} of it",
-        f"the energy audit of each loop closes within {percent(audit.max())}",
-        f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
-        f"elsewhere (at most {percent(most)} of a loop's loss at stake)"
-        if raced
-        else "no jump would have ended elsewhere by another rule of descent",
-    ]
-    text = "; ".join(parts)
-    return f"{text[0].upper()}{text[1:]}."
+
+    def most(part: NDArray[np.float64]) -> str:
+        shares = np.divide(part, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
+        return percent(shares.max())
+
+    elsewhere = "no jump would have ended elsewhere by another rule of descent"
+    if raced := int(np.sum(races > 0)):
+        elsewhere = (
+            f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
+            f"elsewhere (at most {most(_all(data, 'energy_at_stake'))} of a loop's loss at stake)"
+        )
+    return (
+        f"The estimated numerical error of a loss is at most {most(error)} of it; the energy audit "
+        f"of each loop closes within {percent(audit.max())}; {elsewhere}."
+    )
 
 
 def precision(data: Aggregate) -> list[str]:
@@ -163,16 +160,14 @@ def missing(data: Aggregate) -> list[str]:
     if data.failed:
         why = f" First reason: {data.failures[0][1]}." if data.failures else ""
         out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.{why}")
-    empty = [cell_name(cell) for cell in data.cells if not cell.done and cell.pending]
-    if empty:
+    if empty := [cell_name(cell) for cell in data.cells if not cell.done and cell.pending]:
         out.append(f"No task is finished yet for {_listed(empty)}.")
     if failed := failed_cells(data):
         out.append(
             f"WARNING: all tasks failed for {_listed(failed)}: figures and averages lack "
             f"{'this cell' if len(failed) == 1 else 'these cells'}."
         )
-    few = [cell_name(cell) for cell in data.cells if cell.done == 1]
-    if few:
+    if few := [cell_name(cell) for cell in data.cells if cell.done == 1]:
         out.append(f"Only one realisation, hence no spread, for {_listed(few)}.")
     return out
 
@@ -200,13 +195,11 @@ def agreement(data: Aggregate) -> list[str]:
 def readings(data: Aggregate) -> list[str]:
     """Report which campaign is nearest to the paper's table, of this one and those beside it."""
     deviations = []
-    for name, cells in (
-        (data.path.name, data.cells),
-        *((other.path.name, other.cells) for other in data.companions),
-    ):
-        found = _deviations([cell for cell in cells if paper.is_cell_of(cell)])
-        if found:
-            deviations.append((float(np.sqrt(np.mean(np.square(found)))), name, len(found)))
+    campaigns: tuple[Aggregate | Companion, ...] = (data, *data.companions)
+    for one in campaigns:
+        if found := _deviations([cell for cell in one.cells if paper.is_cell_of(cell)]):
+            rms = float(np.sqrt(np.mean(np.square(found))))
+            deviations.append((rms, one.path.name, len(found)))
     if len(deviations) < 2:
         return []
     deviations.sort()
@@ -227,35 +220,29 @@ def quality(data: Aggregate) -> list[str]:
         f"{percent(np.sqrt(np.mean(audit**2)))} of the loss (root mean square over loops), "
         f"{percent(np.max(np.abs(audit)))} in the worst loop."
     ]
-    wrong = doubts(data)
-    if wrong:
+    if wrong := doubts(data):
         out.append(
             f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
             "their estimated error exceeds the accuracy asked for, "
-            f"{percent(data.campaign.solver.accuracy)} of the "
-            f"loss: {_listed(wrong)}."
+            f"{percent(data.campaign.solver.accuracy)} of the loss: {_listed(wrong)}."
         )
     out += _limit(data)
     if data.campaign.cycle.preload is not None:
         out += _preload(data)
-    steep = [cell_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
-    if steep:
+    slopes = [(cell, np.sqrt(cell.estimates["m2"].mean)) for cell in data.cells if cell.done]
+    if steep := [cell_name(cell) for cell, slope in slopes if slope > STEEP]:
         out.append(
             f"WARNING: the root mean square slope exceeds {STEEP:g} for {_listed(steep)}: linear "
             "elasticity of small slopes, on which everything here rests, is doubtful there."
         )
-    truncated = int(data.jumps.truncated.sum())
-    if truncated:
+    if truncated := int(data.jumps.truncated.sum()):
         out.append(
             f"{truncated} loops made more jumps than the catalogue holds: their smallest drops are "
             "missing from the distribution and from the table of kinds, not from the losses."
         )
-    ends = {float(cell.penetration["unloading"][-1]) for cell in data.cells}
-    cut = sum(
-        int(np.sum(cell.values["pull_off_penetration"] < cell.penetration["unloading"][-1]))
-        for cell in data.cells
-    )
-    if cut:
+    ends = [float(cell.penetration["unloading"][-1]) for cell in data.cells]
+    pull_off = [cell.values["pull_off_penetration"] for cell in data.cells]
+    if cut := sum(int(np.sum(at < end)) for at, end in zip(pull_off, ends, strict=True)):
         below = " to ".join(f"{end:g}" for end in sorted({min(ends), max(ends)}))
         out.append(
             f"{cut} loops detached below Δ/h_max = {below}, where the stored unloading curve ends: "
@@ -278,7 +265,8 @@ def _preload(data: Aggregate) -> list[str]:
 
 def _limit(data: Aggregate) -> list[str]:
     """Sentences on the ranges of adhesion below which the zero-range limit holds."""
-    found = [(value, cell) for cell in data.cells if (value := least(cell.least_range)) is not None]
+    ranges = ((extreme(np.min, cell.least_range), cell) for cell in data.cells)
+    found = [(value, cell) for value, cell in ranges if value is not None]
     if not found:
         return []
     opens = data.campaign.material.opens
@@ -317,31 +305,31 @@ def _table_1(data: Aggregate) -> list[str]:
     found = _deviations(data.cells)
     if not found:
         return []
-    known = [
-        (cell.estimates["loss_dimensionless"], value)
-        for cell in data.cells
-        if cell.done
-        and (value := paper.table_1(cell.hurst, cell.work_of_adhesion)) is not None
-        and np.isfinite(cell.estimates["loss_dimensionless"].low)
-    ]
+    known = [pair for pair in _beside(data.cells) if np.isfinite(pair[0].low)]
     inside = sum(loss.low <= value <= loss.high for loss, value in known)
-    intervals = (
-        f"; {inside} of {len(known)} lie inside the 95 % interval of the mean here" if known else ""
-    )
-    low, high, rms = 100 * min(found), 100 * max(found), 100 * np.sqrt(np.mean(np.square(found)))
+    here = f"; {inside} of {len(known)} lie inside the 95 % interval of the mean here"
+    intervals = here if known else ""
+    low, high = 100 * min(found), 100 * max(found)
+    rms = 100 * np.sqrt(np.mean(np.square(found)))
     return [
         f"Of the {len(paper.TABLE_1)} losses of the paper's Table 1, {len(found)} have a cell "
-        "here: "
-        f"W~ is off by {low:+.1f} % to {high:+.1f} %, root mean square {rms:.1f} %{intervals}."
+        f"here: W~ is off by {low:+.1f} % to {high:+.1f} %, root mean square {rms:.1f} %"
+        f"{intervals}."
     ]
 
 
 def _deviations(cells: Sequence[Cell]) -> list[float]:
     """Relative deviations of the mean W~ from the values that the paper gives."""
+    return [loss.mean / value - 1 for loss, value in _beside(cells)]
+
+
+def _beside(cells: Sequence[Cell]) -> list[tuple[Estimate, float]]:
+    """Return W~ of the finished cells of the paper's table, and its values."""
+    values = ((cell, paper.table_1(cell.hurst, cell.work_of_adhesion)) for cell in cells)
     return [
-        cell.estimates["loss_dimensionless"].mean / value - 1
-        for cell in cells
-        if cell.done and (value := paper.table_1(cell.hurst, cell.work_of_adhesion)) is not None
+        (cell.estimates["loss_dimensionless"], value)
+        for cell, value in values
+        if cell.done and value is not None
     ]
 
 
@@ -364,23 +352,16 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
     sure = [pair for pair in up if pair.loss.low > 0]
     if len(sure) == len(data.paired):
         everywhere = "H and further axis" if data.further else "H"
+        same = "; the paper says the same" if of_paper else ""
         return [
             f"The loss in J/m² grows with γ at every {everywhere}, profile by profile, beyond "
-            "the 95 % interval"
-            f"{'; the paper says the same' if of_paper else ''}."
+            f"the 95 % interval{same}."
         ]
+    rest = [pair for pair in data.paired if pair not in sure]
     down = [
-        ", ".join(
-            filter(
-                None,
-                (
-                    f"H = {pair.hurst:g}, γ = {gamma_text(pair.lower)} to {gamma_text(pair.upper)}",
-                    place(pair.others),
-                ),
-            )
-        )
-        for pair in data.paired
-        if pair not in sure
+        f"H = {pair.hurst:g}, γ = {gamma_text(pair.lower)} to {gamma_text(pair.upper)}"
+        + (f", {place(pair.others)}" if pair.others else "")
+        for pair in rest
     ]
     return [
         f"The mean loss in J/m² grows with γ in {len(up)} of {len(data.paired)} steps of γ; not "
@@ -433,10 +414,8 @@ def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:
     if not ratios:
         return []
     where = "At equal load, on unloading up to the largest tension, the contact is"
-    below = [cell for cell, ratio in ratios if ratio < 1]
-    if below:
-        names = _listed([cell_name(cell) for cell in below])
-        return [f"{where} not everywhere larger than on loading: {names}."]
+    if below := [cell_name(cell) for cell, ratio in ratios if ratio < 1]:
+        return [f"{where} not everywhere larger than on loading: {_listed(below)}."]
     least = min(ratio for _, ratio in ratios)
     apart = [cell_name(cell) for cell in data.cells if cell.done and area_ratio(cell) is None]
     rest = f" (no load in common away from the turning point: {_listed(apart)})" if apart else ""
@@ -458,9 +437,8 @@ def _spectrum(data: Aggregate) -> list[str]:
         density = fields.psd_displacement[data.cells.index(cell), 0, -1]
         slope, error = fitted_slope(cell.plan, density)
         if not np.isnan(slope):
-            parts.append(
-                f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f} at {cell_name(cell)}"
-            )
+            fit = f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f}"
+            parts.append(f"{fit} at {cell_name(cell)}")
     if not parts:
         return []
     depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
@@ -468,8 +446,7 @@ def _spectrum(data: Aggregate) -> list[str]:
     depth = f"{sign} = {' or '.join(sorted(depths))}"
     return [
         "Slope of the loading spectrum of the deformed surface at small wave numbers and "
-        f"{depth}, fitted, against Persson's -(2+H): "
-        f"{_listed(parts)}."
+        f"{depth}, fitted, against Persson's -(2+H): {_listed(parts)}."
     ]
 
 
@@ -521,7 +498,3 @@ def _listed(texts: Sequence[str], between: str = "; ") -> str:
 
 def _all(data: Aggregate, name: str) -> NDArray[np.float64]:
     return np.concatenate([cell.values[name] for cell in data.cells])
-
-
-def _rms_slope(cell: Cell) -> float:
-    return float(np.sqrt(cell.estimates["m2"].mean))

@@ -117,7 +117,6 @@ def shown_cells(data: Aggregate) -> str:
     if not data.further or not at:
         return ""
     return (
-        f"Figures with curves for each H and γ show the cells at {at}, as stated below them; "
-        "all cells are in the tables and in `curves.nc`, and there are figures along each further "
-        "axis."
+        f"Figures with curves for each H and γ show the cells at {at}, as stated below them; all "
+        "cells are in the tables and in `curves.nc`, and there are figures along each further axis."
     )

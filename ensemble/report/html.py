@@ -46,15 +46,7 @@ _DOTS_OF_ONE_COLUMN = 1200  # a figure with more pixels across fills two columns
 
 
 def html_page(text: str, directory: Path) -> str:
-    """Return a Markdown page as HTML, with the images of ``directory`` inside.
-
-    Parameters
-    ----------
-    text : str
-        The page. Links to files beside it stay links.
-    directory : path
-        Where its images are; none from elsewhere is taken.
-    """
+    """Return a Markdown page as HTML, with the images of ``directory`` alone inside."""
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.add_render_rule("image", _image)
     parser.add_render_rule("table_open", lambda *_: '<div class="table"><table>')

@@ -22,15 +22,7 @@ from adhesis.solver.loading.zero_range import ANY_RANGE
 
 
 def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustration]]]) -> str:
-    """Return the text of the page.
-
-    Parameters
-    ----------
-    data : Aggregate
-    sections : sequence of (heading, illustrations)
-        The figures that were drawn, under the headings "loops", "losses", "axes", "mechanisms",
-        "fields", "companions".
-    """
+    """Return the text of the page, with the figures that were drawn, by heading."""
     figures = dict(sections)
     of_paper = paper.are_its_cells(data.shown.cells)
 

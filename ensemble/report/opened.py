@@ -25,19 +25,8 @@ from adhesis.ensemble.report.html import picture, table_of
 from adhesis.ensemble.report.plots import Plots
 from adhesis.ensemble.report.tables import loss_tables, mechanisms
 from adhesis.ensemble.report.tables.table import Table
+from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import (
-    CHECKSUM,
-    DAMAGED,
-    DATASETS,
-    DONE,
-    FAILED,
-    ORIGIN,
-    PENDING,
-    STATUS,
-    TASK_DATASETS,
-    scales,
-)
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
 
@@ -47,7 +36,7 @@ _RENAMED = {
     "field_penetration": "penetration",
     "field_position": "position",
 }
-_NO_RESULTS = ("error", CHECKSUM.name, ORIGIN.name)
+_NO_RESULTS = ("error", schema.CHECKSUM.name, schema.ORIGIN.name)
 _SPECTRA = ("psd_height", "height_density", "psd_displacement", "gap_density")
 
 
@@ -91,10 +80,10 @@ class CampaignResults:
             status = results.status()
             for doubt in results.doubts():
                 warnings.warn(doubt, stacklevel=3)
-        states = {"done": DONE, "failed": FAILED, "pending": PENDING}
+        states = {"done": schema.DONE, "failed": schema.FAILED, "pending": schema.PENDING}
         self._counts = {name: int(np.sum(status == state)) for name, state in states.items()}
-        if DAMAGED in status:
-            self._counts["damaged"] = int(np.sum(status == DAMAGED))
+        if schema.DAMAGED in status:
+            self._counts["damaged"] = int(np.sum(status == schema.DAMAGED))
         self.plot = Plots(partial(getattr, self, "averages"))  # which can be pickled
 
     def __enter__(self) -> Self:
@@ -152,23 +141,23 @@ class CampaignResults:
         """
         wanted = [
             d
-            for d in DATASETS
+            for d in schema.DATASETS
             if d.dims[0] == "task"
             and d.name not in (*self.axes, *_SPECTRA, *_NO_RESULTS)
             and not d.name.startswith("jump_")
         ]
-        count = next(d for d in DATASETS if d.name == "jump_count")
+        count = next(d for d in schema.DATASETS if d.name == "jump_count")
         return self._arranged([*wanted, count])
 
     @cached_property
     def spectra(self) -> xr.Dataset:
         """Spectral densities, and densities of heights and gaps, of every loop."""
-        return self._arranged([d for d in DATASETS if d.name in _SPECTRA])
+        return self._arranged([d for d in schema.DATASETS if d.name in _SPECTRA])
 
     @cached_property
     def fields(self) -> xr.Dataset:
         """Profile, displacement, stress and gap of the first realisations, as far as kept."""
-        return self._arranged([d for d in DATASETS if d.dims[0] == KEPT])
+        return self._arranged([d for d in schema.DATASETS if d.dims[0] == KEPT])
 
     @cached_property
     def curves(self) -> xr.Dataset:
@@ -195,9 +184,11 @@ class CampaignResults:
     @cached_property
     def jumps(self) -> pd.DataFrame:
         """The catalogue: one row for each jump of each finished loop, in the order of the path."""
-        columns = [d for d in DATASETS if d.name.startswith("jump_") and d.dims[1:] == ("jump",)]
+        columns = [
+            d for d in schema.DATASETS if d.name.startswith("jump_") and d.dims[1:] == ("jump",)
+        ]
         with Results(self.path) as results:
-            rows = np.flatnonzero(results.status() == DONE)
+            rows = np.flatnonzero(results.status() == schema.DONE)
             used = results.column("jump_kind", rows) >= 0
             loop, _ = np.nonzero(used)
             out = {name: values[rows][loop] for name, values in _axes(results).items()}
@@ -221,9 +212,9 @@ class CampaignResults:
             rows = np.arange(len(results))
             kept = results.column(KEPT)
             status = results.status()
-            status[status == DAMAGED] = PENDING
-            has_result = np.isin(status, (DONE, FAILED))
-            known = {scale.name: scale for scale in scales(results.campaign, results.part)}
+            status[status == schema.DAMAGED] = schema.PENDING
+            has_result = np.isin(status, (schema.DONE, schema.FAILED))
+            known = {scale.name: scale for scale in schema.scales(results.campaign, results.part)}
             coordinates: dict[str, Any] = {}
             variables: dict[str, Any] = {}
             for d in datasets:
@@ -233,8 +224,8 @@ class CampaignResults:
                     np.searchsorted(label, axis[mine])
                     for label, axis in zip(labels, axes, strict=True)
                 )
-                values = status if d is STATUS else results.column(d.name)
-                if d not in TASK_DATASETS and d is not STATUS:
+                values = status if d is schema.STATUS else results.column(d.name)
+                if d not in schema.TASK_DATASETS and d is not schema.STATUS:
                     values[~has_result[mine]] = d.fill
                 shape = (*(label.size for label in labels), *values.shape[1:])
                 array = np.full(shape, d.fill, values.dtype)

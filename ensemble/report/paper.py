@@ -37,20 +37,11 @@ M2: dict[float, float] = {0.7: 5.1e-3, 0.8: 2.7e-3, 0.9: 1.5e-3}
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """Content of a figure of the paper, by its caption.
-
-    Attributes
-    ----------
-    hurst : float
-    works_of_adhesion : tuple of float
-        γ in J/m², one for each panel.
-    penetration : float, optional
-        Δ/h_max of its states, where there is one.
-    """
+    """Content of a figure of the paper, by its caption."""
 
     hurst: float
-    works_of_adhesion: tuple[float, ...]
-    penetration: float | None = None
+    works_of_adhesion: tuple[float, ...]  # γ in J/m², one for each panel
+    penetration: float | None = None  # Δ/h_max of its states, where there is one
 
 
 FIGURE_3 = PaperFigure(0.8, (0.01,))

@@ -30,7 +30,7 @@ class Plots:
 
     def _draw(self, name: str, ax: object) -> Figure:
         from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
-        from adhesis.ensemble.report.figures.style import drawn_into, say_below
+        from adhesis.ensemble.report.figures.style import drawn_into
         from adhesis.ensemble.report.further_axes import below, common
 
         modules = (loops, loss_figures, shapes_and_spectra)
@@ -40,7 +40,7 @@ class Plots:
         with drawn_into(ax):
             shown = self._averages().shown
             figure = draw(shown)
-            say_below(figure, below(shown, common(shown)))
+            figure.say_below(below(shown, common(shown)))
             return figure.finish()
 
     def loss_along(self, name: str, ax: object = None) -> Figure:

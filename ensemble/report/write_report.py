@@ -19,27 +19,11 @@ def write_report(
     beside: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda part: None,
 ) -> Aggregate:
-    """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``; print.
+    """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``.
 
-    Parameters
-    ----------
-    path : path
-        The results file, finished or not.
-    directory : path
-        Made if missing; files of the same names are replaced.
-    stream : text stream, optional
-        Where the tables go; standard output by default.
-    beside : sequence of path
-        Results files of other campaigns to compare with.
-    progress : callable
-        Called with the name of each part of the report before it is made.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to report.
-    WriteError
-        If the directory cannot be written; what was there is left as it was.
+    ``beside`` are results files to compare with; tables are printed to ``stream``. ``progress`` is
+    called with the name of each part before it is made. InputError if there is nothing to report,
+    WriteError if the directory cannot be written; what was there is left as it was.
     """
     progress("averages")
     data = aggregate(path, beside)
@@ -83,7 +67,7 @@ def _write_files(
         along_axes,
     )
     from adhesis.ensemble.report.figures.loss_figures import of_penetration
-    from adhesis.ensemble.report.figures.style import save, say_below, style
+    from adhesis.ensemble.report.figures.style import save, style
     from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
@@ -118,7 +102,7 @@ def _write_files(
         with style():
             figure = item.draw(data if item.whole else data.shown)
             if not item.whole:
-                say_below(figure, below(data, common(data.shown)))
+                figure.say_below(below(data, common(data.shown)))
         save(figure, directory / item.name)
     progress("pages")
     page = write_page(data, sections)

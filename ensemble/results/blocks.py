@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +22,20 @@ def row_blocks(rows: int, width: int) -> Iterator[slice]:
         yield slice(start, min(rows, start + step))
 
 
+def cells_of_rows(rows: Sequence[NDArray[np.intp]], count: int) -> NDArray[np.int64]:
+    """Return the cell of each of ``count`` rows, from the rows of each cell; -1 for none."""
+    out = np.full(count, -1)
+    for k, mine in enumerate(rows):
+        out[mine] = k
+    return out
+
+
 def column_blocks(
     results: Results, name: str, rows: NDArray[np.intp], points: int
 ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-    """Values of ascending ``rows`` of a dataset (task × points), a few columns at a time.
+    """Yield the values of ascending ``rows`` of a dataset (task × points), a few columns at a time.
 
-    Yields
-    ------
-    columns : slice
-    values : array, shape (rows, columns)
-        At most :data:`HELD_AT_ONCE` numbers, at least one column.
+    At most :data:`HELD_AT_ONCE` numbers, at least one column.
     """
     width = max(1, min(points, HELD_AT_ONCE // max(1, rows.size)))
     for start in range(0, points, width):

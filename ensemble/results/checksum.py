@@ -35,14 +35,7 @@ OF_KEPT = tuple(d for d in _ORDERED if d.dims[0] == KEPT)
 
 
 def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
-    """Return the checksum of arrays, one after the other, in little-endian byte order.
-
-    Parameters
-    ----------
-    parts : iterable of array
-    start : int, optional
-        The checksum of what comes before them.
-    """
+    """Return the checksum of arrays as little-endian bytes, after ``start``, of those before."""
     for part in parts:
         little = part.astype(part.dtype.newbyteorder("<"), copy=False)
         start = zlib.crc32(np.ascontiguousarray(little).reshape(-1).view(np.uint8).data, start)
@@ -57,15 +50,8 @@ def row_checksums(
 ) -> NDArray[np.uint32]:
     """Compute the checksums of some rows from what they hold; a block is in memory at a time.
 
-    Parameters
-    ----------
-    read : callable
-    sizes : mapping of int
-        Lengths of the dimensions.
-    kept : int array
-        Rows of the tasks that keep their fields, ascending.
-    rows : int array
-        Ascending.
+    ``sizes`` are the lengths of the dimensions, ``kept`` the rows that keep their fields; both they
+    and ``rows`` ascend.
     """
     out = np.zeros(rows.size, np.uint32)
     widths = [prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in OF_TASKS]

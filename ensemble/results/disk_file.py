@@ -30,14 +30,7 @@ def refusal(error: OSError) -> type[InputError | WriteError]:
 
 
 class DiskFile(io.RawIOBase):
-    """A file object for h5py, of a file on disk.
-
-    Parameters
-    ----------
-    path : path
-    mode : {"x+b", "r+b"}
-        For a new file or an old one.
-    """
+    """A file object for h5py, of a new file on disk ("x+b") or an old one ("r+b")."""
 
     def __init__(self, path: Path, mode: Literal["x+b", "r+b"]) -> None:
         self._file = path.open(mode, buffering=0)
@@ -58,12 +51,7 @@ class DiskFile(io.RawIOBase):
             self.check()
 
     def check(self) -> None:
-        """Raise the first error.
-
-        Raises
-        ------
-        OSError
-        """
+        """Raise the first error (OSError)."""
         if self._error is not None:
             raise self._error
 
@@ -115,12 +103,7 @@ def opened(path: Path, mode: Literal["x+b", "r+b"]) -> Iterator[tuple[h5py.File,
     """Open a results file to write, new or old, by one process.
 
     Signals are held back while HDF5 opens and closes it: what a handler raises would be an error of
-    the disk to HDF5.
-
-    Raises
-    ------
-    OSError
-        Also at the end, if something could not be written.
+    the disk to HDF5. OSError also at the end, if something could not be written.
     """
     with DiskFile(path, mode) as disk:
         with signals_held():

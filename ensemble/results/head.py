@@ -62,16 +62,9 @@ def write_head(path: Path) -> None:
 
 
 def check_head(path: Path) -> bool:
-    """Return whether a file has the checksum of its head.
+    """Return whether a file has the checksum of its head (OSError, InputError).
 
-    Raises
-    ------
-    InputError
-        If it is a pipe, device or directory.
-    OSError
-        If it cannot be read.
-    ValueError
-        If it has no head: it is no results file.
+    ValueError if it has no head: it is no results file.
     """
     with open_regular(path) as handle:
         place = handle.read(_NEAR).find(_MARK)

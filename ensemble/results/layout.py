@@ -29,14 +29,13 @@ from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results import schema
+from adhesis.ensemble.results.copy_rows import Source, copy_dataset, rows_in
 from adhesis.ensemble.results.disk_file import opened, refusal
 from adhesis.ensemble.results.head import reserve_head, write_head
-from adhesis.ensemble.results.read import Results, stretches
+from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
 from adhesis.solver.runtime.uninterrupted import signals_held
-
-_COPY_BYTES = 16 * 2**20  # memory of a growing copy
 
 
 def check_results_file(option: str, path: Path) -> None:
@@ -78,26 +77,10 @@ def create(
 ) -> None:
     """Lay out a results file at full size, by one process; all or nothing.
 
-    Signals are held back meanwhile: h5py would drop what their handlers raise.
-
-    Parameters
-    ----------
-    path : path
-        Replaced if it exists; of a symbolic link, the file that it leads to.
-    campaign : Campaign
-    part : Part, optional
-        Rows to lay out, if not all.
-    versions : mapping of str, optional
-        Root attributes with the versions of what computes (``mpi``, ``hdf5``, ``fftw``, …).
-    grown_from : Results, optional
-        An older file of a campaign that this one extends; its rows are copied.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written or the disk is too small.
-    WriteError
-        If the disk does not take it.
+    It is replaced if it exists; of a symbolic link, the file that it leads to. Of ``grown_from``, a
+    file of a campaign that this one extends, the rows are copied. Signals are held back meanwhile:
+    h5py would drop what their handlers raise. InputError if the file cannot be written or the disk
+    is too small, WriteError if the disk does not take it.
     """
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
@@ -113,7 +96,7 @@ def create(
                 _lay_out(file, campaign, part)
                 _describe(file, campaign, part, versions or {}, grown_from)
                 if grown_from is not None:
-                    _copy_rows(grown_from, file, campaign, part)
+                    _copy_rows(grown_from, file, campaign)  # a part does not grow
             write_head(unfinished)
             with unfinished.open("rb") as handle:
                 os.fsync(handle.fileno())
@@ -180,24 +163,12 @@ def _set_attributes(of: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
         of.attrs[name] = value
 
 
-def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) -> None:
+def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
     """Copy every row but those that are damaged: in the new file they are pending."""
-    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks(part))}
-    target = np.array([place[old.campaign.identity(task)] for task in old.tasks()], np.intp)
-    sound = old.status() != schema.DAMAGED
+    target, rows = rows_in(campaign, old), old.column(KEPT)
     # A task that kept its fields does so in the grown campaign: realisations are only added.
-    of_kept = old.column(KEPT)
-    kept = np.searchsorted(file[KEPT][:], target[of_kept])
+    kept = np.searchsorted(file[KEPT][:], target[rows])
+    source = Source(old, target, kept, rows, old.status() != schema.DAMAGED)
     for column in schema.DATASETS:
-        if column in schema.TASK_DATASETS:
-            continue
-        dataset = file[column.name]
-        targets = kept if column.dims[0] == KEPT else target
-        taken = sound[of_kept] if column.dims[0] == KEPT else sound
-        width = max(1, int(np.prod(dataset.shape[1:])) * dataset.dtype.itemsize)
-        for first in range(0, len(targets), max(1, _COPY_BYTES // width)):
-            block = old.column(column.name, slice(first, first + max(1, _COPY_BYTES // width)))
-            chosen = taken[first : first + len(block)]
-            block, rows = block[chosen], targets[first : first + len(chosen)][chosen]
-            for i, (start, stop) in stretches(rows):
-                dataset[start:stop] = block[i : i + stop - start]
+        if column not in schema.TASK_DATASETS:
+            copy_dataset([source], file, column, 0, file[column.name].shape[0])

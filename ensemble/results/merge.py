@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,18 +20,16 @@ from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results import schema
+from adhesis.ensemble.results.copy_rows import Source, copy_dataset, rows_in
 from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import reason
-from adhesis.ensemble.task.dataset import KEPT, Dataset
+from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS
 from adhesis.solver.runtime.uninterrupted import signals_held
 
-Rows = NDArray[np.intp]
-
 _BLOCK_ROWS = 4096
-_BLOCK_BYTES = 16 * 2**20
 # Time and place may differ between two computations of one task; nothing else may.
 _OF_THE_RUN = ("wall_time", "cpu_time")
 _COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
@@ -47,66 +44,24 @@ _COPIED = tuple(
 
 @dataclass(frozen=True)
 class Merged:
-    """Result of a merge: rows by status, how many it took over, and what it left out.
-
-    Attributes
-    ----------
-    doubts : tuple of str
-        A sentence about each file with damaged rows, which are left out, or with rows of several
-        versions or processors.
-    """
+    """Result of a merge: rows by status, how many it took over, and what it left out."""
 
     total: int
     done: int
     failed: int
     taken: int
+    # A sentence about each file with damaged rows, which are left out, or with rows of several
+    # versions or processors
     doubts: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Source:
-    """A file to take rows from, and where they go."""
-
-    results: Results
-    target: Rows  # row in the merged file of each row, ascending
-    kept: Rows  # place among the merged file's kept rows of each kept row
-    kept_rows: Rows
-    taken: NDArray[np.bool_]  # rows that this file gives
-
-    def row_of(self, target: int) -> int:
-        """Row of a task, by its row in the merged file."""
-        return int(np.searchsorted(self.target, target))
-
-    def gives(self, first: int, stop: int) -> bool:
-        """Whether it gives any of these rows."""
-        low, high = np.searchsorted(self.target, (first, stop))
-        return bool(np.any(self.taken[low:high]))
-
-    def places(self, dataset: Dataset) -> tuple[Rows, NDArray[np.bool_]]:
-        """Return the places of the rows of a dataset, and which of them are given."""
-        if dataset.dims[0] == KEPT:
-            return self.kept, self.taken[self.kept_rows]
-        return self.target, self.taken
 
 
 def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
     """Take over the finished rows of several results files of one campaign.
 
-    Parameters
-    ----------
-    parts : sequence of path
-        Parts of the campaign, or whole files of it, finished or not.
-    out : path
-        Made if it does not exist; else a file of the same campaign, or of one that grew from it.
-        The caller holds its lock.
-
-    Raises
-    ------
-    InputError
-        Before anything is written, if a file is damaged or foreign, or if two hold a row with
-        different bits.
-    WriteError
-        If the disk does not take it; the same merge goes on.
+    ``out`` is made, or is a file of the same campaign, or of one that grew from it; the caller
+    holds its lock. InputError before anything is written, if a file is damaged or foreign, or if
+    two hold a row with different bits; WriteError if the disk does not take it: the same merge goes
+    on.
     """
     out = Path(out)
     with ExitStack() as stack:
@@ -158,19 +113,16 @@ def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
 
 def _assign(
     opened: Sequence[Results], campaign: Campaign, status: NDArray[np.uint8], there: Results | None
-) -> list[_Source]:
+) -> list[Source]:
     """Decide which file gives which row; ``status`` becomes that of the merged file."""
-    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks())}
     kept = schema.kept_rows(campaign)
-    sources: list[_Source] = []
+    sources: list[Source] = []
     giver = np.full(status.size, -1)  # source of each row that is not there yet
     for part in opened:
-        target = np.array([place[part.campaign.identity(t)] for t in part.tasks()], np.intp)
+        target = rows_in(campaign, part)
         own = part.status()
         rows = part.column(KEPT)
-        source = _Source(
-            part, target, np.searchsorted(kept, target[rows]), rows, own == schema.DONE
-        )
+        source = Source(part, target, np.searchsorted(kept, target[rows]), rows, own == schema.DONE)
         for row in np.flatnonzero((own == schema.DONE) & (status[target] == schema.DONE)).tolist():
             other = giver[target[row]]
             if other >= 0:
@@ -190,7 +142,7 @@ def _assign(
     return sources
 
 
-def _compare(source: _Source, row: int, other: Results, there: int) -> None:
+def _compare(source: Source, row: int, other: Results, there: int) -> None:
     """Refuse a row that two files hold with different bits."""
     for dataset in _COMPARED:
         if dataset.dims[0] == KEPT:
@@ -204,7 +156,7 @@ def _compare(source: _Source, row: int, other: Results, there: int) -> None:
             )
 
 
-def _copy(sources: Sequence[_Source], out: Path) -> None:
+def _copy(sources: Sequence[Source], out: Path) -> None:
     """Write the rows that were assigned, block by block, the status of a block last."""
     try:
         with opened(out, "r+b") as (file, disk):
@@ -217,33 +169,13 @@ def _copy(sources: Sequence[_Source], out: Path) -> None:
                     for dataset in _COPIED:
                         if dataset.dims[0] == KEPT:
                             low, high = np.searchsorted(kept, (first, stop))
-                            _copy_dataset(sources, file, dataset, int(low), int(high))
+                            copy_dataset(sources, file, dataset, int(low), int(high))
                         else:
-                            _copy_dataset(sources, file, dataset, first, stop)
+                            copy_dataset(sources, file, dataset, first, stop)
                     file.flush()
                     disk.check()
-                    _copy_dataset(sources, file, schema.STATUS, first, stop)
+                    copy_dataset(sources, file, schema.STATUS, first, stop)
                     file.flush()
                     disk.check()
     except OSError as error:
         raise WriteError(f"{out} could not be written: {reason(error)}") from error
-
-
-def _copy_dataset(
-    sources: Sequence[_Source], file: h5py.File, dataset: Dataset, first: int, stop: int
-) -> None:
-    """Take over rows ``first`` … ``stop`` - 1 of one dataset."""
-    there = file[dataset.name]
-    width = max(1, int(np.prod(there.shape[1:])) * there.dtype.itemsize)
-    step = max(1, _BLOCK_BYTES // width)
-    for start in range(first, min(stop, there.shape[0]), step):
-        end = min(start + step, stop, there.shape[0])
-        block = there[start:end]
-        for source in sources:
-            target, taken = source.places(dataset)
-            low, high = np.searchsorted(target, (start, end))
-            chosen = taken[low:high]
-            if np.any(chosen):
-                values = source.results.column(dataset.name, slice(int(low), int(high)))
-                block[target[low:high][chosen] - start] = values[chosen]
-        there[start:end] = block

@@ -40,26 +40,8 @@ class Results:
     """A results file, read with plain h5py, at any moment of a run.
 
     Opening it checks everything but the rows: the root attributes, the shapes and types of the
-    datasets, the dimension scales, and that the tasks are those of the campaign. The rows are
-    checked by :meth:`status`.
-
-    Parameters
-    ----------
-    path : path
-
-    Attributes
-    ----------
-    path : Path
-    campaign : Campaign
-    part : Part
-        Which rows of the campaign it holds; part 1 of 1 is the whole.
-    attributes : dict
-        The root attributes (docs/results-file.md).
-
-    Raises
-    ------
-    InputError
-        If it is missing, foreign, truncated or damaged; one sentence.
+    datasets, the dimension scales, and that the tasks are those of the campaign. InputError if it
+    is missing, foreign, truncated or damaged. The rows are checked by :meth:`status`.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -237,14 +219,7 @@ class Results:
         return int(self._file["task"].shape[0])
 
     def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
-        """Return a dataset, or some rows of it.
-
-        Parameters
-        ----------
-        name : str
-        rows : slice or ascending int array, optional
-            All rows if not given. Memory is that of the result.
-        """
+        """Return a dataset, or some rows of it: a slice, or ascending numbers."""
         with _damage(self.path):
             dataset = self._file[name]
             if rows is None or isinstance(rows, slice):

@@ -35,33 +35,16 @@ _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
 
 def read_status(path: Path | str) -> dict[str, Any]:
-    """Return counts, times and failures of a results file.
+    """Return counts, times and failures of a results file (InputError), the entries of ``--json``.
 
-    Returns
-    -------
-    dict
-        ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
-        dict for each row that does not have its checksum (it counts as nothing else);
-        ``computed_by``, the number of done rows by the versions and the processor that computed
-        them; ``seconds`` per done task (``mean``, ``median``, ``max``, ``sum``; None without any);
-        ``groups``, one dict for each cell (a value of each of the ``axes``, in the ``axis_units``)
-        with its counts, its mean time, its mean loss with standard error (J/m², and W~), and with
-        ``[stop]`` how well the mean of the steered ``quantity`` is known: ``relative_error``,
-        ``interval_low`` and ``interval_high`` (None where unknown), ``wanted_relative_error``,
-        whether it was ``met`` (None while tasks of the cell are pending), and all this as a
-        sentence (``precision``); ``failures``, one dict for each failed task; ``doubtful``, one for
-        each loss whose own checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the
-        worst first; ``beyond_limit``, one for each loss that is beyond what zero range describes
-        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`), the least range first; ``opens``,
-        whether patches may open from inside; ``under_load``, whether the loops are those of a
-        weight, and ``preload_not_reached``, the number of loops that did not reach their preload
-        (None without one); ``last_row``, when the file was last written to (as ``time.time()``
-        counts), None before the first row.
-
-    Raises
-    ------
-    InputError
-        If the file is not a sound results file.
+    ``damaged`` rows count as nothing else; ``computed_by`` has the number of done rows by versions
+    and processor; ``seconds`` are of a done task. ``groups`` has an entry for each cell (a value of
+    each of the ``axes``, in the ``axis_units``) with its counts, its mean time, its mean loss with
+    standard error (J/m², and W~), and with ``[stop]`` how well the mean of the steered quantity is
+    known. ``doubtful`` lists the worst losses first, ``beyond_limit`` the least range;
+    ``preload_not_reached`` counts loops (None without a preload). ``last_row`` is when the file was
+    last written to (as ``time.time()`` counts), None before the first row. None stands for what is
+    unknown.
     """
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy

@@ -40,19 +40,9 @@ _DESCRIPTORS = Path("/proc/self/fd")  # of Linux
 class Writer:
     """Writes rows of a results file that exists.
 
-    Parameters
-    ----------
-    path : path
-    comm : MPI communicator, optional
-        If given, every rank of it opens the file together (parallel HDF5) and writes rows on its
-        own; opening and closing are collective. If not, this process is the only writer.
-    origin : callable, optional
-        Versions and processor of what computes a row, by the rank that does.
-
-    Raises
-    ------
-    WriteError
-        If it cannot be opened.
+    With a communicator every rank of it opens the file together (parallel HDF5) and writes rows on
+    its own; opening and closing are collective. Without one this process is the only writer.
+    ``origin`` returns versions and processor of what computes a row, by the rank that does.
     """
 
     def __init__(
@@ -103,14 +93,9 @@ class Writer:
         self._names.close()
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
-        """Write the row of a task that was computed; its status last.
+        """Write the row of a task that was computed; its status last (WriteError).
 
-        Raises
-        ------
-        ValueError
-            If the row has other datasets than the schema, or one has another shape.
-        WriteError
-            If the disk does not take it.
+        ValueError if the row has other datasets than the schema, or one has another shape.
         """
         wanted = _NAMES if row in self._kept else _NAMES - _KEPT_NAMES
         if wanted - result.keys() or result.keys() - _NAMES:

@@ -37,26 +37,13 @@ class TimeLimit(BaseException):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a task.
-
-    Attributes
-    ----------
-    task : int
-    rank : int
-        Rank that computed it.
-    seconds : float
-        Wall time.
-    error : str or None
-        Reason of a failure.
-    result : object
-        Return value of ``compute``, until ``deliver`` has stored it.
-    """
+    """Outcome of a task."""
 
     task: int
-    rank: int
-    seconds: float
-    error: str | None = None
-    result: Any = None
+    rank: int  # rank that computed it
+    seconds: float  # wall time
+    error: str | None = None  # reason of a failure
+    result: Any = None  # return value of ``compute``, until ``deliver`` has stored it
 
 
 def attempt(
@@ -64,21 +51,8 @@ def attempt(
 ) -> Outcome:
     """Compute one task; failures become part of the outcome.
 
-    Parameters
-    ----------
-    compute : callable
-    task, rank : int
-    stop : callable
-        Takes the note of the task's last check, or None; returns whether to give it up.
-    limit : float, optional
-        Longest time of the task, in s.
-
-    Raises
-    ------
-    GivenUp
-        If ``stop`` returned True while it ran.
-    Exception
-        One that the handler of a signal raised meanwhile.
+    ``stop`` takes the note of the task's last check, or None, and returns whether to give it up:
+    GivenUp is then raised. ``limit`` is in s. What the handler of a signal raises meanwhile passes.
     """
     started = time.perf_counter()
     end = started + (math.inf if limit is None else limit)

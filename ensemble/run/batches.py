@@ -25,14 +25,8 @@ class _Cell:
 class Batches:
     """The cells of a campaign with ``[stop]``.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    tasks : sequence of Task
-        Row by row.
-    values : mapping of int to float
-        The quantity that ``[stop]`` steers, of the rows that have been computed; NaN of those that
-        failed.
+    ``values`` holds the quantity that ``[stop]`` steers, of the rows that have been computed; NaN
+    of those that failed.
     """
 
     def __init__(
@@ -85,12 +79,8 @@ class Batches:
     def finished(self, row: int, value: float) -> tuple[list[int], list[int]]:
         """Take in a row's value of the quantity, NaN if it failed.
 
-        Returns
-        -------
-        further : list of int
-            Rows of the cell's next batch, if this row has completed one.
-        not_needed : list of int
-            Rows that need not be computed, if the cell now has enough.
+        Returns the rows of the cell's next batch, if this row has completed one, and those that
+        need not be computed, if the cell now has enough.
         """
         cell = self._cells[self._tasks[row].cell]
         before = cell.asked

@@ -69,18 +69,10 @@ class Unresponsive(Exception):
 
 
 class Channel(Protocol):
-    """Messages between a master and its workers; nothing here waits.
+    """Messages between a master and its workers; nothing here waits."""
 
-    Attributes
-    ----------
-    rank : int
-        The own one.
-    workers : sequence of int
-        Ranks that work.
-    """
-
-    rank: int
-    workers: Sequence[int]
+    rank: int  # the own one
+    workers: Sequence[int]  # ranks that work
 
     def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
         """Send a message; urgent ones are looked for while a task is in progress."""
@@ -91,68 +83,37 @@ class Channel(Protocol):
 
 @dataclass
 class Limits:
-    """Reasons that end a run early.
+    """Reasons that end a run early."""
 
-    Attributes
-    ----------
-    stop : callable
-        Returns why the run is to stop now, or None. Asked on every rank.
-    time_left : callable
-        Returns the seconds until the deadline, or None: tasks that would not fit stay behind.
-    task_seconds : float, optional
-        Longest time of one task.
-    grace : float
-        How long workers may take to answer a stop or their dismissal, in s.
-    silence : float
-        How long a worker may not be heard from until the run ends, in s.
-    report_interval : float
-        Time between two signs of life of a worker, in s; several fit into ``silence``.
-    """
-
+    # Returns why the run is to stop now, or None. Asked on every rank.
     stop: Callable[[], str | None] = lambda: None
+    # Returns the seconds until the deadline, or None: tasks that would not fit stay behind
     time_left: Callable[[], float | None] = lambda: None
-    task_seconds: float | None = None
-    grace: float = 30.0
-    silence: float = SILENCE
+    task_seconds: float | None = None  # longest time of one task
+    grace: float = 30.0  # how long workers may take to answer a stop or their dismissal, in s
+    silence: float = SILENCE  # how long a worker may not be heard from until the run ends, in s
+    # Time between two signs of life of a worker, in s; several fit into ``silence``
     report_interval: float = REPORT_INTERVAL
 
 
 @dataclass(eq=False)
 class Master:
-    """Master of a hand-out; see the module.
-
-    Parameters
-    ----------
-    channel : Channel
-    schedule : Schedule
-    group_of : mapping of int to hashable
-        Group of each task, for its measured time.
-    collect : callable
-    limits : Limits
-    tick : callable
-        Called often while nothing arrives (progress).
-    clock, sleep : callable
-        Replaced when the run is simulated.
-    units : Units, optional
-        Tasks that go to one worker together; the schedule knows the first one of each.
-
-    Attributes
-    ----------
-    notes : dict of int to object
-        Last note of each task that is handed out and not answered; None before the first.
-    """
+    """Master of a hand-out; see the module."""
 
     channel: Channel
     schedule: Schedule
-    group_of: Mapping[int, Hashable]
+    group_of: Mapping[int, Hashable]  # group of each task, for its measured time
     collect: Collect
     limits: Limits
-    tick: Callable[[], None] = lambda: None
+    tick: Callable[[], None] = lambda: None  # called often while nothing arrives (progress)
+    # clock, sleep: replaced when the run is simulated
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
+    # Tasks that go to one worker together; the schedule knows the first one of each
     units: Units = field(default_factory=Units)
 
     def __post_init__(self) -> None:
+        # Last note of each task that is handed out and not answered; None before the first.
         self.notes: dict[int, Any] = {}
         # Of each worker, the tasks that it was sent and has not answered, with the mean times of
         # their groups: nothing is queued behind a task of a group that was not measured.
@@ -172,17 +133,10 @@ class Master:
         return sum(len(tasks) for tasks in self._sent.values())
 
     def run(self) -> str | None:
-        """Hand out until nothing waits and everything is answered.
+        """Hand out until everything is answered; return why it stopped early, or None.
 
-        Returns
-        -------
-        str or None
-            Why it stopped early.
-
-        Raises
-        ------
-        Unresponsive
-            If a worker was silent for too long, or did not answer a stop within the grace time.
+        Unresponsive if a worker was silent for too long, or did not answer a stop within the grace
+        time.
         """
         pause = SHORTEST_PAUSE
         self._consider_stopping()
@@ -310,22 +264,13 @@ class Master:
 
 @dataclass(eq=False)
 class Worker:
-    """Worker of a hand-out, which computes what it is sent until it is dismissed; see the module.
-
-    Parameters
-    ----------
-    channel : Channel
-    compute, deliver : callable
-    limits : Limits
-    clock : callable
-        Replaced in tests.
-    """
+    """Worker of a hand-out: computes what it is sent until it is dismissed; see the module."""
 
     channel: Channel
     compute: Compute
     deliver: Deliver
     limits: Limits
-    clock: Callable[[], float] = time.monotonic
+    clock: Callable[[], float] = time.monotonic  # replaced in tests
 
     def __post_init__(self) -> None:
         self._halted = False
@@ -398,11 +343,6 @@ class OwnWorker:
     """Channel of a master whose own process works: on a task each time it looks for a message.
 
     Both ends of it are this object: the worker alone looks for urgent messages.
-
-    Parameters
-    ----------
-    compute, deliver : callable
-    limits : Limits
     """
 
     def __init__(self, compute: Compute, deliver: Deliver, limits: Limits) -> None:

@@ -41,14 +41,9 @@ def in_main_thread() -> bool:
 
 
 class StopSignals:
-    """Context manager that records the signals of :func:`stop_signals` instead of ending.
+    """Context manager that records the first of the :func:`stop_signals`, and goes on.
 
     A second SIGINT (Ctrl-C) interrupts at once. Outside the main thread none is recorded.
-
-    Attributes
-    ----------
-    received : str or None
-        Name of the first signal that came.
     """
 
     def __init__(self) -> None:
@@ -81,13 +76,7 @@ def raised_by_handler(error: BaseException) -> bool:
 
 
 def parse_duration(text: str) -> float:
-    """Return the seconds of "90", "90s", "1h30m", "45:00", "12:00:00" or "2-00:00:00".
-
-    Raises
-    ------
-    InputError
-        If it is none of these, or not positive.
-    """
+    """Return the seconds of "90", "1h30m", "45:00", "12:00:00" or "2-00:00:00" (InputError)."""
     word = text.strip()
     seconds = 0.0
     match = _CLOCK.fullmatch(word) or _UNITS.fullmatch(word)
@@ -104,18 +93,10 @@ def parse_duration(text: str) -> float:
 
 @dataclass(frozen=True)
 class Deadline:
-    """Time at which a run has to stop.
+    """Time at which a run has to stop."""
 
-    Attributes
-    ----------
-    at : float
-        Time at which tasks in progress are given up, in s of ``time.time()``.
-    grace : float
-        Time that workers may take from then on, in s.
-    """
-
-    at: float
-    grace: float
+    at: float  # time at which tasks in progress are given up, in s of ``time.time()``
+    grace: float  # time that workers may take from then on, in s
 
 
 def deadline(
@@ -123,13 +104,8 @@ def deadline(
 ) -> Deadline | None:
     """Return when to give up the tasks in progress; None if never.
 
-    Parameters
-    ----------
-    walltime : float, optional
-        Seconds from ``started``. If not given, it is taken from the batch system: Slurm sets
-        the end of the job, Torque its length.
-    started : float
-        Start of this process, in s of ``time.time()``.
+    ``walltime`` is in s from ``started`` (``time.time()``). Without it that of the batch system
+    counts: Slurm sets the end of the job, Torque its length.
     """
     if walltime is not None:
         return _before(started + walltime, started)

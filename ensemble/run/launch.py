@@ -163,13 +163,9 @@ def largest_number_of_ranks(environ: Mapping[str, str] = os.environ) -> int:
 
 
 def check_file_size_limit() -> None:
-    """Refuse a limit of file sizes under which ranks cannot share memory.
+    """Raise WriteError under a limit of file sizes with which ranks cannot share memory.
 
     Open MPI 4.1 hangs there, or its ranks crash, before any of them has begun.
-
-    Raises
-    ------
-    WriteError
     """
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     if limit != resource.RLIM_INFINITY and limit < _SHARED_BYTES:
@@ -213,15 +209,7 @@ def _report(text: str) -> None:
 
 
 def marked(data: bytes, within: bool) -> bytes:
-    """Mark the lines of a rank that :func:`run_ranks` has started.
-
-    Parameters
-    ----------
-    data : bytes
-        What is printed.
-    within : bool
-        Whether it goes on with a line.
-    """
+    """Mark the lines of a started rank; ``within``: the data go on with a line."""
     line = re.compile(rb"[^\n]*\n|[^\n]+")
     lines = line.findall(data)
     return b"".join(
@@ -243,22 +231,13 @@ def _described(name: str) -> str:
 
 
 class RanksEnd(NamedTuple):
-    """How ranks have ended.
+    """How ranks have ended."""
 
-    Attributes
-    ----------
-    code : int
-        The one that a rank passed on. Without one: 0 if the launcher ended with it, 2 if the ranks
-        have never met, 75 or 130 after a signal, and 137 otherwise.
-    sentence : str
-        The last message, to be printed.
-    words : tuple of str
-        Lines of the launcher, if it gives the reason.
-    """
-
+    # The one that a rank passed on. Without one: 0 if the launcher ended with it, 2 if the ranks
+    # have never met, 75 or 130 after a signal, and 137 otherwise.
     code: int
-    sentence: str = ""
-    words: tuple[str, ...] = ()
+    sentence: str = ""  # the last message, to be printed
+    words: tuple[str, ...] = ()  # lines of the launcher, if it gives the reason
 
 
 def run_ranks(
@@ -268,32 +247,16 @@ def run_ranks(
     program: Sequence[str] | None = None,
     output: Callable[[str], None] = log,
 ) -> RanksEnd:
-    """Start ranks with a command of adhesis and wait for their end.
+    """Start ranks with a command of adhesis and wait for their end (InputError).
 
-    Of the launcher's exit code only 0 counts: launchers end with 1, and with other codes of
+    ``program`` runs instead of adhesis with these arguments; ``output`` takes each line of the
+    ranks. Of the launcher's exit code only 0 counts: launchers end with 1, and with other codes of
     adhesis, for reasons of their own.
 
     In the main thread, SIGTERM, SIGHUP, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C
     ends them at once. If this process is killed, the launcher ends them. A launcher whose ranks do
     not meet in time, or that does not end soon after the ranks have passed on an exit code, is
     ended.
-
-    Parameters
-    ----------
-    launcher : str
-        An ``mpirun``.
-    ranks : int
-    words : sequence of str
-        Arguments of ``adhesis``.
-    program : sequence of str, optional
-        Program that a rank runs instead of adhesis, with these arguments.
-    output : callable
-        Takes each line that the ranks print.
-
-    Raises
-    ------
-    InputError
-        If the launcher cannot be started.
     """
     check_file_size_limit()
     # With -m mpi4py, an error that a rank does not handle ends the others, too.

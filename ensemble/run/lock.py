@@ -54,13 +54,7 @@ _RETRY_INTERVAL = 0.1  # s
 
 
 class RunLock:
-    """Lock that a run holds while it writes to a results file.
-
-    Parameters
-    ----------
-    results : path
-        The results file; it need not exist.
-    """
+    """Lock that a run holds while it writes to a results file, which need not exist."""
 
     def __init__(self, results: Path | str) -> None:
         self._results = Path(results)
@@ -69,21 +63,10 @@ class RunLock:
         self._owner = False
 
     def acquire(self, ranks: int, patience: float) -> None:
-        """Take the lock for a run, by its rank 0.
+        """Take the lock for a run, by its rank 0 (InputError; WriteError for a full disk).
 
-        Parameters
-        ----------
-        ranks : int
-            Number of ranks, for the message to a run that is refused.
-        patience : float
-            Time to wait for a run that holds it, in s: one that was just killed needs a moment.
-
-        Raises
-        ------
-        InputError
-            If another run holds it, or the folder cannot be written.
-        WriteError
-            If the disk is full.
+        ``ranks`` is for the message to a run that is refused, ``patience`` how long to wait for a
+        run that holds it, in s: one that was just killed needs a moment.
         """
         deadline = time.monotonic() + patience
         announced = False

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
@@ -33,25 +33,14 @@ _AGAIN = "; this run computes damaged rows again"
 
 @dataclass(frozen=True)
 class Selection:
-    """Rows to compute again.
-
-    Attributes
-    ----------
-    status : {"failed", "all"}
-    values : mapping of str to numbers
-        By the name of an attribute of tasks; if there are any, only tasks with one of them.
-    """
+    """Rows to compute again."""
 
     status: Literal["failed", "all"]
+    # By the name of an attribute of tasks; if there are any, only tasks with one of them
     values: Mapping[str, Collection[float]] = field(default_factory=dict)
 
     def check(self, tasks: Sequence[Task]) -> None:
-        """Refuse values that the campaign does not have.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse values that the campaign does not have (InputError)."""
         for name, chosen in self.values.items():
             known = {getattr(task, name) for task in tasks}
             for value in chosen:
@@ -72,28 +61,16 @@ class Selection:
 
 @dataclass(frozen=True)
 class Plan:
-    """Tasks that are left, determined by rank 0 and broadcast to all.
+    """Tasks that are left, determined by rank 0 and broadcast to all."""
 
-    Attributes
-    ----------
-    tasks : Tasks
-        Row by row.
-    rows : list of int
-        Rows to compute.
-    done, failed : int
-        Rows that are.
-    times : dict
-        Of each group of tasks that take about the same time: seconds measured, and tasks.
-    batches : Batches, optional
-        Where the campaign has ``[stop]``: what comes after ``rows``.
-    """
-
-    tasks: Tasks
-    rows: list[int]
+    tasks: Tasks  # row by row
+    rows: list[int]  # rows to compute
+    # done, failed: rows that are
     done: int
     failed: int
+    # Of each group of tasks that take about the same time: seconds measured, and tasks
     times: dict[Group, tuple[float, int]] = field(default_factory=dict)
-    batches: Batches | None = None
+    batches: Batches | None = None  # where the campaign has ``[stop]``: what comes after ``rows``
 
 
 def prepare(
@@ -110,31 +87,9 @@ def prepare(
 ) -> Plan:
     """Lock, check everything, make or extend the file, and find what is to be done; by rank 0.
 
-    Only tasks that are to be computed are checked, as that loads the solver.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    path : path
-        The results file.
-    lock : RunLock
-        Taken here.
-    size : int
-        Ranks of the run.
-    part : Part, optional
-        The share of the tasks to compute, if not all.
-    redo : Selection, optional
-        Rows to compute again.
-    patience : float
-        How long to wait for another run to let go of the file, in s.
-    say : callable
-        Gets a line about what was found.
-    check : callable
-        Raises InputError if a task cannot be set up.
-
-    Raises
-    ------
-    InputError
+    Only tasks that are to be computed are checked, as that loads the solver. ``size`` is the number
+    of ranks; ``patience`` how long to wait for another run, in s; ``say`` gets a line about what
+    was found; ``check`` raises InputError if a task cannot be set up.
     """
     tasks = campaign.tasks(part)
     if part != WHOLE and campaign.stop.relative_error is not None:
@@ -164,27 +119,22 @@ def prepare(
         say(f"{path}: {len(rows)} tasks to do{' at first' if batches else ''}")
         return Plan(tasks, rows, 0, 0, batches=batches)
     with Results(path) as old:
-        difference = compare(old.campaign, campaign)
-        if difference.other:
-            raise InputError(
-                f"{path} holds another campaign: {'; '.join(difference.other)} "
-                "(here: this campaign, there: the file)"
-            )
+        grown_keys = growth(path, old.campaign, campaign)
         if old.part != part:
             held = "the whole campaign" if old.part == WHOLE else f"part {old.part} of it"
             raise InputError(f"{path} holds {held}, and part {part} is wanted")
-        if difference.grown and part != WHOLE:
+        if grown_keys and part != WHOLE:
             raise InputError(
                 f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "
                 "parts are merged into does"
             )
-        if difference.grown and not same_rows(old.campaign, campaign):
+        if grown_keys and not same_rows(old.campaign, campaign):
             raise InputError(
-                f"{path} cannot grow by {', '.join(difference.grown)}: the bins of its "
+                f"{path} cannot grow by {', '.join(grown_keys)}: the bins of its "
                 "spectra would change (they follow the highest n0 · ratio of the campaign)"
             )
         before = len(old)
-        if difference.grown:
+        if grown_keys:
             check_space(path, campaign, part)
             check_cells(tasks)
             create(path, campaign, part=part, versions=versions(), grown_from=old)
@@ -212,7 +162,7 @@ def prepare(
                 writer.mark([row for row in spare if status[row] == PENDING], needed=False)
                 wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
                 writer.mark(sorted(wanted), needed=True)
-    grown = f", {len(plan.tasks) - before} of them new" if difference.grown else ""
+    grown = f", {len(plan.tasks) - before} of them new" if grown_keys else ""
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
         f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"

@@ -14,11 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
-from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import duration, percent
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
@@ -45,57 +44,31 @@ Cell = tuple[float, ...]
 
 @dataclass(frozen=True)
 class CellPrice:
-    """Cost of the tasks of one cell.
+    """Cost of the tasks of one cell."""
 
-    Attributes
-    ----------
-    task : Task
-        One of them.
-    tasks : int
-        Number still to do.
-    seconds : float
-        Mean CPU time of one, in s.
-    measured : int
-        Loops that the mean is over; 0 where it is scaled from other cells.
-    """
-
-    task: Task
-    tasks: int
-    seconds: float
-    measured: int
+    task: Task  # one of them
+    tasks: int  # number still to do
+    seconds: float  # mean CPU time of one, in s
+    measured: int  # loops that the mean is over; 0 where it is scaled from other cells
 
 
 @dataclass(frozen=True, repr=False)
 class Price:
-    """Cost of a campaign.
+    """Cost of a campaign."""
 
-    Attributes
-    ----------
-    tasks, done : int
-        Tasks of the campaign or part, and those of them that have a result.
-    cells : tuple of CellPrice
-    longest : float
-        Estimated CPU time of the longest task, or of the longest set of tasks that share a loading
-        branch, in s.
-    file_bytes, rank_bytes : int
-        Of the results file; of one rank's memory, as this process has had it.
-    pilots : int
-        Loops that were computed to find out.
-    pilot_seconds : float
-        Their CPU time.
-    stop : str
-        With ``[stop]``: for how many realisations a cell the price is, and why.
-    """
-
+    # tasks, done: tasks of the campaign or part, and those of them that have a result
     tasks: int
     done: int
     cells: tuple[CellPrice, ...]
+    # Estimated CPU time of the longest task, or of the longest set of tasks that share a loading
+    # branch, in s
     longest: float
+    # file_bytes, rank_bytes: of the results file; of one rank's memory, as this process has had it
     file_bytes: int
     rank_bytes: int
-    pilots: int
-    pilot_seconds: float
-    stop: str = ""
+    pilots: int  # loops that were computed to find out
+    pilot_seconds: float  # their CPU time
+    stop: str = ""  # with ``[stop]``: for how many realisations a cell the price is, and why
 
     def __str__(self) -> str:
         """Return the lines of ``adhesis run --dry-run``."""
@@ -166,30 +139,11 @@ def price(
     """Estimate what a campaign costs; writes nothing.
 
     Cells of which loops are done in the results file cost what those did. Of the others loops are
-    tried out, the first realisation of each, then the second …, until the time is up; what was not
+    tried out for ``seconds``, the first realisation of each, then the second …; what was not
     reached is extrapolated by how the tasks of such cells usually compare. Loops that share a
-    loading branch are tried out together.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    path : path, optional
-        Its results file, if there is one.
-    part : Part, optional
-    seconds : float
-        How long loops are tried out.
-    compute : callable, optional
-        Computes a task.
-    prepare : callable
-        Called with the first task still to do of each cell, if there are any, before one is tried
-        out.
-    on_pilot : callable
-        Called after each loop that was tried out, with its CPU time in s.
-
-    Raises
-    ------
-    InputError
-        If the results file is damaged, or holds another campaign.
+    loading branch are tried out together. ``prepare`` is called with the first task still to do of
+    each cell before one is tried out, ``on_pilot`` after each loop with its CPU time in s.
+    InputError if the results file is damaged, or holds another campaign.
     """
     compute = compute or Runner()
     tasks = campaign.tasks(part)
@@ -240,12 +194,7 @@ def _left(campaign: Campaign, path: Path, tasks: Tasks, known: _Known) -> tuple[
     left = np.zeros(campaign.task_count, bool)
     left[tasks.rows] = True
     with Results(path) as results:
-        difference = compare(results.campaign, campaign)
-        if difference.other:
-            raise InputError(
-                f"{path} holds another campaign: {'; '.join(difference.other)} "
-                "(here: this campaign, there: the file)"
-            )
+        growth(path, results.campaign, campaign)
         rows = zip(
             results.tasks(),
             results.status().tolist(),

@@ -20,13 +20,7 @@ from adhesis.ensemble.run.launch import end_with_parent
 
 
 class Pipes:
-    """Channel of such a worker.
-
-    Parameters
-    ----------
-    rank : int
-    incoming, outgoing : binary stream
-    """
+    """Channel of such a worker."""
 
     def __init__(self, rank: int, incoming: BinaryIO, outgoing: BinaryIO) -> None:
         self.rank = rank

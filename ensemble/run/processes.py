@@ -22,18 +22,7 @@ class Processes:
 
     They neither fork nor import the caller's script, so that this works from a notebook as well as
     from the command line. A process that ends, killed for want of memory say, takes its tasks with
-    it, and another one is started in its place.
-
-    Parameters
-    ----------
-    count : int
-        Number of processes.
-    compute : callable
-        Of :mod:`adhesis.ensemble.run.dispatch`; it is pickled.
-    task_seconds : float, optional
-        Longest time of one task.
-    report_interval : float
-        Time between two signs of life, in s.
+    it, and another one is started in its place. ``compute`` is pickled; both times are in s.
     """
 
     def __init__(

@@ -16,28 +16,20 @@ _MOST_FAILURES_SHOWN = 5
 
 @dataclass
 class Counts:
-    """Numbers of tasks of a run.
+    """Numbers of tasks of a run."""
 
-    Attributes
-    ----------
-    total, done, failed : int
-        In the results file, or the part of it that is asked for.
-    computed, failed_now : int
-        Of these, by this run.
-    doubtful : int
-        Losses, of those computed now, whose own checks say that they are wrong
-        (:mod:`adhesis.ensemble.task.doubt`).
-    beyond_limit : int
-        Losses, of those computed now, that are those of the zero-range limit alone
-        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`).
-    """
-
+    # total, done, failed: in the results file, or the part of it that is asked for
     total: int
     done: int = 0
     failed: int = 0
+    # computed, failed_now: of these, by this run
     computed: int = 0
     failed_now: int = 0
+    # Losses of those computed now whose own checks say that they are wrong
+    # (:mod:`adhesis.ensemble.task.doubt`)
     doubtful: int = 0
+    # Losses of those computed now that are those of the zero-range limit alone
+    # (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`)
     beyond_limit: int = 0
 
     @property
@@ -53,15 +45,9 @@ def _interval(elapsed: float) -> float:
 
 
 class ProgressLine(StatusLine):
-    """Report the progress of a run, on rank 0.
+    """Report the progress of a run, on rank 0, from counts that the run keeps up to date.
 
-    Parameters
-    ----------
-    counts : Counts
-        Kept up to date by the run.
-    time_left : callable
-        Estimated seconds until the end, or None while nothing is known.
-    stream : text stream
+    ``time_left`` returns the estimated seconds until the end, or None while nothing is known.
     """
 
     def __init__(

@@ -81,10 +81,7 @@ def launched() -> tuple[int, int, str]:
 def world() -> Any:
     """Return COMM_WORLD, or :class:`OneRank` if this process is alone.
 
-    Raises
-    ------
-    InputError
-        If a launcher started several processes and MPI sees one: two MPIs are mixed.
+    InputError if a launcher started several processes and MPI sees one: two MPIs are mixed.
     """
     size, _, launcher = launched()
     hints = (name for name in os.environ if name.startswith(_HINTS) and _SETTING not in name)
@@ -109,13 +106,7 @@ def world() -> Any:
 
 
 def together(comm: Any, function: Callable[[], T]) -> T:
-    """Run a function on rank 0 and return its value on every rank.
-
-    Raises
-    ------
-    InputError
-        On every rank, if it was raised on rank 0.
-    """
+    """Run a function on rank 0 and return its value, or raise its InputError, on every rank."""
     answer: tuple[bool, Any] | None = None
     if comm.rank == 0:
         try:
@@ -144,14 +135,7 @@ def wait_for_all(comm: Any, seconds: float = math.inf) -> bool:
 
 
 def one_a_node_first(comm: Any, function: Callable[[bool], T]) -> T:
-    """Run a function on one rank of each node, and then on the others.
-
-    Parameters
-    ----------
-    comm : MPI communicator or OneRank
-    function : callable
-        Called with whether this is the first rank of its node.
-    """
+    """Run a function on one rank of each node, with True, and then on the others, with False."""
     if comm.size == 1:
         return function(True)
     from mpi4py import MPI

@@ -29,21 +29,8 @@ class _Group:
 class Schedule:
     """Tasks that wait, ordered by round and estimated time.
 
-    Parameters
-    ----------
-    tasks : iterable of int
-        Ids of the tasks to do.
-    group_of : mapping of int to hashable
-        Group of each task, also of those that are added later.
-    priors : mapping of hashable to float
-        Relative time of a task of each group, positive.
-    round_of : mapping of int to int, optional
-        Round of each task; all are of one round if not given.
-
-    Attributes
-    ----------
-    waiting : int
-        Tasks not handed out.
+    ``group_of`` and ``round_of`` also hold the tasks that are added later; without ``round_of`` all
+    are of one round. ``priors`` are relative times of a task of each group, positive.
     """
 
     def __init__(

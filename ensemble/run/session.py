@@ -48,78 +48,44 @@ from adhesis.solver.loading.loop import Progress
 
 @dataclass(frozen=True)
 class Engine:
-    """Functions that a run works with; tests and benchmarks pass in their own.
+    """Functions that a run works with; tests and benchmarks pass in their own."""
 
-    Attributes
-    ----------
-    compute : callable
-        Computes a task of a campaign; it calls its third argument now and then.
-    check : callable
-        Raises InputError if a task cannot be set up.
-    writer : callable
-        Opens the results file for writing: path, the communicator if all ranks write, and what
-        returns the versions and the processor of a rank.
-    all_write : bool
-        Whether each rank writes the rows that it computed, as parallel HDF5 allows.
-    watch : callable
-        Makes what stands around a rank's loop of handing out or working.
-    methods : callable
-        The methods that tasks are computed by: they are compiled before the first task.
-    silence : float
-        How long a rank may not be heard from until the run ends, in s.
-    """
-
+    # Computes a task of a campaign; it calls its third argument now and then
     compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
+    # Raises InputError if a task cannot be set up
     check: Callable[[Campaign, Task], None] = check_task
+    # Opens the results file for writing: path, the communicator if all ranks write, and what
+    # returns the versions and the processor of a rank
     writer: Callable[[Path, Any, Callable[[int], str]], Writer] = Writer
+    # Whether each rank writes the rows that it computed, as parallel HDF5 allows
     all_write: bool = bool(h5py.get_config().mpi)
+    # Makes what stands around a rank's loop of handing out or working
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
+    # The methods that tasks are computed by: they are compiled before the first task
     methods: Callable[[Campaign, Iterable[Task]], Collection[str]] = methods_of
-    silence: float = SILENCE
+    silence: float = SILENCE  # how long a rank may not be heard from until the run ends, in s
 
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a run.
+    """Options of a run."""
 
-    Attributes
-    ----------
-    part : Part
-        The share of the tasks to compute.
-    redo : Selection, optional
-        Rows to compute again.
-    max_failures : int, optional
-        So many failed tasks stop the run.
-    deadline : Deadline, optional
-        When to give up what is in flight.
-    patience : float
-        How long to wait for another run to let go of the results file, in s.
-    processes : int
-        Processes that compute beside this one where there are no ranks; 0 computes here.
-    """
-
-    part: Part = WHOLE
-    redo: Selection | None = None
-    max_failures: int | None = 20
-    deadline: Deadline | None = None
-    patience: float = 10.0
+    part: Part = WHOLE  # the share of the tasks to compute
+    redo: Selection | None = None  # rows to compute again
+    max_failures: int | None = 20  # so many failed tasks stop the run
+    deadline: Deadline | None = None  # when to give up what is in flight
+    patience: float = 10.0  # how long to wait for another run to let go of the results file, in s
+    # Processes that compute beside this one where there are no ranks; 0 computes here
     processes: int = 0
 
 
 @dataclass
 class Summary(Counts):
-    """Result of a run: its counts, and how it ended.
-
-    Attributes
-    ----------
-    stopped : str or None
-        Why it stopped before the last task.
-    precisions : tuple of (str, Precision)
-        With ``[stop]``: name of every cell, and how well the mean of its quantity is known.
-    """
+    """Result of a run: its counts, and how it ended."""
 
     seconds: float = 0.0
-    stopped: str | None = None
+    stopped: str | None = None  # why it stopped before the last task
+    # With ``[stop]``: name of every cell, and how well the mean of its quantity is known
     precisions: tuple[tuple[str, Precision], ...] = ()
 
     def __str__(self) -> str:
@@ -139,30 +105,15 @@ def run_campaign(
 ) -> Summary:
     """Compute what is missing of a campaign in its results file.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    path : path
-        The results file; made, resumed or extended as it is found.
-    comm : MPI communicator, optional
-        Called on every rank of it: rank 0 hands out, the others compute. Without it, or with one
-        rank, this process computes, or hands out to processes that it starts.
-    options : Options, optional
-    say : callable
-        Gets a line about what was found and what will be done, on rank 0.
-    engine : Engine, optional
-        Loops into a results file, if not given.
-    stream : text stream, optional
-        Where progress is reported; stderr, if not given.
+    The file is made, resumed or extended. Called on every rank of ``comm``: rank 0 hands out, the
+    others compute. Without it, or with one rank, this process computes, or hands out to processes
+    that it starts. ``say`` gets a line about what was found and what will be done, on rank 0;
+    progress goes to ``stream``, or stderr.
 
-    Raises
-    ------
-    InputError
-        On every rank, before any work, if the campaign cannot be computed or the file is foreign,
-        damaged, of another campaign, in use or not writable.
-    adhesis.ensemble.run.dispatch.Unresponsive
-        On rank 0, if a worker does not answer; the results file is sound. The other ranks wait:
-        the caller has to end the job.
+    InputError on every rank, before any work, if the campaign cannot be computed or the file is
+    foreign, damaged, of another campaign, in use or not writable. Unresponsive on rank 0, if a
+    worker does not answer; the results file is sound. The other ranks wait: the caller has to end
+    the job.
     """
     options, engine = options or Options(), engine or Engine()
     path = target_of(path)

@@ -18,13 +18,7 @@ class _Unit:
 
 
 class Units:
-    """Units of tasks.
-
-    Parameters
-    ----------
-    key_of : mapping of int to hashable, optional
-        Tasks with the same key make a unit; a task without a key is one of its own.
-    """
+    """Units of tasks: those with the same key; a task without a key is one of its own."""
 
     def __init__(self, key_of: Mapping[int, Hashable] | None = None) -> None:
         self._key_of = key_of or {}
@@ -50,10 +44,7 @@ class Units:
     def answered(self, task: int, seconds: float | None) -> tuple[int, float] | None:
         """Take in that a task took ``seconds``, or None if it has no result.
 
-        Returns
-        -------
-        tuple of int and float, or None
-            First task and time of its unit, if that is now done as a whole.
+        Returns first task and time of its unit, if that is now done as a whole.
         """
         if task not in self._first:
             return None if seconds is None else (task, seconds)

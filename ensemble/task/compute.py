@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
@@ -23,31 +24,15 @@ from adhesis.solver.registry import make_method
 
 
 def make_problem(campaign: Campaign, task: Task) -> Problem:
-    """Build the profile, half-space and work of adhesion of a task.
-
-    Raises
-    ------
-    ValueError
-        If no such problem exists.
-    """
+    """Build the profile, half-space and work of adhesion of a task (ValueError)."""
     campaign = campaign.at(task)
     table = campaign.profile
-    profile = self_affine_profile(
-        task.hurst,
-        period=table.period,
-        n0=table.n0,
-        ratio=table.ratio,
-        rolloff=table.rolloff,
-        seed=task.seed,
-        amplitudes=table.amplitudes,
-        **table.normalisation,
-    )
+    names = ("period", "n0", "ratio", "rolloff", "amplitudes")
+    shape: dict[str, Any] = {name: getattr(table, name) for name in names} | table.normalisation
+    profile = self_affine_profile(task.hurst, seed=task.seed, **shape)
     half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
-    stiffness = campaign.cycle.stiffness
-    if campaign.cycle.under_load:
-        control = Control(0.0)
-    else:
-        control = Control() if stiffness is None else Control(stiffness)
+    stiffness = 0.0 if campaign.cycle.under_load else campaign.cycle.stiffness
+    control = Control() if stiffness is None else Control(stiffness)
     material = campaign.material
     strength = strength_of(task.work_of_adhesion, material.adhesion_range, material.strength)
     return Problem(
@@ -62,13 +47,7 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
 
 
 def check_task(campaign: Campaign, task: Task) -> None:
-    """Check that a task can be set up, before any work.
-
-    Raises
-    ------
-    InputError
-        If it cannot; the message is the solver's.
-    """
+    """Raise InputError, with the solver's message, if a task cannot be set up."""
     try:
         _make_method(campaign, task)
     except (ValueError, NotImplementedError, ArithmeticError) as error:
@@ -149,12 +128,8 @@ class Runner:
             self._shared = None  # an interrupted branch is not continued
             recorder = FieldRecorder(plan, branch.method, keep=keep)
             try:
-                loop = branch.loop(
-                    turn,
-                    marks=_marks(plan),
-                    progress=progress,
-                    on_state=recorder.on_state,
-                )
+                marks, on_state = _marks(plan), recorder.on_state
+                loop = branch.loop(turn, marks=marks, progress=progress, on_state=on_state)
             except Exception:
                 self._shared = _Shared(campaign, key, turn, branch)
                 raise
@@ -169,12 +144,8 @@ class Runner:
     def _branch(self, campaign: Campaign, task: Task, key: Hashable, turn: float) -> LoadingBranch:
         """Return the loading branch of a task: that of the last task, if they share one."""
         last = self._shared
-        if (
-            last is not None
-            and last.campaign is campaign
-            and last.key == key
-            and last.turning_point < turn
-        ):
+        same = last is not None and last.campaign is campaign and last.key == key
+        if last is not None and same and last.turning_point < turn:
             return last.branch
         others = campaign.sharing(task)
         return LoadingBranch(

@@ -18,31 +18,15 @@ KEPT = "field_task"
 
 @dataclass(frozen=True)
 class Dataset:
-    """One dataset, a row for each task.
-
-    Attributes
-    ----------
-    name : str
-    dims : tuple of str
-        Names of the dimensions, ``task`` or ``field_task`` first.
-    dtype : str
-        numpy's name of the type.
-    unit : str
-        As UDUNITS reads it; "1" if there is none.
-    meaning : str
-        For the attribute ``long_name``.
-    attributes : mapping
-        Further attributes.
-    value : callable, optional
-        How its row is taken from a loop (:mod:`adhesis.ensemble.task.row`); None where it is not.
-    """
+    """One dataset, a row for each task."""
 
     name: str
-    dims: tuple[str, ...]
-    dtype: str
-    unit: str
-    meaning: str
-    attributes: Mapping[str, Any] = field(default_factory=dict)
+    dims: tuple[str, ...]  # names of the dimensions, ``task`` or ``field_task`` first
+    dtype: str  # numpy's name of the type
+    unit: str  # as UDUNITS reads it; "1" if there is none
+    meaning: str  # for the attribute ``long_name``
+    attributes: Mapping[str, Any] = field(default_factory=dict)  # further attributes
+    # How its row is taken from a loop (:mod:`adhesis.ensemble.task.row`); None where it is not
     value: Callable[..., Any] | None = field(default=None, compare=False)
 
     @property

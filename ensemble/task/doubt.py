@@ -52,25 +52,14 @@ def why_beyond(opens: bool) -> str:
 
 
 def doubtful(values: Mapping[str, Any], accuracy: float) -> NDArray[np.bool_]:
-    """Return which losses have a larger error than was asked for, by their own account.
+    """Return which losses are less accurate than asked for, by their own account.
 
-    Parameters
-    ----------
-    values : mapping
-        Numbers or columns of rows, by the names of the results file.
-    accuracy : float
-        Requested relative error.
+    ``values`` are numbers or columns of rows, by the names of the results file.
     """
     error = np.asarray(values["loss_error"]) > accuracy * np.abs(values["loss"])
     return np.asarray((np.abs(values["audit_residual"]) > accuracy) | error)
 
 
 def beyond_zero_range(values: Mapping[str, Any]) -> NDArray[np.bool_]:
-    """Return which losses an adhesion of finite range may not have.
-
-    Parameters
-    ----------
-    values : mapping
-        Numbers or columns of rows, by the names of the results file.
-    """
+    """Return which losses an adhesion of finite range may not have; see :func:`doubtful`."""
     return beyond_limit(*(values[name] for name in _OF_LIMIT))

@@ -39,39 +39,21 @@ HEIGHT_EDGES: Array = np.linspace(-5, 5, 81)
 
 @dataclass(frozen=True)
 class FieldPlan:
-    """States of which a campaign keeps fields, and bins of their statistics.
+    """States of which a campaign keeps fields, and bins of their statistics."""
 
-    Attributes
-    ----------
-    period : float
-        λ in m.
-    lowest_harmonic, highest_harmonic : int
-        Of the profile.
-    finest_harmonic : int
-        Highest harmonic of all profiles of the campaign.
-    max_penetration : float
-        Δ/h_max; under a load and at a preload 1, and then all penetrations here are mean stresses
-        over max_stress or preload.
-    max_stress, preload : float or None
-        In Pa, under a load, and at a preload.
-    load_steps : int
-    wanted : tuple of float
-        Penetrations Δ/h_max as the campaign gives them.
-    max_nodes : int
-        Largest number of nodes of a stored field.
-    realisations : int
-        Number of first realisations of each (H, γ) whose fields are stored.
-    """
-
-    period: float
+    period: float  # λ in m
+    # lowest_harmonic, highest_harmonic: of the profile
     lowest_harmonic: int
     highest_harmonic: int
-    finest_harmonic: int
+    finest_harmonic: int  # highest harmonic of all profiles of the campaign
+    # Δ/h_max; under a load and at a preload 1, and then all penetrations here are mean stresses
+    # over max_stress or preload
     max_penetration: float
     load_steps: int
-    wanted: tuple[float, ...]
-    max_nodes: int
-    realisations: int
+    wanted: tuple[float, ...]  # penetrations Δ/h_max as the campaign gives them
+    max_nodes: int  # largest number of nodes of a stored field
+    realisations: int  # number of first realisations of each (H, γ) whose fields are stored
+    # max_stress, preload: in Pa, under a load, and at a preload
     max_stress: float | None = None
     preload: float | None = None
 
@@ -132,11 +114,7 @@ class FieldPlan:
 def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale, ...]:
     """Return the dimensions of the datasets of fields.
 
-    Parameters
-    ----------
-    plan : FieldPlan
-    several : collection of str
-        Keys that have several values; lengths are then in units of these.
+    Lengths are in units of the keys that have ``several`` values.
     """
     if "period" in several:
         waves = Scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
@@ -234,13 +212,7 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
 class FieldRecorder:
     """Recorder of the fields of one loop; :meth:`on_state` is passed to ``run_loop``.
 
-    Parameters
-    ----------
-    plan : FieldPlan
-    method : Method
-        The one that runs the loop.
-    keep : bool
-        Whether the fields themselves are stored.
+    ``keep`` is whether the fields themselves are stored.
     """
 
     def __init__(self, plan: FieldPlan, method: Method, keep: bool) -> None:

@@ -188,19 +188,12 @@ RESULT_DATASETS: tuple[Dataset, ...] = (
 
 def row_scales(campaign: Campaign) -> tuple[Scale, ...]:
     """Return the dimensions of the rows of a campaign."""
-    depth = "max_penetration" if campaign.has_axis("max_penetration") else "h_max"
+    several = campaign.has_axis("max_penetration")
+    depth = f"penetration/{'max_penetration' if several else 'h_max'}"
     return (
+        Scale("loading_penetration", campaign.loading_penetration, "1", f"{depth} on loading"),
         Scale(
-            "loading_penetration",
-            campaign.loading_penetration,
-            "1",
-            f"penetration/{depth} on loading",
-        ),
-        Scale(
-            "unloading_penetration",
-            campaign.unloading_penetration,
-            "1",
-            f"penetration/{depth} on unloading",
+            "unloading_penetration", campaign.unloading_penetration, "1", f"{depth} on unloading"
         ),
         Scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
         *field_scales(field_plan(campaign), {axis.name for axis in campaign.axes[2:]}),
@@ -212,16 +205,9 @@ def row_of(
 ) -> Row:
     """Return the row of a loop, without its times and fields.
 
-    Parameters
-    ----------
-    loop : LoopResult
-    sizes : mapping of int
-        Lengths of the dimensions of :func:`row_scales`. Curves are zero after detachment and cut
-        where their axis ends; of more jumps than the catalogue holds those with the largest drops
-        are kept, in the order of the path.
-    axes : mapping of arrays, optional
-        Penetrations (:meth:`adhesis.solver.loading.loop_result.LoopResult.at`) of the curves of
-        each branch, where these are not the loop's load steps.
+    Curves are zero after detachment and cut where their axis ends; of more jumps than the catalogue
+    holds those with the largest drops are kept, in the order of the path. ``axes`` are the
+    penetrations of the curves of each branch, where these are not the loop's load steps.
     """
     row: Row = {d.name: d.value(loop) for d in (*NUMBERS, JUMP_COUNT) if d.value is not None}
     for branch, curves in CURVES.items():

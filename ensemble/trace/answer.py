@@ -104,17 +104,10 @@ class Uncertain:
 
 @dataclass(frozen=True)
 class Change:
-    """Change of the loss by one loop.
-
-    Attributes
-    ----------
-    run : Run
-    factor : float
-        Its loss over that of the loop with which it is compared; 0 if it loses nothing.
-    """
+    """Change of the loss by one loop."""
 
     run: Run
-    factor: float
+    factor: float  # its loss over that of the loop with which it is compared; 0 if it loses nothing
 
     @property
     def size(self) -> float:
@@ -437,13 +430,7 @@ def make_cycle(
     work_of_adhesion_open: float | None = None,
     measure: Measure = "arc",
 ) -> Cycle:
-    """Make contact and cycle, with the values of both tables.
-
-    Raises
-    ------
-    TypeError, ValueError
-        What the solver would refuse of them.
-    """
+    """Make contact and cycle, with the values of both tables (TypeError, ValueError)."""
     checks.choice("method", method, METHOD_NAMES)
     checks.real("accuracy", accuracy, checks.ACCURACY)
     checks.choice("measure", measure, get_args(Measure))

@@ -91,11 +91,8 @@ class Job:
 def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists.
 
-    Parameters
-    ----------
-    job : Job
-    report : callable, optional
-        Called after each load step with the branch and the prescribed value that is reached.
+    ``report`` is called after each load step with the branch and the prescribed value that is
+    reached.
     """
 
     def progress(branch: Branch, penetration: float, state: ContactState) -> None:

@@ -36,22 +36,10 @@ class _Computing:
 
 
 class Loops:
-    """Loops of a plan, begun in the order of their jobs.
+    """Loops of a plan, begun in the order of their jobs, in processes; 0 runs them in this process.
 
-    Parameters
-    ----------
-    jobs : sequence of Job
-    processes : int
-        Number of processes; 0 runs the jobs one after the other in this process.
-
-    Attributes
-    ----------
-    done : dict
-        Result by job name; the error text of a failed loop.
-    took : dict
-        Wall seconds by name of the finished jobs.
-    pids : list of int
-        Ids of the processes.
+    ``done`` holds the result by job name, the error text of a failed loop; ``took`` wall seconds by
+    name of the finished jobs; ``pids`` the ids of the processes.
     """
 
     def __init__(self, jobs: Sequence[Job], processes: int) -> None:

@@ -478,8 +478,7 @@ def _long_waves(work: _Work, spectrum: TraceSpectrum, rms: float) -> None:
         work.warnings.append(
             f"waves longer than a third of the trace hold {100 * min(share, 1.0):.0f} % of the "
             "mean square height: they decide the loss, and one trace has only one or two of them; "
-            "measure a longer one, or several, or take the form off "
-            f"({parameter('degree')})"
+            f"measure a longer one, or several, or take the form off ({parameter('degree')})"
         )
 
 

@@ -21,26 +21,14 @@ _WIDEST = 0.1
 
 @dataclass(frozen=True)
 class Feature:
-    """Single crest or trough; positions from the first point of the trace, in m.
+    """Single crest or trough; positions from the first point of the trace, in m."""
 
-    Attributes
-    ----------
-    position : float
-        Of its top, or of its bottom.
-    begin, end : float
-        Where it begins and ends: three times its width at half height.
-    beyond : float
-        Height above all other crests, or depth below all other troughs, in m.
-    rms : float
-        Root mean square of the other heights, in m.
-    is_crest : bool
-    """
-
-    position: float
+    position: float  # of its top, or of its bottom
+    # begin, end: where it begins and ends: three times its width at half height
     begin: float
     end: float
-    beyond: float
-    rms: float
+    beyond: float  # height above all other crests, or depth below all other troughs, in m
+    rms: float  # root mean square of the other heights, in m
     is_crest: bool
 
     @property
@@ -86,16 +74,9 @@ def excluding(begin: float, end: float) -> str:
 
 
 def single_features(level: Array, step: float, start: float) -> tuple[Feature, ...]:
-    """Find the single crests and troughs of level heights, by position.
+    """Find the single crests and troughs of level heights (m), by position.
 
-    Parameters
-    ----------
-    level : array, shape (n,)
-        In m.
-    step : float
-        In m.
-    start : float
-        Position of the first height in the trace, in m.
+    ``step`` is in m, ``start`` the position of the first height in the trace, in m.
     """
     found = []
     for sign in (1.0, -1.0):

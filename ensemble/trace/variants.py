@@ -55,26 +55,16 @@ class Run:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(ByValue):
-    """Runs, jobs and expected cost.
-
-    Attributes
-    ----------
-    seconds : dict
-        Expected CPU seconds by run.
-    waves, patches : int
-        Number of waves of the answer's loop, and expected number of patches.
-    wall : float
-        Expected wall seconds on this machine's cores.
-    hints : tuple of str
-    """
+    """Runs, jobs and expected cost."""
 
     runs: tuple[Run, ...]
     jobs: tuple[Job, ...]
-    seconds: dict[str, float]
+    seconds: dict[str, float]  # expected CPU seconds by run
+    # waves, patches: number of waves of the answer's loop, and expected number of patches
     waves: int
     patches: int
     processes: int
-    wall: float
+    wall: float  # expected wall seconds on this machine's cores
     hints: tuple[str, ...]
 
     @property
@@ -94,14 +84,8 @@ def make_plan(
 ) -> Plan:
     """List the loops of an answer and estimate their cost; none is run.
 
-    Parameters
-    ----------
-    prepared : Prepared
-    cycle : Cycle
-    quick : bool
-        Leave out the tables against γ and turning point.
-    processes : int, optional
-        Number of processes side by side, 0 for this one alone; without it one a core.
+    ``quick`` leaves out the tables against γ and turning point; without ``processes`` one a core, 0
+    for this one alone.
     """
     processes = cores() if processes is None else processes
     runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]

@@ -35,7 +35,7 @@ from adhesis.ensemble.report.figures import (
     shapes_and_spectra,
 )
 from adhesis.ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
-from adhesis.ensemble.report.figures.style import save, style
+from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import loss_tables
@@ -104,7 +104,7 @@ def undrawn(monkeypatch, drawn) -> list[str]:
 
     def unless_wanted(item):
         def draw(data):
-            return item.draw(data) if item.name in wanted else Figure()
+            return item.draw(data) if item.name in wanted else PublishedFigure()
 
         return replace(item, draw=draw)
 

@@ -6,11 +6,10 @@ It lists every key with its meaning, its rule and its default. An existing file 
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+from adhesis.ensemble.outputs import write_new
 
 EXAMPLES = (
     "adhesis new my.toml",
@@ -27,15 +26,12 @@ def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
     if args.file.suffix != ".toml":
         raise InputError(f"FILE.toml is {args.file}: the name must end in .toml")
-    check_outputs({"FILE.toml": args.file}, {})
-    if os.path.isfile(args.file):
-        raise InputError(f"FILE.toml is {args.file}, which exists: give another name")
-    from adhesis.ensemble.campaign.template import campaign_template
 
-    writing = Writing()
-    with writing.output("FILE.toml", args.file), whole_file(args.file) as stream:
-        stream.write(campaign_template().encode())
-    writing.finish()
-    print(f"wrote       {args.file}")
+    def content() -> bytes:
+        from adhesis.ensemble.campaign.template import campaign_template  # loads numpy
+
+        return campaign_template().encode()
+
+    write_new("FILE.toml", args.file, content)
     print(f"next        adhesis run {args.file} --dry-run   (its cost; without --dry-run: the run)")
     return 0

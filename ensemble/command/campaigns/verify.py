@@ -10,7 +10,8 @@ import argparse
 import json
 from pathlib import Path
 
-SOUND, SOME_DAMAGED = 0, 1
+from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
+
 EXAMPLES = (
     "adhesis verify paper.h5",
     "adhesis verify paper.h5 --json",
@@ -34,7 +35,7 @@ def execute(args: argparse.Namespace) -> int:
     if args.json:
         names = ("file", "tasks", "done", "failed", "not_needed", "pending", "damaged")
         print(json.dumps({name: status[name] for name in names}, indent=1, ensure_ascii=False))
-        return SOME_DAMAGED if damaged else SOUND
+        return SOME_FAILED if damaged else DONE
     sound = status["done"] + status["failed"] + status["not_needed"]
     if damaged:
         print(f"{args.file}: {len(damaged)} of {sound + len(damaged)} written rows are damaged")
@@ -44,4 +45,4 @@ def execute(args: argparse.Namespace) -> int:
             f"{args.file} is sound: {sound} rows have their checksum ({status['done']} done, "
             f"{status['failed']} failed), {status['pending']} are pending"
         )
-    return SOME_DAMAGED if damaged else SOUND
+    return SOME_FAILED if damaged else DONE

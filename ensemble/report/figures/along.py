@@ -10,23 +10,8 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
+from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.figures.loss_figures import errorbar, short_handle, short_of
-from adhesis.ensemble.report.figures.style import (
-    MM,
-    MOST_CURVES,
-    MOST_PANELS,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    PublishedFigure,
-    gamma_label,
-    label_panel,
-    legend_above,
-    new_figure,
-    panels,
-    say_below,
-    spread_out,
-    with_x_label,
-)
 from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, symbols, together
 
 _MOST_TICKS = 5
@@ -51,34 +36,31 @@ def with_figure(data: Aggregate) -> list[Axis]:
     ]
 
 
-def along(axis: Axis) -> Callable[[Aggregate], PublishedFigure]:
+def along(axis: Axis) -> Callable[[Aggregate], style.PublishedFigure]:
     """Return the function that draws the figure of one axis."""
-
-    def loss_along(data: Aggregate) -> PublishedFigure:
-        return _draw(data, axis)
-
-    return loss_along
+    return lambda data: _draw(data, axis)
 
 
-def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
+def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     """Means with intervals against an axis, every cell of it and of one more further axis.
 
     With one more: a column for each (H, γ), a line for each of its values. Else a column for each
     H, a line for each γ.
     """
-    second = _second_axis(data, axis)
+    moving = together(data, axis)
+    second = next((other for other in data.further if other.name not in moving), None)
     fixed, lines = _lines(data, axis, second)
     titles = list(dict.fromkeys(title for title, _ in lines))
-    titles = [titles[round(k)] for k in spread_out(range(len(titles)), MOST_PANELS)]
+    titles = [titles[round(k)] for k in style.spread_out(range(len(titles)), style.MOST_PANELS)]
     labels = list(dict.fromkeys(label for _, label in lines))
-    labels = [labels[round(k)] for k in spread_out(range(len(labels)), MOST_CURVES)]
+    labels = [labels[round(k)] for k in style.spread_out(range(len(labels)), style.MOST_CURVES)]
     rows = [_LOSS, *(_OF_TURNING_POINT if axis.name in TURNING_POINTS else ())]
-    width = ONE_COLUMN if len(titles) == 1 else TWO_COLUMNS
-    height = (22 + 40 * len(rows)) * MM
-    figure = new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
+    width = style.ONE_COLUMN if len(titles) == 1 else style.TWO_COLUMNS
+    height = (22 + 40 * len(rows)) * style.MM
+    figure = style.new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
     low, high = min(axis.values), max(axis.values)
     logarithmic = low > 0 and high > _LOG_FROM * low
-    grid = panels(figure, len(rows), len(titles))
+    grid = figure.rows
     axis_text, axis_unit = axis_label(axis)
     for row, (name, label, unit) in zip(grid, rows, strict=True):
         for axes, title in zip(row, titles, strict=True):
@@ -101,10 +83,10 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
             axes.set_ylim(bottom=0)  # when the panels, which share it, are all drawn
         row[0].set_ylabel(label)
     for axes, title in zip(grid[0], titles, strict=True):
-        label_panel(axes, title)
+        style.label_panel(axes, title)
     ticks = [value / axis_unit for value in axis.values]
-    for axes in with_x_label(figure, len(titles), len(rows) * len(titles)):
-        axes.set_xlabel(axis_text)
+    figure.label(axis_text)
+    for axes in (*grid[-1], *figure.given):
         if logarithmic:
             axes.set_xscale("log")
         elif len(ticks) <= _MOST_TICKS:
@@ -113,15 +95,9 @@ def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
     if any(texts):
         drawn = [cell for line in lines.values() for cell in line]
         handles = [*handles, *short_handle(drawn)]
-        legend_above(figure, handles, 3 if second is None else 2)
-    say_below(figure, below(data, fixed))
+        figure.legend_above(handles, 3 if second is None else 2)
+    figure.say_below(below(data, fixed))
     return figure
-
-
-def _second_axis(data: Aggregate, axis: Axis) -> Axis | None:
-    """Return the further axis whose values are the lines of a figure along another one."""
-    moving = together(data, axis)
-    return next((other for other in data.further if other.name not in moving), None)
 
 
 def _lines(
@@ -143,7 +119,7 @@ def _lines(
         cell = line[0]
         if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
             continue
-        title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
+        title, label = f"H = {cell.hurst:g}", style.gamma_label(cell.work_of_adhesion)
         if second is not None:
             value = dict(cell.others)[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
@@ -18,50 +19,25 @@ from adhesis.ensemble.report.paper import PaperFigure
 
 @dataclass(frozen=True)
 class Illustration:
-    """One figure of the report.
+    """One figure of the report."""
 
-    Attributes
-    ----------
-    name : str
-        Stem of its files.
-    title : str
-    caption : str
-        What it shows, as a sentence or two.
-    draw : callable
-    of_paper : str
-        The figure or table of the paper that shows the same, if there is one.
-    beside_paper : callable, optional
-        Returns a sentence for the caption on what the paper shows there and the figure does not;
-        used where the campaign is the paper's.
-    at_stress : str
-        A further sentence for the caption where loops turn at a mean stress.
-    whole : bool
-        Whether it draws all cells, and not those of :attr:`Aggregate.shown`.
-    is_worth : callable
-        Returns whether there is something to see: more than one point, or fields.
-    """
-
-    name: str
+    name: str  # stem of its files
     title: str
-    caption: str
+    caption: str  # what it shows, as a sentence or two
     draw: Callable[[Aggregate], PublishedFigure]
-    of_paper: str = ""
+    of_paper: str = ""  # the figure or table of the paper that shows the same, if there is one
+    # Returns a sentence for the caption on what the paper shows there and the figure does not; used
+    # where the campaign is the paper's
     beside_paper: Callable[[Aggregate], str] | None = None
-    at_stress: str = ""
-    whole: bool = False
+    at_stress: str = ""  # a further sentence for the caption where loops turn at a mean stress
+    whole: bool = False  # whether it draws all cells, and not those of :attr:`Aggregate.shown`
+    # Returns whether there is something to see: more than one point, or fields
     is_worth: Callable[[Aggregate], bool] = lambda data: True
 
 
-def _several_hursts(data: Aggregate) -> bool:
-    return len({cell.hurst for cell in data.cells if cell.done}) > 1
-
-
-def _several_works_of_adhesion(data: Aggregate) -> bool:
-    return len({cell.work_of_adhesion for cell in data.cells if cell.done}) > 1
-
-
-def _with_shape(data: Aggregate) -> bool:
-    return any(shape is not None for shape in data.fields.shapes)
+def _several(name: str) -> Callable[[Aggregate], bool]:
+    """Return the function that tells whether finished cells have several values of a number."""
+    return lambda data: len({getattr(cell, name) for cell in data.cells if cell.done}) > 1
 
 
 def _with_fields(data: Aggregate) -> bool:
@@ -107,7 +83,7 @@ LOSSES = (
         loss_figures.loss_against_hurst,
         "Table 1",
         lambda data: "Stars: the paper's values, which have no error.",
-        is_worth=_several_hursts,
+        is_worth=_several("hurst"),
     ),
     Illustration(
         "loss_against_m2",
@@ -115,7 +91,7 @@ LOSSES = (
         f"Means with 95 % intervals, a panel for each γ, a point for each H. {_BELOW}",
         loss_figures.loss_against_slope,
         beside_paper=lambda data: "Stars: the paper's values, at the m2 that it quotes.",
-        is_worth=_several_hursts,
+        is_worth=_several("hurst"),
     ),
 )
 SHAPES = (
@@ -133,7 +109,7 @@ SHAPES = (
             " Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
             "h_rms = 1 µm, so the states here are those that the campaign kept.",
         ),
-        is_worth=_with_shape,
+        is_worth=lambda data: any(shape is not None for shape in data.fields.shapes),
     ),
     Illustration(
         "fig4_spectra_of_branches",
@@ -212,7 +188,7 @@ MECHANISMS = (
         "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
         "a little.",
         loss_figures.pull_off,
-        is_worth=_several_works_of_adhesion,
+        is_worth=_several("work_of_adhesion"),
     ),
 )
 PENETRATIONS = (
@@ -231,35 +207,23 @@ ALL = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
 
 def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
     """One figure for each further axis of the campaign, unless it goes with H or γ."""
-    return tuple(
-        Illustration(
-            f"loss_along_{axis.name}",
-            f"Loss against {axis.name}",
-            "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
-            "little."
-            + (
-                " Contact: the largest of the loop; loss per contact: over that largest area."
-                if axis.name in TURNING_POINTS
-                else ""
-            )
-            + (
-                " Crosses: mean contact at the turning point."
-                if axis.name == "max_penetration"
-                else ""
-            )
-            + (
-                f" With it {', '.join(sorted(together(data, axis) - {axis.name}))} varies."
-                if len(together(data, axis)) > 1
-                else ""
-            )
-            + (
-                " All cells of two axes: a line for each value of the other one; more axes: as "
-                "written below the panels."
-                if set(data.further) - {a for a in data.further if a.name in together(data, axis)}
-                else ""
-            ),
-            along(axis),
-            whole=True,
+    return tuple(_along_axis(data, axis) for axis in with_figure(data))
+
+
+def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
+    with_it = together(data, axis) - {axis.name}
+    caption = "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
+    caption += "little."
+    if axis.name in TURNING_POINTS:
+        caption += " Contact: the largest of the loop; loss per contact: over that largest area."
+    if axis.name == "max_penetration":
+        caption += " Crosses: mean contact at the turning point."
+    if with_it:
+        caption += f" With it {', '.join(sorted(with_it))} varies."
+    if {other.name for other in data.further} - {*with_it, axis.name}:
+        caption += (
+            " All cells of two axes: a line for each value of the other one; more axes: as written "
+            "below the panels."
         )
-        for axis in with_figure(data)
-    )
+    name, title = f"loss_along_{axis.name}", f"Loss against {axis.name}"
+    return Illustration(name, title, caption, along(axis), whole=True)

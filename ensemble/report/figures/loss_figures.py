@@ -25,20 +25,20 @@ from adhesis.ensemble.report.figures.style import (
     ONE_COLUMN,
     TWO_COLUMNS,
     PublishedFigure,
+    colour,
     gamma_label,
+    key,
     label_panel,
-    legend_above,
     look,
     new_figure,
-    panels,
     plain_decades,
     shown_gammas,
     spread_out,
-    with_x_label,
 )
 from adhesis.ensemble.report.findings import typical_cell
 from adhesis.ensemble.report.further_axes import loops_short_of_preload
 from adhesis.ensemble.report.tables.loss_tables import papers_loss
+from adhesis.solver.model.profile import Array
 
 _FEWEST_BARS = 4  # for which there is room
 _MOST_BARS = 9  # in one column, so that their labels do not touch
@@ -76,20 +76,18 @@ def loss_against_hurst(data: Aggregate) -> PublishedFigure:
         x = np.array([cell.hurst for cell in cells])
         found = [cell.estimates[name] for cell in cells]
         errorbar(axes, x, found, k, "_", unit=unit, hollow=short_of(cells))
-        _stars(axes, [(cell.hurst + aside, papers_loss(cell), look(k).colour) for cell in cells])
-        axes.set_title(gamma_label(gamma), loc="left", pad=3)
+        _stars(axes, [(cell.hurst + aside, papers_loss(cell), colour(k)) for cell in cells])
+        label_panel(axes, gamma_label(gamma))
     for axes in figure.panels[len(shown) :]:
         axes.set_axis_off()
-    for axes in with_x_label(figure, columns, rows * columns):
-        axes.set_xlabel("Hurst exponent $H$")
-    for row in panels(figure, rows, columns):
-        row[0].set_ylabel(label)
+    figure.label("Hurst exponent $H$", label)
     for axes in figure.panels[: len(shown)]:
         axes.set_ylim(bottom=0)
         if len(hursts) <= _MOST_TICKS:
             axes.set_xticks(hursts)
         axes.set_xlim(min(hursts) - 2.5 * aside, max(hursts) + 2.5 * aside)
-    legend_above(figure, [_mean_handle(), *_star_handle(data), *short_handle(data.cells)], 2)
+    mean = key("mean and 95 % interval", color="0.3", marker="o", linestyle="none")
+    figure.legend_above([mean, *_star_handle(data), *short_handle(data.cells)], 2)
     return figure
 
 
@@ -104,18 +102,12 @@ def loss_against_slope(data: Aggregate) -> PublishedFigure:
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
             found = [cell.estimates[name] for cell in cells]
             errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit, hollow=short_of(cells))
-            colour = look(k).colour
-            _stars(axes, [(paper.m2(c.hurst), papers_loss(c), colour) for c in cells])
-        axes.set_ylabel(label)
+            _stars(axes, [(paper.m2(c.hurst), papers_loss(c), colour(k)) for c in cells])
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
         label_panel(axes, gamma_label(gamma))
-    for axes in with_x_label(figure, 1, len(shown)):
-        axes.set_xlabel("mean square slope $m_2$")
-    handles = [
-        Line2D([], [], color=look(k).colour, marker=look(k).marker, ls="none", label=f"H = {h:g}")
-        for k, h in enumerate(hursts)
-    ]
-    legend_above(figure, [*handles, *_star_handle(data), *short_handle(data.cells)], 4)
+    figure.label("mean square slope $m_2$", label)
+    handles = [key(f"H = {h:g}", ls="none", **look(k)) for k, h in enumerate(hursts)]
+    figure.legend_above([*handles, *_star_handle(data), *short_handle(data.cells)], 4)
     return figure
 
 
@@ -128,22 +120,17 @@ def _of_gamma(data: Aggregate, gamma: float) -> list[Cell]:
 
 def _stars(axes: Axes, values: list[tuple[float | None, float | None, str]]) -> None:
     """Draw values of the paper, where it gives them: (x, W~, colour)."""
-    for x, value, colour in values:
+    for x, value, edge in values:
         if x is not None and value is not None:
-            look_of_star = {**_STAR, "markeredgecolor": colour}
-            axes.plot([x], [value], **look_of_star, zorder=5, label="paper")
-
-
-def _mean_handle() -> Line2D:
-    label = "mean and 95 % interval"
-    return Line2D([], [], color="0.3", marker="o", linestyle="none", label=label)
+            star = {**_STAR, "markeredgecolor": edge}
+            axes.plot([x], [value], **star, zorder=5, label="paper")
 
 
 def _star_handle(data: Aggregate) -> list[Line2D]:
     """The entry of the paper's values in a legend, if any are drawn."""
     if all(papers_loss(cell) is None for cell in data.cells if cell.done):
         return []
-    return [Line2D([], [], **_STAR, label="paper")]
+    return [key("paper", **_STAR)]
 
 
 def of_penetration(data: Aggregate) -> list[Companion]:
@@ -182,20 +169,13 @@ def loss_against_penetration(data: Aggregate) -> PublishedFigure:
     tops = [top for _, _, found in curves for top in found]
     apart = 0.012 * (max(tops, default=1.0) - min(tops, default=0.0))
     for place, (k, label, found) in enumerate(curves):
-        errorbar(
-            axes,
-            np.array(list(found)),
-            list(found.values()),
-            k,
-            label,
-            offset=(place - (len(curves) - 1) / 2) * apart,
-            unit=unit,
-        )
-    axes.set_xlabel(r"largest penetration $\Delta_\mathrm{max}/h_\mathrm{max}$")
-    axes.set_ylabel(quantity)
+        offset = (place - (len(curves) - 1) / 2) * apart
+        x, losses = np.array(list(found)), list(found.values())
+        errorbar(axes, x, losses, k, label, offset=offset, unit=unit)
+    figure.label(r"largest penetration $\Delta_\mathrm{max}/h_\mathrm{max}$", quantity)
     axes.set_ylim(bottom=0)
     label_panel(axes, title)
-    legend_above(figure, axes.get_legend_handles_labels()[0], len(curves) or 1)
+    figure.legend_above(axes.get_legend_handles_labels()[0], len(curves) or 1)
     return figure
 
 
@@ -208,15 +188,12 @@ def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, 
     for companion in of_penetration(data):
         cells[companion.campaign.cycle.turning_point] = companion.like(here)
     there = {top: cell for top, cell in sorted(cells.items()) if cell is not None and cell.done}
-    if not there:
-        return {}
-    shared = set.intersection(*(set(cell.seed.tolist()) for cell in there.values()))
+    seeds = [set(cell.seed.tolist()) for cell in there.values()]
+    shared = list(set.intersection(*seeds)) if seeds else []
     if not shared:
         return {}
-    losses = [
-        cell.values[loss_quantity(data)[0]][np.isin(cell.seed, list(shared))]
-        for cell in there.values()
-    ]
+    name = loss_quantity(data)[0]
+    losses = [cell.values[name][np.isin(cell.seed, shared)] for cell in there.values()]
     return dict(zip(there, estimates(np.array(losses)), strict=True))
 
 
@@ -230,56 +207,32 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
     large = [cell.estimates["loss_large_scale"] for cell in cells]
     small = [cell.estimates["loss_small_scale"] for cell in cells]
     bottom = np.zeros(len(cells))
-    for found, colour, hatch, label, aside in (
+    for found, face, hatch, label, aside in (
         (large, "#56B4E9", "", "large scale", -0.15),
         (small, "#E69F00", "////", "small scale", 0.15),
     ):
-        mean = 1e3 * np.array([estimate.mean for estimate in found])
-        low = 1e3 * np.array([estimate.low for estimate in found])
-        high = 1e3 * np.array([estimate.high for estimate in found])
-        axes.bar(
-            place,
-            mean,
-            bottom=bottom,
-            color=colour,
-            edgecolor="black",
-            linewidth=0.5,
-            hatch=hatch,
-            label=label,
-        )
-        axes.errorbar(
-            place + aside,
-            bottom + mean,
-            yerr=np.nan_to_num(np.array([mean - low, high - mean])),
-            fmt="none",
-            ecolor="black",
-            elinewidth=0.8,
-            label="_",
-        )
+        mean, low, bars = _in_unit(found, 1e-3)
+        edge: Any = {"edgecolor": "black", "linewidth": 0.5}
+        axes.bar(place, mean, bottom=bottom, color=face, hatch=hatch, label=label, **edge)
+        line: Any = {"fmt": "none", "ecolor": "black", "elinewidth": 0.8, "label": "_"}
+        axes.errorbar(place + aside, bottom + mean, yerr=bars, **line)
         mark_below_zero(axes, (place + aside)[bottom + low < 0], "black")
         bottom = bottom + mean
     above = 1e3 * np.nan_to_num([found.high - found.mean for found in small])
     reach = np.fmax(bottom + above, 1e3 * np.array([found.high for found in large]))
     for x, cell, top in zip(place, cells, reach, strict=True):
-        share = cell.estimates["small_scale_share"].mean
-        axes.annotate(
-            f"{100 * share:.0f} %",
-            (x, top),
-            (0, 3),
-            textcoords="offset points",
-            ha="center",
-            fontsize=6,
-        )
+        share = f"{100 * cell.estimates['small_scale_share'].mean:.0f} %"
+        place_of_text: Any = {"textcoords": "offset points", "ha": "center", "fontsize": 6}
+        axes.annotate(share, (x, top), (0, 3), **place_of_text)
     unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     texts = [f"{cell.hurst:g}\n{cell.work_of_adhesion / size:g}" for cell in cells]
     axes.set_xticks(place, texts)
-    axes.set_xlabel(rf"$H$ (upper line), $\gamma$ in {unit} (lower line)")
-    axes.set_ylabel("sum of drops (mJ/m²)")
+    figure.label(rf"$H$ (upper line), $\gamma$ in {unit} (lower line)", "sum of drops (mJ/m²)")
     axes.set_ylim(0, 1.12 * float(reach.max(initial=0)) or 1)
     middle, half = (len(cells) - 1) / 2, max(len(cells), _FEWEST_BARS) / 2
     axes.set_xlim(middle - half, middle + half)
     axes.grid(False, axis="x")
-    legend_above(figure, axes.get_legend_handles_labels()[0], 2)
+    figure.legend_above(axes.get_legend_handles_labels()[0], 2)
     return figure
 
 
@@ -289,25 +242,19 @@ def jump_energies(data: Aggregate) -> PublishedFigure:
     shown = shown_gammas(data)
     height = (13 + 44 * len(hursts)) * MM
     figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
-    grid = panels(figure, len(hursts), 2)
-    for row, hurst in zip(grid, hursts, strict=True):
+    for row, hurst in zip(figure.rows, hursts, strict=True):
         for axes, small in zip(row, (False, True), strict=True):
             for k, gamma in shown:
                 cell = data.cell(hurst, gamma)
                 if cell is not None and cell.done:
                     _jump_density(axes, data, cell, small, k)
             label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
-        row[0].set_ylabel("jumps per loop and decade")
-    for axes in with_x_label(figure, 2, 2 * len(hursts)):
-        axes.set_xlabel("energy drop of one jump (J/m²)")
+    figure.label("energy drop of one jump (J/m²)", "jumps per loop and decade")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
-    handles = [
-        Line2D([], [], color=look(k).colour, linestyle=LINES[k], label=gamma_label(gamma))
-        for k, gamma in shown
-    ]
+    handles = [key(gamma_label(g), color=colour(k), linestyle=LINES[k]) for k, g in shown]
     plain_decades(figure.panels)
-    legend_above(figure, handles, len(handles))
+    figure.legend_above(handles, len(handles))
     return figure
 
 
@@ -319,25 +266,13 @@ def _jump_density(axes: Axes, data: Aggregate, cell: Cell, small: bool, k: int) 
     edges = BIN_EDGES[part.start : part.stop + 1]
     # Jumps are counted: n of them are known to sqrt(n).
     scatter = density / np.sqrt(np.maximum(density * cell.done / BINS_PER_DECADE, 1))
-    axes.stairs(
-        (density + scatter)[part],
-        edges,
-        baseline=np.maximum(density - scatter, 0.3 * density)[part],
-        fill=True,
-        color=look(k).colour,
-        alpha=0.1,
-        linewidth=0,
-        label="_",
-    )
-    axes.stairs(
-        np.where(density > 0, density, np.nan)[part],
-        edges,
-        baseline=None,
-        color=look(k).colour,
-        linestyle=LINES[k],
-        linewidth=1.4,
-        label=gamma_label(cell.work_of_adhesion),
-    )
+    below = np.maximum(density - scatter, 0.3 * density)[part]
+    band: Any = {"fill": True, "color": colour(k), "alpha": 0.1, "linewidth": 0, "label": "_"}
+    axes.stairs((density + scatter)[part], edges, baseline=below, **band)
+    shown = np.where(density > 0, density, np.nan)[part]
+    line: Any = {"color": colour(k), "linestyle": LINES[k], "linewidth": 1.4}
+    label = gamma_label(cell.work_of_adhesion)
+    axes.stairs(shown, edges, baseline=None, label=label, **line)
 
 
 def pull_off(data: Aggregate) -> PublishedFigure:
@@ -348,21 +283,16 @@ def pull_off(data: Aggregate) -> PublishedFigure:
     unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
-        errorbar(
-            axes,
-            np.array([cell.work_of_adhesion for cell in cells]) / size,
-            [cell.estimates["pull_off_stress"] for cell in cells],
-            k,
-            f"H = {hurst:g}",
-            offset=_apart(data, k, len(hursts)) / size,
-            unit=1e3,
-            hollow=short_of(cells),
-        )
-    axes.set_xlabel(rf"work of adhesion $\gamma$ ({unit})")
-    axes.set_ylabel("largest tension (kPa)")
+        x = np.array([cell.work_of_adhesion for cell in cells]) / size
+        found = [cell.estimates["pull_off_stress"] for cell in cells]
+        # apart, so that intervals can be distinguished
+        offset = (k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion) / size
+        hollow = short_of(cells)
+        errorbar(axes, x, found, k, f"H = {hurst:g}", offset=offset, unit=1e3, hollow=hollow)
+    figure.label(rf"work of adhesion $\gamma$ ({unit})", "largest tension (kPa)")
     axes.set_ylim(bottom=0)
     handles = [*axes.get_legend_handles_labels()[0], *short_handle(data.cells)]
-    legend_above(figure, handles, 3)
+    figure.legend_above(handles, 3)
     _second_scale(axes, data)
     return figure
 
@@ -371,21 +301,10 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
     """Beside kPa, σ~ at the mean h_max of all cells."""
     h_max = np.concatenate([cell.values["h_max"] for cell in data.cells])
     scale = float(stress_scale(data.cells[0].campaign, h_max.mean(keepdims=True))[0])
-
-    def dimensionless(kilopascal: Any) -> Any:
-        return 1e3 * kilopascal / scale
-
-    def in_kilopascal(stress: Any) -> Any:
-        return stress * scale / 1e3
-
+    to_and_fro = (lambda stress: 1e3 * stress / scale, lambda stress: stress * scale / 1e3)
     axes.tick_params(right=False)
-    right = axes.secondary_yaxis("right", functions=(dimensionless, in_kilopascal))
+    right = axes.secondary_yaxis("right", functions=to_and_fro)
     right.set_ylabel(r"$\tilde\sigma$ at the mean $h_\mathrm{max}$")
-
-
-def _apart(data: Aggregate, k: int, count: int) -> float:
-    """Return the offset of the k-th curve over γ, so that intervals can be distinguished."""
-    return (k - (count - 1) / 2) * 0.01 * max(data.works_of_adhesion)
 
 
 def _cells(data: Aggregate) -> list[Cell]:
@@ -420,27 +339,24 @@ def errorbar(
     Where the panel begins at 0, a mark there shows which intervals go on below. Marks of cells that
     are short of their preload are hollow.
     """
-    mean = np.array([estimate.mean for estimate in found]) / unit
-    low = np.array([estimate.low for estimate in found]) / unit
-    high = np.array([estimate.high for estimate in found]) / unit
-    axes.errorbar(
-        x + offset,
-        mean,
-        yerr=np.nan_to_num(np.array([mean - low, high - mean])),
-        color=look(k).colour,
-        marker=look(k).marker,
-        linestyle=LINES[k] if x.size >= _FEWEST_FOR_A_LINE else "none",
-        label=label,
-    )
+    mean, low, bars = _in_unit(found, unit)
+    line = LINES[k] if x.size >= _FEWEST_FOR_A_LINE else "none"
+    axes.errorbar(x + offset, mean, yerr=bars, linestyle=line, label=label, **look(k))
     if any(hollow):
         place = np.flatnonzero(hollow)
-        options: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5}
-        marker, colour = look(k).marker, look(k).colour
-        axes.plot(
-            (x + offset)[place], mean[place], marker=marker, color=colour, label="_", **options
-        )
+        options = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5, "label": "_"}
+        axes.plot((x + offset)[place], mean[place], **look(k) | options)
     if from_zero:
-        mark_below_zero(axes, (x + offset)[low < 0], look(k).colour)
+        mark_below_zero(axes, (x + offset)[low < 0], colour(k))
+
+
+def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
+    """Return means, low ends of their intervals, and both distances from the mean as bars."""
+    mean, low, high = (
+        np.array([getattr(estimate, part) for estimate in found]) / unit
+        for part in ("mean", "low", "high")
+    )
+    return mean, low, np.nan_to_num(np.array([mean - low, high - mean]))
 
 
 def short_of(cells: Sequence[Cell]) -> list[bool]:

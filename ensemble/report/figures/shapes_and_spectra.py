@@ -30,15 +30,14 @@ from adhesis.ensemble.report.figures.style import (
     ONE_COLUMN,
     TWO_COLUMNS,
     PublishedFigure,
+    colour,
     gamma_label,
+    key,
     label_panel,
-    legend_above,
     look,
     new_figure,
-    panels,
     plain_decades,
     spread_out,
-    with_x_label,
 )
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
@@ -48,18 +47,14 @@ _LEAST_DENSITY = 1e-6
 _FEWEST_NODES, _BEYOND = 1000, 4
 # Colour of a branch where both are drawn over the rigid profile.
 _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
+_SLOPE: Any = {"color": "0.3", "linewidth": 0.7}
 
 
 def shapes(data: Aggregate) -> PublishedFigure:
     """Fig. 3: rigid profile and elastic surface above it of one realisation on both branches.
 
     Heights are those of the profile: on a machine or under a load the two branches have different
-    separations at one prescribed value.
-
-    Raises
-    ------
-    ValueError
-        If no cell has kept its fields.
+    separations at one prescribed value. ValueError if no cell has kept its fields.
     """
     fields = data.fields
     kept = [cell for cell in data.cells if fields.shapes[data.cells.index(cell)] is not None]
@@ -70,41 +65,22 @@ def shapes(data: Aggregate) -> PublishedFigure:
     shape = fields.shapes[data.cells.index(cell)]
     assert shape is not None
     chosen = shown_penetrations(fields, 3)
-    figure = new_figure(
-        len(chosen),
-        2,
-        TWO_COLUMNS,
-        (12 + 38 * len(chosen)) * MM,
-        sharex="col",
-        gridspec_kw={"width_ratios": [2, 1]},
-    )
+    height, ratios = (12 + 38 * len(chosen)) * MM, {"width_ratios": [2, 1]}
+    figure = new_figure(len(chosen), 2, TWO_COLUMNS, height, sharex="col", gridspec_kw=ratios)
     everywhere = np.arange(cell.plan.position.size)
     window = _window(cell, shape)
-    for (whole, detail), k in zip(panels(figure, len(chosen), 2), chosen, strict=True):
+    for (whole, detail), k in zip(figure.rows, chosen, strict=True):
         for axes, part in ((whole, everywhere), (detail, window)):
             _draw_shape(axes, cell.plan.position, shape, k, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
-        label_panel(
-            whole,
-            f"{_cell_label(cell)}, {_depth(data, cell, k)}, $s$ = {_separations(shape, k)}",
-        )
+        depth, separations = _depth(data, cell, k), _separations(shape, k)
+        label_panel(whole, f"{_cell_label(cell)}, {depth}, $s$ = {separations}")
         label_panel(detail, "detail")
-        whole.set_ylabel("height (µm)")
-    for axes in with_x_label(figure, 2, 2 * len(chosen)):
-        axes.set_xlabel("position $x$ (mm)")
+    figure.label("position $x$ (mm)", "height (µm)")
     handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h$")]
-    handles += [
-        Line2D(
-            [],
-            [],
-            color=_COLOUR_OF_BRANCH[branch],
-            linestyle=LINE_OF_BRANCH[branch],
-            label=f"elastic surface $v + s$, {branch}",
-        )
-        for branch in BRANCHES
-    ]
-    legend_above(figure, handles, 3)
+    handles += [key(f"elastic surface $v + s$, {b}", **_look_of(b)) for b in BRANCHES]
+    figure.legend_above(handles, 3)
     return figure
 
 
@@ -112,23 +88,12 @@ def spectra_of_branches(data: Aggregate) -> PublishedFigure:
     """Fig. 4: spectral density of profile and deformed surface on both branches at one state."""
     cells = cells_of(data, paper.FIGURE_4)
     figure = new_figure(len(cells), 1, ONE_COLUMN, (16 + 52 * len(cells)) * MM, sharex=True)
-    for (axes,), cell in zip(panels(figure, len(cells), 1), cells, strict=True):
+    for (axes,), cell in zip(figure.rows, cells, strict=True):
         k = state_of(cell.plan, paper.FIGURE_4)
         for b, branch in enumerate(BRANCHES):
-            _spectrum(
-                axes,
-                cell,
-                data.fields.psd_displacement[data.cells.index(cell), b, k],
-                color=_COLOUR_OF_BRANCH[branch],
-                linestyle=LINE_OF_BRANCH[branch],
-                label=branch,
-            )
+            _spectrum(axes, data, cell, b, k, label=branch, **_look_of(branch))
         _finish_spectra(axes, data, cell, f", {_depth(data, cell, k)}")
-    handles = [
-        Line2D([], [], color=_COLOUR_OF_BRANCH[b], linestyle=LINE_OF_BRANCH[b], label=b)
-        for b in BRANCHES
-    ]
-    _label_spectra(figure, len(cells), handles)
+    _label_spectra(figure, [key(b, **_look_of(b)) for b in BRANCHES])
     return figure
 
 
@@ -147,12 +112,10 @@ def gap_density(data: Aggregate) -> PublishedFigure:
     hursts = spread_out(data.hursts, MOST_PANELS)
     height = (16 + 46 * len(hursts)) * MM
     figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
-    grid = panels(figure, len(hursts), 2)
     fields = data.fields
     chosen = shown_penetrations(fields, MOST_CURVES)
-    for row, hurst in zip(grid, hursts, strict=True):
+    for row, hurst in zip(figure.rows, hursts, strict=True):
         cell = cell_of_hurst(data, hurst, paper.FIGURE_8)
-        row[0].set_ylabel(r"density of $t/h_\mathrm{max}$")
         if cell is None:
             continue
         for b, (axes, branch) in enumerate(zip(row, BRANCHES, strict=True)):
@@ -160,21 +123,16 @@ def gap_density(data: Aggregate) -> PublishedFigure:
                 # The outermost bins also hold all gaps beyond the axis.
                 values = fields.gap_density[data.cells.index(cell), b, k][1:-1]
                 if np.any(values > 0):
-                    axes.plot(
-                        fields.gap_bin[1:-1],
-                        np.where(values > 0, values, np.nan),
-                        color=look(place).colour,
-                        linestyle=LINES[place],
-                        label=f"{cell.plan.penetration[k]:.2f}",
-                    )
+                    y, depth = np.where(values > 0, values, np.nan), cell.plan.penetration[k]
+                    line: Any = {"color": colour(place), "linestyle": LINES[place]}
+                    axes.plot(fields.gap_bin[1:-1], y, label=f"{depth:.2f}", **line)
             label_panel(axes, f"{_cell_label(cell)}, {branch}")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
         axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
-    for axes in with_x_label(figure, 2, 2 * len(hursts)):
-        axes.set_xlabel(r"gap $t/h_\mathrm{max}$")
+    figure.label(r"gap $t/h_\mathrm{max}$", r"density of $t/h_\mathrm{max}$")
     plain_decades(figure.panels)
-    legend_above(figure, _penetration_handles(data, chosen, markers=False), len(chosen))
+    figure.legend_above(_penetration_handles(data, chosen, markers=False), len(chosen))
     return figure
 
 
@@ -188,23 +146,14 @@ def height_density(data: Aggregate) -> PublishedFigure:
         cell = max((c for c in data.cells if c.hurst == hurst), key=lambda c: c.done)
         if cell.done:
             density = fields.height_density[data.cells.index(cell)]
-            axes.plot(
-                fields.height_bin,
-                np.where(density > 0, density, np.nan),
-                color=look(k).colour,
-                linestyle="none",
-                marker=look(k).marker,
-                markersize=2.4,
-                label=f"H = {hurst:g}",
-            )
+            points: Any = {"linestyle": "none", "markersize": 2.4, "label": f"H = {hurst:g}"}
+            y = np.where(density > 0, density, np.nan)
+            axes.plot(fields.height_bin, y, **points, **look(k))
     x = np.linspace(-4.5, 4.5, 200)
     axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color="0.3", label="Gaussian")
-    axes.set_yscale("log")
-    axes.set_ylim(1e-4, 1)
-    axes.set_xlim(-4.5, 4.5)
-    axes.set_xlabel(r"height $h/h_\mathrm{rms}$")
-    axes.set_ylabel("probability density")
-    legend_above(figure, axes.get_legend_handles_labels()[0], 4)
+    axes.set(yscale="log", ylim=(1e-4, 1), xlim=(-4.5, 4.5))
+    figure.label(r"height $h/h_\mathrm{rms}$", "probability density")
+    figure.legend_above(axes.get_legend_handles_labels()[0], 4)
     return figure
 
 
@@ -217,89 +166,56 @@ def shown_penetrations(fields: FieldStatistics, most: int) -> list[int]:
 def _spectra(data: Aggregate, b: int) -> PublishedFigure:
     hursts = spread_out(data.hursts, MOST_PANELS)
     figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 52 * len(hursts)) * MM, sharex=True)
-    fields = data.fields
-    chosen = shown_penetrations(fields, 3)
-    for (axes,), hurst in zip(panels(figure, len(hursts), 1), hursts, strict=True):
+    chosen = shown_penetrations(data.fields, 3)
+    for (axes,), hurst in zip(figure.rows, hursts, strict=True):
         cell = cell_of_hurst(data, hurst, paper.FIGURE_5)
         if cell is None:
             continue
         for place, k in enumerate(chosen):
-            _spectrum(
-                axes,
-                cell,
-                fields.psd_displacement[data.cells.index(cell), b, k],
-                color=look(place).colour,
-                linestyle=LINES[place],
-                marker=look(place).marker,
-                label=f"{cell.plan.penetration[k]:.2f}",
-            )
+            label = f"{cell.plan.penetration[k]:.2f}"
+            _spectrum(axes, data, cell, b, k, label=label, linestyle=LINES[place], **look(place))
         _finish_spectra(axes, data, cell)
-    _label_spectra(figure, len(hursts), _penetration_handles(data, chosen))
+    _label_spectra(figure, _penetration_handles(data, chosen))
     return figure
 
 
-def _spectrum(axes: Axes, cell: Cell, values: Array, **options: Any) -> None:
+def _look_of(branch: str) -> dict[str, Any]:
+    """Return the look of a branch where both are drawn over the rigid profile."""
+    return {"color": _COLOUR_OF_BRANCH[branch], "linestyle": LINE_OF_BRANCH[branch]}
+
+
+def _spectrum(axes: Axes, data: Aggregate, cell: Cell, b: int, k: int, **options: Any) -> None:
     """Draw the spectrum of one state, unless no realisation is in contact there."""
+    values = data.fields.psd_displacement[data.cells.index(cell), b, k]
     if np.any(values > 0):
-        axes.loglog(
-            cell.plan.wave_number,
-            np.where(values > 0, values, np.nan),
-            markersize=2,
-            markevery=4,
-            **options,
-        )
+        y = np.where(values > 0, values, np.nan)
+        axes.loglog(cell.plan.wave_number, y, markersize=2, markevery=4, **options)
 
 
 def _finish_spectra(axes: Axes, data: Aggregate, cell: Cell, state: str = "") -> None:
     """Add the rigid profile and the reference slopes to a panel, and its labels."""
-    rigid, present = data.fields.psd_height[data.cells.index(cell)], cell.plan.filled
-    axes.loglog(
-        cell.plan.wave_number[present],
-        rigid[present],
-        color="0.55",
-        linewidth=2,
-        label="rigid",
-        zorder=1.5,
-    )
-    _reference_slopes(axes, cell.hurst, rigid[present], cell.plan.wave_number[present])
-    axes.set_ylabel(r"spectral density $C(q)$ (m³)")
+    present = cell.plan.filled
+    rigid = data.fields.psd_height[data.cells.index(cell)][present]
+    q = cell.plan.wave_number[present]
+    axes.loglog(q, rigid, color="0.55", linewidth=2, label="rigid", zorder=1.5)
+    # q^-(2H+1) below and q^-(2+H) above the data, over the profile's own wave numbers
+    ends = np.array([q[0], q[-1]])
+    for exponent, factor, line in ((2 * cell.hurst + 1, 0.2, ":"), (2 + cell.hurst, 5.0, "-.")):
+        slope = factor * rigid[0] * (ends / q[0]) ** -exponent
+        axes.loglog(ends, slope, linestyle=line, label=f"slope {-exponent:.1f}", **_SLOPE)
     label_panel(axes, f"{_cell_label(cell)}{state}")
 
 
-def _label_spectra(figure: PublishedFigure, count: int, handles: list[Line2D]) -> None:
-    """Label the wave numbers, and put the legend of all panels above them."""
-    plain_decades(figure.panels[:count])
-    for axes in with_x_label(figure, 1, count):
-        axes.set_xlabel("wave number $q$ (rad/m)")
-    handles = [
-        Line2D([], [], color="0.55", linewidth=2, label="rigid profile"),
-        *handles,
-        Line2D([], [], color="0.3", linewidth=0.7, linestyle=":", label="$q^{-(2H+1)}$"),
-        Line2D([], [], color="0.3", linewidth=0.7, linestyle="-.", label="$q^{-(2+H)}$"),
-    ]
-    legend_above(figure, handles, 3)
-
-
-def _reference_slopes(axes: Axes, hurst: float, rigid: np.ndarray, q: np.ndarray) -> None:
-    """Lines q^-(2H+1) below and q^-(2+H) above the data, over the profile's own wave numbers."""
-    ends = np.array([q[0], q[-1]])
-    for exponent, factor, line in ((2 * hurst + 1, 0.2, ":"), (2 + hurst, 5.0, "-.")):
-        axes.loglog(
-            ends,
-            factor * rigid[0] * (ends / q[0]) ** -exponent,
-            color="0.3",
-            linewidth=0.7,
-            linestyle=line,
-            label=f"slope {-exponent:.1f}",
-        )
+def _label_spectra(figure: PublishedFigure, handles: list[Line2D]) -> None:
+    """Label the axes, and put the legend of all panels above them."""
+    plain_decades(figure.panels)
+    figure.label("wave number $q$ (rad/m)", r"spectral density $C(q)$ (m³)")
+    slopes = [key("$q^{-(2H+1)}$", ls=":", **_SLOPE), key("$q^{-(2+H)}$", ls="-.", **_SLOPE)]
+    figure.legend_above([key("rigid profile", color="0.55", linewidth=2), *handles, *slopes], 3)
 
 
 def _draw_shape(
-    axes: Axes,
-    position: Array,
-    shape: DeformedShape,
-    k: int,
-    part: NDArray[np.intp],
+    axes: Axes, position: Array, shape: DeformedShape, k: int, part: NDArray[np.intp]
 ) -> None:
     """Draw the nodes ``part``, counted on beyond the period where they exceed it.
 
@@ -314,14 +230,8 @@ def _draw_shape(
         gap = shape.displacement[b, k] - shape.height + _separation(shape, b, k)
         if np.all(np.isfinite(gap)):
             # monotone between nodes: contact stays contact, and nothing overlaps
-            axes.plot(
-                x,
-                rigid + 1e6 * _refined(PchipInterpolator, gap, part, factor),
-                color=_COLOUR_OF_BRANCH[branch],
-                linestyle=LINE_OF_BRANCH[branch],
-                linewidth=0.9,
-                label=branch,
-            )
+            surface = rigid + 1e6 * _refined(PchipInterpolator, gap, part, factor)
+            axes.plot(x, surface, linewidth=0.9, label=branch, **_look_of(branch))
     axes.set_xlim(x[0], x[-1])
 
 
@@ -373,13 +283,9 @@ def _penetration_handles(
         unit = r"\Delta/\Delta"
     penetration = data.cells[0].plan.penetration if len(tops) == 1 else data.fields.penetration
     return [
-        Line2D(
-            [],
-            [],
-            color=look(place).colour,
-            linestyle=LINES[place],
-            marker=look(place).marker if markers else "",
-            label=rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
+        key(
+            rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
+            **{**look(place), "linestyle": LINES[place]} | ({} if markers else {"marker": ""}),
         )
         for place, k in enumerate(chosen)
     ]

@@ -12,7 +12,6 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from adhesis.ensemble.aggregate.average import Aggregate
@@ -52,22 +52,10 @@ LINES: tuple[Any, ...] = (
 LINE_OF_BRANCH: dict[str, Any] = {"loading": "-", "unloading": LINES[1]}
 
 
-@dataclass(frozen=True)
-class Look:
-    """Colour and marker of one curve."""
-
-    colour: str
-    marker: str
-
-
-# Okabe & Ito's colours, in an order in which the darkness of neighbours differs.
-LOOKS = (
-    Look("#E69F00", "o"),
-    Look("#0072B2", "s"),
-    Look("#000000", "^"),
-    Look("#CC79A7", "D"),
-    Look("#009E73", "v"),
-    Look("#56B4E9", "P"),
+# Okabe & Ito's colours, in an order in which the darkness of neighbours differs, and markers.
+_LOOKS = (
+    *(("#E69F00", "o"), ("#0072B2", "s"), ("#000000", "^")),
+    *(("#CC79A7", "D"), ("#009E73", "v"), ("#56B4E9", "P")),
 )
 
 
@@ -78,9 +66,19 @@ def style() -> Iterator[None]:
         yield
 
 
-def look(k: int) -> Look:
-    """Return the look of the k-th curve of a panel."""
-    return LOOKS[k % len(LOOKS)]
+def look(k: int) -> dict[str, Any]:
+    """Return colour and marker of the k-th curve of a panel, as options of matplotlib."""
+    return {"color": colour(k), "marker": _LOOKS[k % len(_LOOKS)][1]}
+
+
+def colour(k: int) -> str:
+    """Return the colour of the k-th curve of a panel."""
+    return _LOOKS[k % len(_LOOKS)][0]
+
+
+def key(label: str, **options: Any) -> Line2D:
+    """Return the entry of a legend for a line or marker with these options of matplotlib."""
+    return Line2D([], [], label=label, **options)
 
 
 def spread_out(values: Sequence[float], most: int) -> list[float]:
@@ -99,14 +97,8 @@ def shown_gammas(data: Aggregate) -> list[tuple[int, float]]:
 
 def left_out(data: Aggregate) -> str:
     """A sentence on the H and γ that figures leave out for the sake of the eye; empty if none."""
-    parts = [
-        f"{most} of {len(values)} {name}"
-        for name, values, most in (
-            ("H", data.hursts, MOST_PANELS),
-            ("γ", data.works_of_adhesion, MOST_CURVES),
-        )
-        if len(values) > most
-    ]
+    shown = (("H", data.hursts, MOST_PANELS), ("γ", data.works_of_adhesion, MOST_CURVES))
+    parts = [f"{most} of {len(all_)} {name}" for name, all_, most in shown if len(all_) > most]
     what = "Figures with a panel for each H and a curve for each γ show"
     return f"{what} {' and '.join(parts)}." if parts else ""
 
@@ -118,15 +110,8 @@ _given: ContextVar[tuple[Axes, ...]] = ContextVar("_given", default=())
 def drawn_into(ax: object) -> Iterator[None]:
     """Let the first panels of a figure be axes that a user gives, in the user's own style.
 
-    Parameters
-    ----------
-    ax : Axes or array of Axes, or None
-        Without them, all panels are the figure's, in the style of the product.
-
-    Raises
-    ------
-    TypeError
-        If it is anything else.
+    Without them, all panels are the figure's, in the style of the product. TypeError if ``ax`` is
+    neither None nor one or several Axes.
     """
     found = () if ax is None else np.ravel(np.array(ax, dtype=object))
     given = tuple(panel for panel in found if isinstance(panel, Axes))
@@ -145,19 +130,42 @@ class PublishedFigure(Figure):
 
     Also when it is saved outside of :func:`style`: publishers refuse the Type 3 fonts that
     matplotlib writes by default.
-
-    Attributes
-    ----------
-    given : tuple of Axes
-        Those of :func:`drawn_into`, which take the place of its first panels.
     """
 
-    given: tuple[Axes, ...] = ()
+    given: tuple[Axes, ...] = ()  # those of :func:`drawn_into`, in place of its first panels
+    columns = 1
 
     @property
     def panels(self) -> list[Axes]:
         """The axes of its panels, row by row: those given, and its own."""
         return [*self.given, *self.axes[len(self.given) :]]
+
+    @property
+    def rows(self) -> list[list[Axes]]:
+        """The panels of each row."""
+        panels, n = self.panels, self.columns
+        return [panels[k : k + n] for k in range(0, len(panels), n)]
+
+    def label(self, x: str, *y: str) -> None:
+        """Label the lowest panels, and all given ones, below, and the first of each row aside."""
+        for axes in (*self.panels[-self.columns :], *self.given):
+            axes.set_xlabel(x)
+        for row in self.rows:
+            for axes, text in zip(row, y, strict=False):
+                axes.set_ylabel(text)
+
+    def legend_above(self, handles: Sequence[Any], columns: int) -> None:
+        """Put the legend above the panels, where it hides no data; or into the first one given."""
+        if self.given:
+            self.given[0].legend(handles=handles)
+        else:
+            self.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+    def say_below(self, text: str) -> None:
+        """Write below the panels what they have in common; nothing below axes that are given."""
+        if text and not self.given:
+            width = int(self.get_figwidth() / _WIDTH_OF_SIGN)
+            self.supxlabel(textwrap.fill(text, width), fontsize=_SMALL, x=0.99, ha="right")
 
     def finish(self) -> Figure:
         """Lay it out, and return the figure that was drawn into: this one, or that of the axes."""
@@ -183,13 +191,7 @@ class PublishedFigure(Figure):
 def new_figure(
     rows: int, columns: int, width: float, height: float, **options: Any
 ) -> PublishedFigure:
-    """Return a figure of the given width and height (inches) with a grid of panels.
-
-    Raises
-    ------
-    ValueError
-        If more axes are given than it has panels.
-    """
+    """Return a figure of this size (inches) with panels; ValueError for more given axes."""
     given = _given.get()
     if len(given) > rows * columns:
         raise ValueError(
@@ -197,19 +199,8 @@ def new_figure(
         )
     figure = PublishedFigure(figsize=(width, height))
     figure.subplots(rows, columns, squeeze=False, **options)
-    figure.given = given
+    figure.given, figure.columns = given, columns
     return figure
-
-
-def panels(figure: PublishedFigure, rows: int, columns: int) -> list[list[Axes]]:
-    """Return the panels of :func:`new_figure`, row by row."""
-    axes = figure.panels[: rows * columns]
-    return [axes[k * columns : (k + 1) * columns] for k in range(rows)]
-
-
-def with_x_label(figure: PublishedFigure, columns: int, count: int) -> list[Axes]:
-    """Return the panels that have a label below: the lowest of ``count``, and all given ones."""
-    return [*figure.panels[max(count - columns, 0) : count], *figure.given]
 
 
 def plain_decades(axes: Sequence[Axes]) -> None:
@@ -219,21 +210,6 @@ def plain_decades(axes: Sequence[Axes]) -> None:
             low, high = axis.get_view_interval()
             if scale == "log" and high >= 20 * low:
                 axis.set_minor_formatter(NullFormatter())
-
-
-def legend_above(figure: PublishedFigure, handles: Sequence[Any], columns: int) -> None:
-    """Put the legend above the panels, where it hides no data; or into the first axes given."""
-    if figure.given:
-        figure.given[0].legend(handles=handles)
-        return
-    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
-
-
-def say_below(figure: PublishedFigure, text: str) -> None:
-    """Write below the panels what all of them have in common; nothing below axes that are given."""
-    if text and not figure.given:
-        width = int(figure.get_figwidth() / _WIDTH_OF_SIGN)
-        figure.supxlabel(textwrap.fill(text, width), fontsize=_SMALL, x=0.99, ha="right")
 
 
 def label_panel(axes: Axes, text: str) -> None:

@@ -22,11 +22,7 @@ def key_columns(
 ) -> tuple[TableColumn, ...]:
     """Return the columns of what a row is about: H, γ, and every further axis.
 
-    Parameters
-    ----------
-    data : Aggregate
-    cell_of : callable, optional
-        Returns the cell that a row belongs to, if the row is not about the cell itself.
+    ``cell_of`` returns the cell that a row belongs to, if the row is not about the cell itself.
     """
     return (
         TableColumn("hurst", lambda entry: cell_of(entry).hurst, "H"),

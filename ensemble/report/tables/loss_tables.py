@@ -28,6 +28,7 @@ from adhesis.ensemble.report.tables.table import (
     number,
     plain,
 )
+from adhesis.solver.loading.zero_range import RANGES
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import finite
 
@@ -48,7 +49,9 @@ def losses(data: Aggregate) -> Table:
         TableColumn(
             "loss_dimensionless_error_numerical",
             estimate("loss_error_dimensionless"),
-            *("± loop", number(1), True, True),
+            *("± loop", number(1)),
+            only_if_any=True,
+            last=True,
         ),
         TableColumn(
             "loss_dimensionless_error_load_steps",
@@ -58,66 +61,55 @@ def losses(data: Aggregate) -> Table:
         ),
         TableColumn(
             "loss_dimensionless_error_resolution",
-            partial(_error_of_resolution, data),
-            *("± method", number(1), True, True),
+            partial(_deviation, "resolution", data),
+            *("± method", number(1)),
+            only_if_any=True,
+            last=True,
         ),
-        TableColumn("loss_dimensionless_paper", papers_loss, "paper", fixed(2), True, True),
+        TableColumn(
+            "loss_dimensionless_paper", papers_loss, "paper", fixed(2), only_if_any=True, last=True
+        ),
         _estimated("loss", "mean [J/m^2]", "loss (mJ/m²)", number(unit=1e-3)),
         _estimated("loss", "std [J/m^2]"),
         _estimated("loss", "sem [J/m^2]", "s.e.", number(2, unit=1e-3)),
         _estimated("loss", "ci_low [J/m^2]", "95 % from", partial(at_least_0, unit=1e-3)),
         _estimated("loss", "ci_high [J/m^2]", "to", number(unit=1e-3)),
         *_friction_columns(data),
-        TableColumn(
-            "loss_over_work_of_adhesion",
-            _loss_over_work_of_adhesion,
-            *("W/γ", number(3)),
-            only_if_any=True,
-        ),
+        TableColumn("loss_over_work_of_adhesion", _over_gamma, "W/γ", number(3), only_if_any=True),
         TableColumn("interval", lambda cell: interval_method(cell.done)),
         _estimated("loss_from_drops", "mean [J/m^2]"),
         _estimated("audit_residual", "mean"),
-        TableColumn("audit_residual_rms", _if_done(lambda cell: _rms(_audit(cell)))),
+        TableColumn("audit_residual_rms", _of_audit(lambda audit: np.sqrt(np.mean(audit**2)))),
         TableColumn(
             "audit_residual_largest",
-            _if_done(lambda cell: np.max(np.abs(_audit(cell)))),
+            _of_audit(lambda audit: np.max(np.abs(audit))),
             *("audit", percent),
         ),
-        TableColumn("races", _races, "races", plain, only_if_any=True),
+        TableColumn(
+            "races",
+            lambda cell: int(cell.values["races"].sum()) if cell.done else None,
+            *("races", plain),
+            only_if_any=True,
+        ),
         _estimated("energy_at_stake_dimensionless", "mean"),
         TableColumn(
             "range_least [m]",
-            lambda cell: least(cell.least_range),
+            lambda cell: extreme(np.min, cell.least_range),
             *("range (nm)", number(unit=1e-9)),
             only_if_any=True,
         ),
-        TableColumn("valid_range_least [m]", lambda cell: least(cell.values["valid_range"])),
-        TableColumn("edge_range_least [m]", lambda cell: least(cell.values["edge_range"])),
-        TableColumn("touch_range_least [m]", lambda cell: least(cell.values["touch_range"])),
-        TableColumn("turn_range_least [m]", lambda cell: least(cell.values["turn_range"])),
+        *(TableColumn(f"{name}_least [m]", partial(_least_of, name)) for name in RANGES),
         TableColumn(
             "largest_interior_tension [Pa]",
-            lambda cell: largest(cell.values["largest_interior_tension"]),
+            lambda cell: extreme(np.max, cell.values["largest_interior_tension"]),
         ),
-        _estimated("loss_small_scale", "mean [J/m^2]"),
-        _estimated("loss_small_scale", "sem [J/m^2]"),
-        _estimated("loss_large_scale", "mean [J/m^2]"),
-        _estimated("loss_large_scale", "sem [J/m^2]"),
-        _estimated("small_scale_share", "mean"),
-        _estimated("small_scale_share", "ci_low"),
-        _estimated("small_scale_share", "ci_high"),
-        _estimated("pull_off_stress", "mean [Pa]"),
-        _estimated("pull_off_stress", "sem [Pa]"),
-        _estimated("pull_off_stress", "ci_low [Pa]"),
-        _estimated("pull_off_stress", "ci_high [Pa]"),
-        TableColumn(
-            "pull_off_stress_dimensionless_mean",
-            _if_done(lambda cell: _pull_off_stress_dimensionless(cell).mean()),
-        ),
-        _estimated("pull_off_penetration", "mean"),
-        _estimated("pull_off_penetration", "sem"),
-        _estimated("h_max", "mean [m]"),
-        _estimated("h_rms", "mean [m]"),
+        *_for_programs("loss_small_scale", "mean sem", " [J/m^2]"),
+        *_for_programs("loss_large_scale", "mean sem", " [J/m^2]"),
+        *_for_programs("small_scale_share", "mean ci_low ci_high"),
+        *_for_programs("pull_off_stress", "mean sem ci_low ci_high", " [Pa]"),
+        TableColumn("pull_off_stress_dimensionless_mean", _if_done(_pull_off_stress)),
+        *_for_programs("pull_off_penetration", "mean sem"),
+        *(_estimated(name, "mean [m]") for name in ("h_max", "h_rms")),
         _estimated("m0", "mean [m^2]"),
         _estimated("m2", "mean"),
         _estimated("m4", "mean [1/m^2]"),
@@ -158,32 +150,31 @@ def _estimated(
     return TableColumn(f"{quantity}_{part}", estimate(quantity, which), heading, show, last=last)
 
 
+def _for_programs(quantity: str, parts: str, unit: str = "") -> tuple[TableColumn, ...]:
+    """Return columns of the CSV file alone, of several parts of a cell's estimate."""
+    return tuple(_estimated(quantity, f"{part}{unit}") for part in parts.split())
+
+
 def _if_done(value: Callable[[Cell], Any]) -> Callable[[Cell], float | None]:
     """Take a number from the cells that have a finished task."""
     return lambda cell: float(value(cell)) if cell.done else None
 
 
-def _audit(cell: Cell) -> Array:
-    return cell.values["audit_residual"]
+def _of_audit(value: Callable[[Array], Any]) -> Callable[[Cell], float | None]:
+    return _if_done(lambda cell: value(cell.values["audit_residual"]))
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _races(cell: Cell) -> int | None:
-    return int(cell.values["races"].sum()) if cell.done else None
-
-
-def _pull_off_stress_dimensionless(cell: Cell) -> Array:
-    return cell.values["pull_off_stress"] / stress_scale(cell.campaign, cell.values["h_max"])
+def _pull_off_stress(cell: Cell) -> float:
+    """Return the mean of the dimensionless pull-off stress."""
+    scale = stress_scale(cell.campaign, cell.values["h_max"])
+    return float((cell.values["pull_off_stress"] / scale).mean())
 
 
 def _papers_m2(cell: Cell) -> float | None:
     return paper.m2(cell.hurst) if paper.is_cell_of(cell) else None
 
 
-def _loss_over_work_of_adhesion(cell: Cell) -> float | None:
+def _over_gamma(cell: Cell) -> float | None:
     """Return the mean loss over the work of adhesion; None without adhesion."""
     gamma = cell.work_of_adhesion
     return cell.estimates["loss"].mean / gamma if gamma > 0 else None
@@ -221,16 +212,14 @@ def papers_loss(cell: Cell) -> float | None:
     return paper.table_1(cell.hurst, cell.work_of_adhesion)
 
 
-def least(values: Array) -> float | None:
-    """Return the least of the known values; None if none is finite."""
+def extreme(choose: Callable[[Array], Any], values: Array) -> float | None:
+    """Return the least or largest of the known values; None if none is finite."""
     known = values[np.isfinite(values)]
-    return float(known.min()) if known.size else None
+    return float(choose(known)) if known.size else None
 
 
-def largest(values: Array) -> float | None:
-    """Return the largest of the known values; None if none is finite."""
-    known = values[np.isfinite(values)]
-    return float(known.max()) if known.size else None
+def _least_of(name: str, cell: Cell) -> float | None:
+    return extreme(np.min, cell.values[name])
 
 
 def beside_the_paper(data: Aggregate) -> Table:
@@ -243,8 +232,7 @@ def beside_the_paper(data: Aggregate) -> Table:
         TableColumn("ci_high", estimate("loss_dimensionless", "high"), "to", number()),
         TableColumn("paper", papers_loss, "paper", fixed(2)),
         TableColumn(
-            "deviation",
-            _off_the_paper,
+            *("deviation", _off_the_paper),
             *("W~ off the paper by", partial(rounded_percent, sign="+")),
         ),
         TableColumn("inside", _inside, "paper in the interval"),
@@ -279,19 +267,14 @@ def _error_of_load_steps(data: Aggregate, cell: Cell) -> float | None:
     The audit compares loop integral and sum of drops, of which the load steps are the only
     difference.
     """
-    found = _deviation(data, cell, "load steps")
+    found = _deviation("load steps", data, cell)
     if found is None and cell.done:
         audit = cell.values["audit_residual"] * cell.values["loss_dimensionless"]
         found = float(np.mean(np.abs(audit)))
     return found
 
 
-def _error_of_resolution(data: Aggregate, cell: Cell) -> float | None:
-    """From a campaign that differs in its solver alone; None if there is none beside."""
-    return _deviation(data, cell, "resolution")
-
-
-def _deviation(data: Aggregate, cell: Cell, kind: str) -> float | None:
+def _deviation(kind: str, data: Aggregate, cell: Cell) -> float | None:
     """Largest mean difference of the loss from a companion of that kind."""
     found = [
         abs(pair.difference.mean)

@@ -43,30 +43,14 @@ def fixed(digits: int) -> Format:
 
 @dataclass(frozen=True)
 class TableColumn:
-    """One column of a table.
+    """One column of a table."""
 
-    Attributes
-    ----------
-    name : str
-        In the CSV file, with its unit in brackets unless dimensionless.
-    value : callable
-        Takes its value from what a row is about.
-    heading : str
-        For people; empty if the column is for the CSV file only.
-    show : callable
-        Turns a value into text.
-    only_if_any : bool
-        For people only if a row has a value that is not zero.
-    last : bool
-        For people behind the others.
-    """
-
-    name: str
-    value: Callable[[Any], Value]
-    heading: str = ""
-    show: Format = plain
-    only_if_any: bool = False
-    last: bool = False
+    name: str  # in the CSV file, with its unit in brackets unless dimensionless
+    value: Callable[[Any], Value]  # takes its value from what a row is about
+    heading: str = ""  # for people; empty if the column is for the CSV file only
+    show: Format = plain  # turns a value into text
+    only_if_any: bool = False  # for people only if a row has a value that is not zero
+    last: bool = False  # for people behind the others
 
 
 @dataclass(frozen=True)
@@ -94,13 +78,8 @@ class Table:
         shown = self._shown()
         if stream.isatty():
             from rich.console import Console
-            from rich.table import Table as RichTable
 
-            table = RichTable(title=self.title, title_justify="left")
-            for heading in shown[0]:
-                table.add_column(heading, justify="right")
-            for row in shown[1:]:
-                table.add_row(*row)
+            table = rich_table(self.title, shown[0], shown[1:], slice(None), wrap=True)
             Console(file=stream).print(table)
             return
         widths = [max(len(cell) for cell in column) for column in zip(*shown, strict=True)]
@@ -122,6 +101,28 @@ class Table:
             for row in self.rows
         ]
         return [[column.heading for _, column in kept], *body]
+
+
+def rich_table(
+    title: str,
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    numbers: slice,
+    *,
+    wrap: bool = False,
+) -> Any:
+    """Return a table for a terminal; columns of numbers are to the right, and may be wrapped."""
+    from rich.table import Table as RichTable
+
+    table = RichTable(title=title, title_justify="left")
+    to_the_right = range(len(headings))[numbers]
+    for k, heading in enumerate(headings):
+        is_number = k in to_the_right
+        justify: Any = "right" if is_number else "left"
+        table.add_column(heading, justify=justify, no_wrap=is_number and not wrap)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def make_table(title: str, columns: Sequence[TableColumn], of: Iterable[Any]) -> Table:

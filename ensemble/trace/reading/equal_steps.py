@@ -25,23 +25,9 @@ def equal_steps(
 ) -> tuple[Array, float, list[str]]:
     """Return heights at equal steps, the step in m, and a description of what was done.
 
-    Parameters
-    ----------
-    name : str
-        Of the source, in messages.
-    x : array, shape (n,)
-        Positions, in their unit.
-    metres : float
-        Size of that unit in m.
-    heights : array, shape (n,)
-        In m.
-    lines : int array, shape (n,), or None
-        Line of the file that each row stands on.
-
-    Raises
-    ------
-    InputError
-        If a position is missing, or they turn back, stand still or have unequal steps.
+    Positions ``x`` are in a unit of so many ``metres``, heights in m; both have shape (n,), as the
+    ``lines`` of the file that each row stands on. InputError if a position is missing, or they turn
+    back, stand still or have unequal steps.
     """
     notes: list[str] = []
 

@@ -91,12 +91,7 @@ def _units_in(text: str) -> list[str]:
 def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> list[str | None]:
     """Find the units of two columns (or of one, twice) in a header; None where it has none.
 
-    Parameters
-    ----------
-    header : sequence of str
-        Its lines.
-    fields : sequence of sequence of str
-        Fields of those of its lines that have as many fields as the data.
+    ``fields`` are those of its lines that have as many fields as the data.
     """
     names = [row for row in fields if not any(_VALUE.search(field) for field in row)]
     if fields and len(fields[0]) == 1:
@@ -141,13 +136,7 @@ def _names_heights(line: str, is_last: bool) -> bool:
 
 
 def step_of_header(name: str, header: Sequence[str], decimal: str) -> float | None:
-    """Find the step, the distance of two points, in a header; return it in m, or None.
-
-    Raises
-    ------
-    InputError
-        If it states several.
-    """
+    """Find the distance of two points in a header, in m, or None; InputError for several."""
     steps: list[float] = []
     for line in header:
         step = next(filter(None, (_step(part, decimal) for part in _parts(line, decimal))), None)

@@ -51,13 +51,8 @@ def available() -> bool:
 def read_scan(source: Source, row: int | None = None, channel: int | None = None) -> Scan:
     """Read a line scan, or one row of a map, from an instrument file.
 
-    Raises
-    ------
-    UnknownFormatError
-        If no reader knows the file, or it is damaged.
-    InputError
-        If it gives no length or unit, it holds a map and no row is chosen, or the chosen channel
-        or row is not there.
+    UnknownFormatError if no reader knows the file, or it is damaged. InputError if it gives no
+    length or unit, it holds a map and no row is chosen, or the chosen channel or row is not there.
     """
     io = _library()
     import warnings

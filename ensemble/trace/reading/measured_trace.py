@@ -282,10 +282,7 @@ def _refuse_options(to_what: str, **options: object) -> None:
 def holds_numbers(source: Source) -> bool:
     """Return whether a file is a text or a .npy, and no instrument's file.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or has to be unpacked or exported first.
+    InputError if it cannot be read, or has to be unpacked or exported first.
     """
     if source.is_npy:
         return True
@@ -299,13 +296,7 @@ def holds_numbers(source: Source) -> bool:
 
 
 def load_array(source: Source) -> Array:
-    """Load a .npy of real numbers, of one or two dimensions.
-
-    Raises
-    ------
-    InputError
-        If it holds anything else.
-    """
+    """Load a .npy of real numbers, of one or two dimensions (InputError)."""
     try:
         with source.open() as stream:
             table: Any = np.load(stream, allow_pickle=False)

@@ -127,13 +127,7 @@ def has_signs_of_thousands(column: Sequence[str], decimal: str) -> bool:
 def find_form(
     source: Source, sample: Sequence[str], delimiter: str | None, decimal: str | None
 ) -> tuple[str, str]:
-    """Return delimiter and decimal sign of lines of numbers, as given or as found.
-
-    Raises
-    ------
-    InputError
-        If the lines can be read in two ways.
-    """
+    """Return delimiter and decimal sign of lines of numbers; InputError if two fit."""
     if delimiter is None:
         delimiter = find_delimiter(source, sample, decimal)
     if decimal is None:
@@ -141,22 +135,15 @@ def find_form(
         comma, point = any("," in f for f in rows), any("." in f for f in rows)
         if comma and point:
             raise InputError(
-                f"{source} has commas and points within its numbers: give "
-                f"{parameter('decimal')} and {parameter('delimiter')}, "
-                "and take signs of thousands out"
+                f"{source} has commas and points within its numbers: give {parameter('decimal')} "
+                f"and {parameter('delimiter')}, and take signs of thousands out"
             )
         decimal = "," if comma else "."
     return delimiter, decimal
 
 
 def find_delimiter(source: Source, sample: Sequence[str], decimal: str | None) -> str:
-    """Return the delimiter of lines of numbers.
-
-    Raises
-    ------
-    InputError
-        If a comma can be a delimiter or a decimal sign.
-    """
+    """Return the delimiter of lines of numbers; InputError if a comma has two meanings."""
     lines = [_QUOTED.sub('"', line.strip()) for line in sample]
 
     def everywhere(sign: str) -> bool:

@@ -52,18 +52,10 @@ _OTHER_TEXTS = {
 
 @dataclass(frozen=True)
 class Source:
-    """A file of measurements, or what a stream held.
+    """A file of measurements, or what a stream held."""
 
-    Attributes
-    ----------
-    name : str
-        In messages; its ending may decide the format.
-    content : bytes or None
-        Of a stream; None for a file, whose name is its path.
-    """
-
-    name: str
-    content: bytes | None = None
+    name: str  # in messages; its ending may decide the format
+    content: bytes | None = None  # of a stream; None for a file, whose name is its path
 
     def __str__(self) -> str:
         return self.name
@@ -99,13 +91,7 @@ class Source:
         return next((name for known, name in _OTHER_TEXTS.items() if known.match(begin)), None)
 
     def holds_zero_bytes(self) -> bool:
-        """Return whether there is a zero byte anywhere: a text has none.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read.
-        """
+        """Return whether there is a zero byte anywhere: a text has none (InputError)."""
         try:
             with self.open() as stream:
                 return any(b"\0" in block for block in iter(lambda: stream.read(_BLOCK), b""))
@@ -117,13 +103,7 @@ class Source:
         return open_regular(self.name) if self.content is None else io.BytesIO(self.content)
 
     def read(self) -> bytes:
-        """Return its whole content.
-
-        Raises
-        ------
-        InputError
-            If it cannot be read, or is too large for a text.
-        """
+        """Return its whole content; InputError if it cannot be read, or is too large for a text."""
         try:
             size = os.stat(self.name).st_size if self.content is None else len(self.content)
             if size > MOST_BYTES:
@@ -138,11 +118,8 @@ class Source:
     def beginning(self) -> bytes:
         """Return its first bytes.
 
-        Raises
-        ------
-        InputError
-            If it is missing, no regular file, unreadable, empty, or has to be unpacked or exported
-            first.
+        InputError if it is missing, no regular file, unreadable, empty, or has to be unpacked or
+        exported first.
         """
         try:
             if self.content is None:
@@ -193,13 +170,7 @@ def _of_workbook(source: Source) -> str:
 
 
 def source_of(given: Any) -> Source:
-    """Return the source of a path, or of an open file or other stream, which is read to its end.
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
-    """
+    """Return the source of a path, or of a stream, read to its end (TypeError)."""
     if isinstance(given, str | os.PathLike):
         return Source(str(checks.path("source", given)))
     if not hasattr(given, "read"):

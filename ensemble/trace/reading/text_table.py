@@ -64,32 +64,17 @@ _NAME_AND_UNIT = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The numbers of a text file.
+    """The numbers of a text file."""
 
-    Attributes
-    ----------
-    columns : array, shape (k, n)
-        NaN where a number is missing.
-    filled : tuple of int
-        Columns that are not empty from top to bottom.
-    header : tuple of str
-        Lines before the numbers, without their comment signs.
-    fields : tuple of tuple of str
-        Those header lines that have as many fields as the numbers, split up.
-    lines : int array, shape (n,)
-        Line of the file that each row stands on, from 1.
-    delimiter, decimal : str
-    empty_lines : tuple of int
-        Lines of a single column that are empty, each a missing height.
-    """
-
-    columns: Array
-    filled: tuple[int, ...]
-    header: tuple[str, ...]
+    columns: Array  # shape (k, n); NaN where a number is missing
+    filled: tuple[int, ...]  # columns that are not empty from top to bottom
+    header: tuple[str, ...]  # lines before the numbers, without their comment signs
+    # Those header lines that have as many fields as the numbers, split up
     fields: tuple[tuple[str, ...], ...]
-    lines: Array
+    lines: Array  # shape (n,); line of the file that each row stands on, from 1
     delimiter: str
     decimal: str
+    # Lines of a single column that are empty, each a missing height
     empty_lines: tuple[int, ...] = ()
 
     @property
@@ -103,23 +88,14 @@ class Table:
 def read_table(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
     """Read a text of numbers in columns, whatever its header, delimiter and decimal sign.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no text, holds no columns of numbers or several blocks of
-        them, or can be read in two ways; the sentence says which line, and what would settle it.
+    InputError if the file cannot be read, is no text, holds no columns of numbers or several blocks
+    of them, or can be read in two ways; the sentence says which line, and what would settle it.
     """
     return _table(source, _lines(source), delimiter, decimal)
 
 
 def read_column(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
-    """Read a text of one column, as :func:`read_table` does; its numbers may stand in one row.
-
-    Raises
-    ------
-    InputError
-        As :func:`read_table`.
-    """
+    """Read a text of one column, as :func:`read_table` does; its numbers may stand in one row."""
     lines = _lines(source)
     rows = [place for place, line in enumerate(lines) if looks_like_numbers(line)]
     if len(rows) == 1:
@@ -450,17 +426,9 @@ def _refuse_parts(
 
 
 def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tuple[str, ...]:
-    """Fields of a line of the header, which need not be set apart as the numbers are.
+    """Split a line of the header into fields, which need not be set apart as the numbers are.
 
-    Parameters
-    ----------
-    line : str
-    delimiter : str
-        That of the numbers.
-    count : int
-        Number of columns, with those that are empty.
-    filled : sequence of int
-        Columns that are not empty.
+    ``count`` is the number of columns, ``filled`` are those that are not empty.
     """
     fields = _split_names(line, delimiter)
     while fields and not fields[-1]:
