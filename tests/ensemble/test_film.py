@@ -17,7 +17,6 @@ import pytest
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
-import adhesis.ensemble.command.loop as loop_command
 import adhesis.ensemble.loop.film_scenes as scenes_module
 from adhesis import (
     Control,
@@ -210,23 +209,6 @@ def test_the_command_writes_the_film_of_a_loop_and_of_a_path(tmp_path, capsys):
         assert run(*way, "--film", file) == 0
         assert f"wrote       {file}" in capsys.readouterr().out
         assert len(data_of(file.read_text())["frames"]) > 20
-
-
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (("--film", "a.avi"), "--film is a.avi: the name must end in .html, .gif or .mp4"),
-        (("--film", "no/a.html"), "--film is no/a.html: there is no directory no"),
-        (("--film", "a.html", "--max-penetration", "0.5,0.6"), "--film is given with 2 turning"),
-        (("--film", "a.html", "--json", "a.html"), "--json and --film are both a.html"),
-    ],
-)
-def test_the_command_refuses_before_the_loop(words, text, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(loop_command, "make_method", None)
-    assert run(*words) == 2
-    assert text in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
 
 
 # ---------------------------------------------------------------------- a browser

@@ -274,48 +274,6 @@ def test_the_warning_goes_to_stderr_json_and_exit_code(
     assert "few.csv holds 7 heights only: fewer than 8 make a profile of a few waves" in reported
 
 
-# ---------------------------------------------------------------------- material and bounds
-
-H = ("--heights", "a.csv", "--period", 1e-3)
-S = ("--hurst", 0.8)
-OPTIONS: dict[str, tuple[tuple[object, ...], str]] = {
-    "no material": (
-        H,
-        "--work-of-adhesion, --young, --poisson are missing: with --heights the material has to "
-        "be given",
-    ),
-    "no ratio of Poisson": ((*H, *CONTACT[:4]), "--poisson is missing: with --heights"),
-    "a step": ((*H, *CONTACT, "--step", "1um"), "--step belongs to --trace"),
-    "a degree": ((*H, *CONTACT, "--degree", 2), "--degree belongs to --trace"),
-    "a unit of a spectrum": ((*S, "--unit", "um"), "--unit belongs to --trace"),
-    "a long period": ((*S, "--period", 1e300), "--period is 1e+300, which would be 1e+300 m: give"),
-    "a short period": ((*S, "--period", 1e-300), "--period is 1e-300: "),
-    "a delimiter": ((*H, *CONTACT, "--delimiter", ":"), "--delimiter is ':': it must be one of"),
-}
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("kind", OPTIONS)
-def test_options_are_refused_by_name(
-    kind: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def start(*_: object, **__: object) -> None:
-        raise AssertionError("bad input reached the computation")
-
-    monkeypatch.setattr(loop_command, "run_loop", start)
-    monkeypatch.chdir(tmp_path)
-    Path("a.csv").write_text("\n".join(METRES))
-    words, sentence = OPTIONS[kind]
-    assert main(["loop", *map(str, words)]) == 2
-    text = capsys.readouterr()
-    assert text.out == ""
-    (line,) = text.err.splitlines()
-    assert line.startswith(f"adhesis loop: {sentence}")
-
-
 # ---------------------------------------------------------------------- campaign files
 
 

@@ -12,7 +12,6 @@ import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report.findings import verdict
 from adhesis.ensemble.report.paper import is_reading
 from adhesis.ensemble.report.tables.loss_tables import losses
@@ -87,25 +86,6 @@ def test_a_path_lists_its_friction(tmp_path, capsys):
     assert "\nfriction    " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--work-of-adhesion-open", 0.01), "-open is 0.01 J/m²: it must be at least the work of"),
-        (("--work-of-adhesion-open", "0,08"), "--work-of-adhesion-open"),
-        (("--work-of-adhesion-open", 0.08, "--strength", 1e9), "beside a strength of"),
-        (("--work-of-adhesion-open", 0.08, "--adhesion-range", "1nm"), "give one of them"),
-        (("--work-of-adhesion-open", 0.08, "--work-of-adhesion", 0), "left out, as γ is 0"),
-        (("--work-of-adhesion-open", 0.08, "--method", "grid"), "--method is 'grid' beside a work"),
-        (("--work-of-adhesion-open", 0.08, "--nodes-per-wave", 32), "--nodes-per-wave is 32 besi"),
-    ],
-)
-def test_impossible_options_are_refused_in_one_sentence(words, message, capsys):
-    assert run("loop", *ROUGH, *words, "--quiet") == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1 or error.startswith("usage")
-
-
 # ---------------------------------------------------------------------- trace
 
 
@@ -143,26 +123,6 @@ def test_the_answer_of_a_trace_has_its_friction(capsys):
     assert "which recede at 0.02 J/m²" in str(answer)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("0.04,0.02", "--work-of-adhesion-open", 0.1), "beside 2 works of adhesion: give one of"),
-        (("0.04", "--work-of-adhesion-open", 0.01), "-open is 0.01 J/m²: it must be at least the"),
-        (("0.04", "--work-of-adhesion-open", 0.08, "--strength", 1e9), "beside a strength of 1e"),
-        (("0.04", "--work-of-adhesion-open", 0.08, "--method", "grid"), "--method is 'grid' besi"),
-    ],
-)
-def test_a_trace_refuses_them_before_its_loops(words, message, tmp_path, capsys):
-    file, prepared = tmp_path / "t.txt", small_trace()
-    np.savetxt(
-        file, np.column_stack([prepared.trace.step * np.arange(200), prepared.trace.heights])
-    )
-    more = ("--unit", "m", "--young", 1e6, "--poisson", 0.5, "--to", tmp_path / "out", "--quiet")
-    assert run("trace", file, "--work-of-adhesion", *words, *more) == 2
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 # ---------------------------------------------------------------------- campaign
 
 
@@ -185,29 +145,6 @@ def test_zip_joins_it_with_the_work_of_adhesion():
         for task in campaign.tasks()
     }
     assert found == {(0.01, 0.02), (0.04, 0.08)}
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (text("0.02"), "_open is 0.02: it must be at least the work of adhesion, 0.04"),
-        (text("[0.02, 0.08]"), "work_of_adhesion_open is 0.02: it must be at least"),
-        (text("0.08", work_of_adhesion="[0, 0.04]"), "must be left out, as γ is 0, in every cell"),
-        (text("-1"), "work_of_adhesion_open is -1: it must be"),
-        (text('"80 mm"'), "work_of_adhesion_open"),
-        (text("0.08\nstrength = 3e9"), "_open and a range or strength: at most one"),
-        (text("0.08\nadhesion_range = 1e-12"), "and a range or strength: at most one"),
-        (
-            campaign_text(poisson="0.5\nwork_of_adhesion_open = 0.08"),
-            "[solver] method is 'grid' beside a work_of_adhesion_open",
-        ),
-    ],
-)  # fmt: skip
-def test_campaigns_that_cannot_be_computed_are_refused(given, message):
-    with pytest.raises(InputError) as error:
-        parse_campaign(given)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_equal_works_of_adhesion_are_those_of_one():

@@ -303,16 +303,6 @@ def test_a_cell_that_is_new_is_tried_before_the_file_grows(tmp_path):
     assert out.read_bytes() == before
 
 
-def test_bad_options(tmp_path):
-    """Of single options: test_command_line.py."""
-    assert "no folder" in refused(tmp_path, "--out", tmp_path / "none" / "r.h5")
-    assert "is a directory" in refused(tmp_path, "--out", tmp_path)
-    sentence = "the name of a new results file must end in .h5"
-    assert sentence in refused(tmp_path, "--out", tmp_path / "new.txt")
-    itself = write_campaign(tmp_path)
-    assert "the campaign file itself" in refused(tmp_path, "--out", itself)
-
-
 def test_an_existing_results_file_keeps_its_name(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "old.dat"
     run(tmp_path)
@@ -326,11 +316,6 @@ def test_a_results_file_of_another_campaign(tmp_path):
     assert "material.young is 2000000.0 here and 1000000.0 there" in sentence
     assert "cycle.load_steps is 5 here and 4 there" in sentence
     assert "sweep.hurst" in refused(tmp_path, hurst="[0.7]")
-
-
-def test_a_file_that_is_no_results_file(tmp_path):
-    (tmp_path / "r.h5").write_text("my notes")
-    assert "is not a results file of adhesis" in refused(tmp_path)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

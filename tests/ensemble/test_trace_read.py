@@ -18,7 +18,6 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.heights import read_heights
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
-from tests.support.options import replacing
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -340,51 +339,6 @@ def test_refusals_of_files(tmp_path: Path) -> None:
 
 
 CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
-
-
-@pytest.mark.parametrize(
-    ("words", "reported"),
-    [
-        (["--plan"], "states no unit"),
-        (["--plan", "--unit", "um", "--columns", "3"], "--columns is 3: it must name two of the 2"),
-        (["--plan", "--unit", "um", "--columns", "2"], "header states no step with its unit: give"),
-        (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
-        (["--plan", "--unit", "um", "--tip-radius", "5"], "--tip-radius is 5, which would be 5 m"),
-        (["--plan", "--unit", "um", "--tip-radius", "5m"], "trusted from 50 µm on (what a tip of"),
-        (["--plan", "--unit", "um", "--tip-radius=-1um"], "--tip-radius is -1e-06: it must be"),
-        (["--plan", "--unit", "um", "--longest-gap", "5 parsec"], "'5 parsec': its unit must be"),
-        (["--plan", "--unit", "um", "--max-stress", "5"], "a weight or a machine?"),
-        (["--plan", "--unit", "um", "--stiffness", "0"], "(--stiffness 0) needs --max-stress"),
-        (["--plan", "--unit", "um", "--stiffness", "0", "--max-stress", "0"], "--max-stress is 0"),
-        (
-            ["--plan", "--unit", "um", "--stiffness", "1", "--layer", "1mm"],
-            "--stiffness and --layer are given: give one of them",
-        ),
-        (["--plan", "--unit", "um", "--degree", "9"], "--degree is 9"),
-        (["--plan", "--unit", "um", "--max-penetration", "deep"], "--max-penetration is 'deep'"),
-        (["--plan", "--unit", "um", "--step", "1um"], "--step belongs to heights without"),
-        (["--plan", "--unit", "um", "--method", "magic"], "method is 'magic'"),
-        (["--unit", "um"], "--to is missing: give the directory for the page, or --plan"),
-        (["--plan", "--unit", "um", "--columns", "x"], "--columns is 'x': it must be two whole"),
-        (["--plan", "--work-of-adhesion", "1.0,1.0"], "is '1.0,1.0': its values must"),
-        (
-            ["--plan", "--work-of-adhesion", "1;2"],
-            "--work-of-adhesion is '1;2': it must be a",
-        ),
-        (["--plan", "--unit", "um", "--processes", "0"], "--processes is 0"),
-        (["--plan", "--unit", "um", "--work-of-adhesion", "-1"], "--work-of-adhesion is -1"),
-    ],
-)
-def test_the_command_refuses_with_one_sentence_and_code_2(
-    words: list[str], reported: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "t.txt"
-    path.write_text("\n".join(rows(" ", ".")))
-    assert main(["trace", str(path), *replacing(CONTACT, words)]) == 2
-    error = capsys.readouterr().err
-    assert reported in error
-    assert len(error.splitlines()) == 1
-    assert sorted(tmp_path.iterdir()) == [path]
 
 
 def test_a_plan_is_said_and_nothing_is_written(
