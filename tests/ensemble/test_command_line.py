@@ -96,30 +96,6 @@ def test_an_option_that_is_given_twice_is_refused(words, capsys):
     assert not [name for name in vars(many) if name.startswith("_")]
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        *("run c.toml --out {}.h5", "run {}.toml"),
-        *("new {}.toml", "sample {}.csv", "merge a.h5 --out {}.h5", "merge {}.h5 --out a.h5"),
-        *("status {}.h5", "verify {}.h5", "report {}.h5 --to x", "bench --to {}", "doctor --in {}"),
-        *("trace {}.csv --to x CONTACT", "trace c.csv --to {} CONTACT"),
-        "loop --heights {}.csv --period 2mm CONTACT",
-        *(f"loop --hurst 0.8 --{name} {{}}.{name}" for name in ("json", "csv")),
-        *("loop --hurst 0.8 --fields {}.npz", "loop --hurst 0.8 --film {}.html"),
-    ],
-)
-def test_a_name_that_is_too_long_is_one_sentence(words, capsys, tmp_path, monkeypatch):
-    """Of a file or folder, of the folder that it is in, and of the whole path."""
-    monkeypatch.chdir(tmp_path)
-    write_campaign(tmp_path)
-    assert main(["sample", "c.csv"]) == 0
-    capsys.readouterr()
-    words = words.replace("CONTACT", " ".join(CONTACT))
-    for name in ("y" * 256, "y" * 300 + "/x", "z/" * 2100 + "x"):
-        assert name in refused(capsys, words.format(name).split())
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.csv", "c.toml"]
-
-
 def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
     """Python 3.13 raises what older ones report through ``error``."""
 

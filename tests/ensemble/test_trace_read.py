@@ -322,22 +322,6 @@ def test_what_is_in_doubt_is_refused_in_one_sentence(kind: str, tmp_path: Path) 
     assert "\n" not in str(refusal.value)
 
 
-def test_refusals_of_files(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        read_trace(tmp_path / "none.txt")
-    with pytest.raises(InputError, match="is a directory"):
-        read_trace(tmp_path)
-    (tmp_path / "a.npy").write_bytes(b"not an array")
-    with pytest.raises(InputError, match=r"no \.npy of numbers"):
-        read_trace(tmp_path / "a.npy")
-    np.save(tmp_path / "b.npy", np.zeros((9, 9)))
-    with pytest.raises(InputError, match="9 × 9 numbers"):
-        read_trace(tmp_path / "b.npy")
-    (tmp_path / "c.txt").write_bytes(b"\x00\x01\x02" * 100)
-    with pytest.raises(InputError, match="neither text nor"):
-        read_trace(tmp_path / "c.txt")
-
-
 CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
 
 
