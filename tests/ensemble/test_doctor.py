@@ -89,7 +89,7 @@ def test_a_launcher_that_hangs_is_given_up(tmp_path: Path, monkeypatch: pytest.M
     hanging = tmp_path / "mpirun"
     hanging.write_text('#!/bin/sh\n[ "$1" = --version ] || exec sleep 600\n')
     hanging.chmod(0o755)
-    monkeypatch.setattr(doctor, "_TIME_LIMIT", 5.0)
+    monkeypatch.setattr(doctor, "_TIME_LIMIT", 2.0)
     monkeypatch.setenv("MPIRUN", str(hanging))
     diagnosis = doctor.examine()
     assert not diagnosis.usable

@@ -16,12 +16,14 @@ import xarray
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.run import launch, session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
 from adhesis.ensemble.task.compute import check_task
 from tests.support.campaign_support import (
+    TIMING,
     adhesis,
     adhesis_here,
     differences,
@@ -124,11 +126,16 @@ def test_walltime_ends_the_run_in_time(tmp_path):
 
 def test_growing_computes_exactly_what_is_new(tmp_path):
     _, out = run(tmp_path, realisations="1", hurst="[0.8]")
+    with Results(out) as results:
+        before = [results.column(name).tolist() for name in TIMING]
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}", realisations="3")
     assert process.returncode == 0
     assert "12 of 12 tasks done; 10 computed" in process.stderr
-    assert len(log.read_text().splitlines()) == 10
+    new = {f"{h}:{g}:{r}" for h in (0.7, 0.8) for g in (0.01, 0.04) for r in range(3)}
+    assert set(log.read_text().split()) == new - {"0.8:0.01:0", "0.8:0.04:0"}
+    with Results(out) as results:
+        assert [results.column(name)[[6, 9]].tolist() for name in TIMING] == before
     (tmp_path / "whole").mkdir()
     _, whole = run(tmp_path / "whole", realisations="3")
     assert differences(out, whole) == []
