@@ -279,9 +279,7 @@ def test_campaigns_run_outside_the_main_thread(tmp_path):
     before = sys.stderr
 
     async def all_of_them() -> list[adhesis.CampaignResults]:
-        return await asyncio.gather(
-            *(asyncio.to_thread(small_campaign().run, out) for out in outs)
-        )
+        return await asyncio.gather(*(asyncio.to_thread(small_campaign().run, out) for out in outs))
 
     one, two = asyncio.run(all_of_them())
     assert [done_rows(out) for out in outs] == [2, 2]
