@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import html
 import json
 import os
-import pickle
 import re
 import shutil
 import subprocess
@@ -129,12 +127,6 @@ def test_a_path_is_filmed_too():
     assert "path: work" in film.page
 
 
-def test_copies_and_pickles_are_filmed_alike(loop, film):
-    for other in (copy.deepcopy(loop), pickle.loads(pickle.dumps(loop))):
-        assert other == loop
-        assert other.film(frames=30).page == film.page
-
-
 # ---------------------------------------------------------------------- files
 
 
@@ -171,22 +163,10 @@ def test_animations_are_written_by_their_writers(loop, tmp_path, ending):
         assert file.read_bytes()[4:8] == b"ftyp"
 
 
-def test_what_cannot_be_filmed_is_refused_in_one_sentence(loop, tmp_path, monkeypatch):
+def test_without_ffmpeg_an_mp4_is_refused(loop, monkeypatch):
     monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
-    bare = LoopResult(**{**vars(loop), "contact_states": ()})
-    for call, error, text in (
-        (lambda: loop.film("a.avi"), InputError, "path is a.avi: the name must end in .html, "),
-        (lambda: loop.film("a.mp4"), InputError, "ffmpeg, which writes .mp4, is not installed"),
-        (lambda: loop.film(3), TypeError, "path is 3"),
-        (lambda: loop.film(frames=1), ValueError, "frames is 1: it must be"),
-        (lambda: loop.film(frames=1001), ValueError, "frames is 1001: it must be"),
-        (lambda: loop.film(frames=2.5), (TypeError, ValueError), "frames is 2.5"),
-        (lambda: loop.film(progress=3), TypeError, "progress is 3"),
-        (lambda: bare.film(), ValueError, "this result holds no contact states"),
-        (lambda: loop.film(tmp_path / "no" / "a.html", frames=2), InputError, "no directory"),
-    ):
-        with pytest.raises(error, match=re.escape(text)):
-            call()
+    with pytest.raises(InputError, match="ffmpeg, which writes \\.mp4, is not installed"):
+        loop.film("a.mp4")
 
 
 def test_progress_counts_the_frames(loop):

@@ -243,21 +243,6 @@ def test_no_file_appears_if_the_fields_cannot_be_had(wave_file, tmp_path, monkey
     assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
 
 
-@pytest.mark.parametrize("method", ["grid", "sharp"])
-def test_methods_agree_on_the_fields_at_the_turning_point(method, wave_file, tmp_path):
-    """Both branches hold the same state there, and it is the exact one."""
-    out = tmp_path / "fields.npz"
-    words = ("--max-penetration", 0.5, "--load-steps", 2, "--method", method, "--fields", out)
-    assert run(*wave_words(wave_file, *words, "--field-penetrations", 0.5, "--quiet")) == 0
-    data = np.load(out)
-    assert data["stress"][0] == pytest.approx(data["stress"][1])
-    a = WAVE.half_width(0.5 * AMPLITUDE)
-    assert np.ptp(data["edges"][0, 0]) / 2 == pytest.approx(a, abs=PERIOD / 1024)
-    crest = float(WAVE.stress(0.0, a))
-    assert data["stress"][0, 0] == pytest.approx(crest, rel=1e-2)
-    assert data["gap"][0].mean() == pytest.approx(0.5 * AMPLITUDE, rel=1e-2)
-
-
 def test_self_affine_profile_through_a_real_method(tmp_path, capsys):
     out = tmp_path / "loop.json"
     words = ("--hurst", 0.8, "--seed", 3, "--n0", 1, "--ratio", 4, "--load-steps", 4)

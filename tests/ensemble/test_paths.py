@@ -50,6 +50,12 @@ def _shared(path: Path, target: str) -> None:
     os.lchown(path, ANOTHER_USER, ANOTHER_USER)
 
 
+def _chained(path: Path) -> None:
+    Path("all").mkdir()
+    _shared(Path("all/planted"), "../apart/precious")
+    path.symlink_to("all/planted")
+
+
 MADE: dict[str, Callable[[Path], None]] = {
     "pipe": os.mkfifo,
     "socket": _socket,
@@ -63,6 +69,7 @@ MADE: dict[str, Callable[[Path], None]] = {
     "link to nothing": lambda path: path.symlink_to("apart/new"),
     "link to itself": lambda path: path.symlink_to(path.name),
     "link of another user": lambda path: _shared(path, "apart/precious"),
+    "link to that of another user": lambda path: _chained(path),
     "second name": lambda path: path.hardlink_to("apart/precious"),
 }
 NAMED = {
@@ -82,7 +89,8 @@ OF_READING = (
 )
 OF_WRITING = (
     *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
-    *("link to itself", "link of another user", "a file for a folder", "no folder"),
+    *("link to itself", "link of another user", "link to that of another user"),
+    *("a file for a folder", "no folder"),
     *LONG,
 )
 OF_FOLDERS = (
@@ -123,7 +131,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     Path("c.toml").write_text(campaign_text())
 
     def make(kind: str, ending: str = "") -> str:
-        if kind == "link of another user" and os.geteuid() != 0:
+        if kind.endswith("of another user") and os.geteuid() != 0:
             pytest.skip("only root can give files to other users")
         if kind in NAMED:
             return NAMED[kind] if kind == "a device" else NAMED[kind] + ending

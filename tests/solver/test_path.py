@@ -125,21 +125,3 @@ def test_a_path_may_end_in_contact():
     assert path.penetration[-1] == pytest.approx(0.3)
     assert path.energy_change < 0
     assert abs(path.audit_residual) < 1e-4
-
-
-@pytest.mark.parametrize(
-    ("points", "rule"),
-    [
-        ([], "at least one"),
-        ([-0.1], "start with loading"),
-        ([0.5, 0.6], "after loading it must unload"),
-        ([0.5, 0.3, 0.2], "after unloading it must load"),
-        ([0.5, 0.5], "after loading it must unload"),
-        ([0.5, np.nan, 0.6], "must be a finite number"),
-        ([1.2], "max_penetration is 1.2"),
-        ([0.5, 0.3], "omit that turning point"),
-    ],
-)
-def test_impossible_paths_are_refused(points, rule):
-    with pytest.raises(ValueError, match=rule):
-        run_path(make_method("sharp", problem_of()), points, load_steps=5)
