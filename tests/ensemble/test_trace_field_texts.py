@@ -15,7 +15,7 @@ from adhesis.ensemble.loop.heights import read_heights
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import instrument
 from adhesis.ensemble.trace.reading.header_units import step_of_header
-from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver import checks
 from adhesis.solver.model.problem import Problem
 from tests.support.campaign_support import campaign_text
@@ -33,10 +33,6 @@ TWO = [f"{x},{z}" for x, z in PAIRS]
 def with_codes(codes: dict[int, str]) -> list[str]:
     """Rows of two columns, with other heights at some points."""
     return [f"{x},{codes.get(k, z)}" for k, (x, z) in enumerate(PAIRS)]
-
-
-def commas(lines: Iterable[str]) -> list[str]:
-    return [line.replace(",", ";").replace(".", ",") for line in lines]
 
 
 def grouped(sign: str) -> list[str]:
@@ -419,7 +415,3 @@ def test_a_sign_that_is_not_of_toml_is_named_with_its_place(old: str, new: str, 
     text = campaign_text(young="1e6").replace(old, new, 1)
     with pytest.raises(InputError, match=rf"not valid TOML: line \d+, column \d+ {words}"):
         parse_campaign(text)
-
-
-def test_a_trace_says_how_it_was_read() -> None:
-    assert isinstance(read_trace(np.column_stack([PLACE, 1e6 * Z]), unit="um"), Trace)

@@ -464,6 +464,7 @@ answer(control=Control(0)) -> ValueError: a path under a load turns at max_stres
 answer(control=Control(0), max_penetration=0.5) ->
     ValueError: a path under a load turns at max_stress: give that, and no max_penetration
 answer(max_stress=500.0) -> ValueError: max_stress is given, but a path under a separation
+answer(max_stress=500.0, preload=500.0) -> ValueError: preload and max_stress are given
 answer(quick=1) -> TypeError: quick is 1: it must be True or False
 answer(watch=1) -> TypeError: watch is 1: it must be a function, or None
 # files
