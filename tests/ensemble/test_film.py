@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import html
 import json
-import os
 import re
-import shutil
-import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,9 +28,8 @@ from adhesis.ensemble.loop.film import Film, film_of
 from adhesis.ensemble.loop.film_scenes import scenes_of
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.references.exact_wave import ExactWave
+from tests.support.browser import needs_browser, seen_by_browser
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-BROWSER = next(filter(None, map(shutil.which, BROWSERS)), None)
 MATERIAL = HalfSpace(1e6, 0.5)
 
 
@@ -193,7 +188,7 @@ def test_the_command_writes_the_film_of_a_loop_and_of_a_path(tmp_path, capsys):
 
 # ---------------------------------------------------------------------- a browser
 
-_PROBE = """<pre id="result"></pre><script>
+_PROBE = """
 const look = () => ({
   slider: Number(slider.value), state: get("state").textContent, jump: get("jump").textContent,
   number: get("number").textContent, body: body.getAttribute("d"), point: point.getAttribute("x"),
@@ -220,31 +215,15 @@ const wait = setInterval(() => {
   setTimeout(() => {
     button.click();
     seen.paused = look();
-    get("result").textContent = JSON.stringify({...seen, errors});
+    reportSeen({...seen, errors});
   }, 250);
 }, 100);
-</script></body>"""
+"""
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium in PATH: the page is not opened")
+@needs_browser
 def test_the_page_plays_in_a_browser_and_its_slider_moves_the_state(film, tmp_path):
-    page = tmp_path / "film.html"
-    page.write_text(film.page.replace("</body>", _PROBE))
-    assert BROWSER is not None
-    sandbox = [] if os.geteuid() else ["--no-sandbox"]  # Chromium has none for root
-    done = subprocess.run(
-        [
-            *(BROWSER, "--headless", *sandbox, "--disable-gpu", f"--user-data-dir={tmp_path}/user"),
-            *("--virtual-time-budget=120000", "--dump-dom", Path(page).as_uri()),
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    found = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert found is not None
-    assert found[1]
-    seen = json.loads(html.unescape(found[1]))
+    seen = seen_by_browser(film.page, _PROBE, tmp_path)
     assert seen["errors"] == []
     scenes = film._scenes.scenes
     assert seen["frames"] == len(scenes) == seen["last"] + 1

@@ -44,6 +44,7 @@ from adhesis.ensemble.report.tables.works import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
+from tests.support.browser import needs_browser, seen_by_browser
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
 ROOT = Path(__file__).parent.parent.parent
@@ -62,6 +63,9 @@ def data(file):
 
 
 # Figures that are laid out and written: each takes seconds, and all are by one function.
+DOT = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
 SAVED = ("fig6_contact_against_stress", "loss_by_mechanism")
 
 
@@ -74,7 +78,7 @@ def report(file) -> Path:
         if stem.name in SAVED:
             return save(figure, stem)
         for suffix in (".png", ".pdf"):
-            stem.with_suffix(suffix).write_bytes(b"\x89PNG\r\n\x1a\n" + stem.name.encode())
+            stem.with_suffix(suffix).write_bytes(DOT + stem.name.encode())
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("adhesis.ensemble.report.figures.style.save", written)
@@ -830,6 +834,22 @@ def test_the_html_page_needs_no_other_file(report):
         for table in re.findall(r"(?:^\|.*\n)+", markdown, re.MULTILINE)
         for line in table.splitlines()[2:]
     )
+
+
+@needs_browser
+def test_a_browser_shows_every_figure_of_the_report_and_no_error(report, tmp_path):
+    page = (report / "report.html").read_text(encoding="utf-8")
+    found = seen_by_browser(
+        page.replace(
+            "<head>", "<head><script>errors = []; onerror = e => errors.push(e);</script>"
+        ),
+        """onload = () => reportSeen({errors, widths: [...document.images].map(i => i.naturalWidth),
+            });""",
+        tmp_path,
+    )
+    assert found["errors"] == []
+    assert len(found["widths"]) == 13
+    assert min(found["widths"]) > 0
 
 
 def test_texts_of_a_results_file_are_shown_as_texts(data, tmp_path):
