@@ -350,6 +350,10 @@ def test_a_run_of_somebody_else_and_a_job_do_not_destroy_each_other(real: Site) 
     (real.folder / "free").touch()
     assert by_hand.wait(120) == 0
     assert done_rows(results) == 40
+    again = real.start(STAGING="disk1")
+    text, _ = again.communicate(timeout=60)
+    assert again.returncode == 2, text
+    assert f"adhesis merge {staged(real).relative_to(real.folder)} --out s.h5" in text
     joined = adhesis_here("merge", staged(real), "--out", results)
     assert joined.returncode == 0, joined.stderr
 

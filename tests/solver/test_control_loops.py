@@ -7,7 +7,6 @@ import pytest
 
 from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile, single_wave
 from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.references.single_wave import SingleWave
@@ -97,9 +96,3 @@ def test_mirror_shift_and_scale_change_nothing(rough, relative):
     # lengths a hundredfold: γ/(E* λ) and k λ/E* stay
     large = loop_of(rough.scaled(100, 100), 1.0, relative * unit / 100, 0.4)
     assert large.loss_dimensionless == pytest.approx(here.loss_dimensionless, rel=same)
-
-
-def test_a_load_that_no_state_carries_ends_in_a_sentence():
-    """With α = 0.6 a wave runs from first touch to full contact."""
-    with pytest.raises(PathError, match=r"under a load .* drawn into full contact at first touch"):
-        loop_of(single_wave(AMPLITUDE, PERIOD), wave_of(0.6).work_of_adhesion, 0.0, 0.1)
