@@ -11,6 +11,7 @@ import json
 import multiprocessing
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,9 @@ LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
         ExactWave(Problem(WAVE, HalfSpace(1e6, 0.5), 0.0)), max_penetration=0.5, load_steps=4
     ),
     "to a preload": lambda: run_loop(wave_method(), preload=500.0, load_steps=4),
+    "flat": lambda: run_loop(
+        ExactWave(replace(wave_method().problem, measure="flat")), max_penetration=0.5, load_steps=4
+    ),
     "path": lambda: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4),
 }
 

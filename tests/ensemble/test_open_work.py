@@ -59,21 +59,6 @@ def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     assert line in capsys.readouterr().out.splitlines()
 
 
-def test_a_loop_of_one_work_of_adhesion_is_as_before(tmp_path, capsys):
-    found = []
-    for more in ((), ("--work-of-adhesion-open", 0.04)):
-        out = tmp_path / "loop.json"
-        words = ("--work-of-adhesion", 0.04, *more, "--json", out, "--quiet")
-        assert run("loop", *ROUGH, "--load-steps", 4, *words) == 0
-        found.append(json.loads(out.read_text()))
-    changing = ("seconds", "provenance", "warnings")
-    one, both = ({k: v for k, v in data.items() if k not in changing} for data in found)
-    assert one == both
-    assert (one["work_of_adhesion_open"], one["friction"]) == (0.04, 0.0)
-    assert "receded" not in one
-    assert "friction" not in capsys.readouterr().out
-
-
 def test_a_path_lists_its_friction(tmp_path, capsys):
     words = ("--work-of-adhesion-open", 0.08, "--load-steps", 5, "--quiet")
     out = tmp_path / "path.json"

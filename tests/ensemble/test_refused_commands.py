@@ -65,6 +65,10 @@ run c.toml --redo all --work-of-adhesion {{-1,nan}} ->
     --work-of-adhesion is {{}}: this campaign has no such task
 run c.toml --redo all --work-of-adhesion 40 ->
     --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
+run c.toml --out r.h5 --redo failed --hurst 0.75 ->
+    --hurst is 0.75: this campaign has no such task
+run c.toml --out r.h5 --redo all --realisation 9 -> only 0, 1
+run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
 status '' -> FILE.h5 is ''
 status text -> is not a results file
 status r.h5 --interval {{x,-1,0,nan,inf,1e9}} -> --interval is '{{}}'

@@ -196,24 +196,6 @@ def test_done_tasks_can_be_computed_again_too(tmp_path):
     assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
 
 
-def test_rows_that_do_not_exist_cannot_be_computed_again(tmp_path):
-    _, out = run(tmp_path)
-    before = out.read_bytes()
-    for words, sentence in (
-        (
-            ("--redo", "failed", "--hurst", "0.75"),
-            "--hurst is 0.75: this campaign has no such task",
-        ),
-        (("--redo", "all", "--realisation", "9"), "only 0, 1"),
-        (("--redo", "all", "--work-of-adhesion", "4"), "only 0.01, 0.04"),
-    ):
-        process, _ = run(tmp_path, *words)
-        assert process.returncode == 2
-        assert sentence in process.stderr
-        assert len(process.stderr.splitlines()) == 1
-    assert out.read_bytes() == before
-
-
 def test_an_interrupted_campaign_has_every_cell_about_as_often(tmp_path):
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}", realisations="3")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import os
 import random
 from collections.abc import Callable
@@ -70,15 +68,6 @@ def test_what_was_loaded_is_saved_as_the_same_file(content: bytes, tmp_path: Pat
     assert twice == once
     assert twice.method == once.method
     assert twice.to_xarray().identical(once.to_xarray())
-
-
-def test_the_measure_is_loaded_as_it_was_saved(tmp_path: Path) -> None:
-    flat = dataclasses.replace(PROBLEM, measure="flat", adhesion_range=None)
-    loop = adhesis.run_loop(ExactWave(flat), max_penetration=0.6, load_steps=6)
-    loop.save(tmp_path / "loop.nc")
-    found = adhesis.load(tmp_path / "loop.nc")
-    assert found == loop
-    assert found.problem.measure == "flat"
 
 
 def test_a_bit_that_is_flipped_is_found(content: bytes, tmp_path: Path) -> None:
@@ -269,13 +258,3 @@ def test_a_file_that_is_only_sealed_anew_is_loaded(
         file["mean_stress"][3] = file["mean_stress"][3]
     path.write_bytes(sealed(path.read_bytes()))
     assert adhesis.load(path) == loop
-
-
-def test_the_method_of_a_saved_loop_keeps_its_settings(
-    loop: adhesis.LoopResult, content: bytes, tmp_path: Path
-) -> None:
-    path = tmp_path / "loop.nc"
-    path.write_bytes(content)
-    with xr.open_dataset(path) as found:
-        assert json.loads(found.attrs["method"])["name"] == loop.method.name
-    assert adhesis.load(path).method.name == loop.method.name

@@ -115,11 +115,6 @@ def test_a_leg_that_ends_in_contact_is_audited_with_its_friction():
     assert abs(path.audit_residual) < 1e-4
 
 
-def test_more_pinning_loses_more_and_friction_grows_with_depth():
-    losses = [closed_form(ratio, depth)[0] for ratio in (1.1, 2.0, 4.0) for depth in (0.3, 0.6)]
-    assert losses == sorted(losses)
-
-
 def test_a_rough_loop_closes_its_audit_with_friction_between_jumps():
     loop = rough_loop()
     drops = sum(jump.energy_drop for jump in loop.jumps)
