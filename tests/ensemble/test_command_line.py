@@ -26,8 +26,6 @@ from adhesis.solver.registry import METHOD_NAMES
 from tests.support.campaign_support import environment, write_campaign
 from tests.support.wrong_values import outside
 
-CONTACT = ("--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5")
-
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):

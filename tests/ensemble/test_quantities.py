@@ -1,4 +1,4 @@
-"""Quantities with their units: of options and campaign files, by one reader; as they are printed."""
+"""Quantities with units: read from options and campaign files by one reader, and printed."""
 
 from __future__ import annotations
 
