@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -21,6 +19,7 @@ from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.fields import field_plan
 from adhesis.solver.model.jump import JUMP_KINDS
+from tests.support.campaign_support import run_python
 from tests.support.synthetic_results import campaign, rows, sign, write
 
 E_STAR, Q0 = 1e6 / 0.75, 1000.0
@@ -273,13 +272,7 @@ def test_memory_does_not_grow_with_the_curves(tmp_path):
         data["status"][:] = 1
     sign(path)
     size = path.stat().st_size / 2**20
-    out = subprocess.run(
-        [sys.executable, "-c", MEMORY, str(path)],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=Path(__file__).parent.parent.parent,
-    ).stdout.split()
+    out = run_python("-c", MEMORY, path).stdout.split()
     assert int(out[0]) == done
     assert size > 70
     assert float(out[1]) < 20, f"{out[1]} MB for a file of {size:.0f} MB"

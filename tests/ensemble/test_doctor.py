@@ -17,6 +17,7 @@ from adhesis.ensemble.run import launch
 from adhesis.solver import precompile as warm
 from adhesis.solver.runtime import disk_cache as code_cache
 from adhesis.solver.runtime.disk_cache import CodeFiles
+from tests.support.campaign_support import run_python
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
@@ -112,7 +113,7 @@ def test_versions_are_texts_and_do_not_start_mpi() -> None:
         "import json, sys; from adhesis.ensemble.versions import installed; v = installed(); "
         "print(json.dumps([v, 'mpi4py.MPI' in sys.modules]))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = run_python("-c", code)
     texts, loaded = json.loads(done.stdout)
     assert {"mpi", "hdf5", "fftw", "python", "numpy"} <= set(texts)
     assert all(isinstance(text, str) and text for text in texts.values())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.session import run_campaign
-from tests.support.campaign_support import adhesis, campaign_text, write_campaign
+from tests.support.campaign_support import adhesis, campaign_text, run_python, write_campaign
 from tests.support.fake_run import fake_engine
 
 HOSTILE = [
@@ -78,9 +77,7 @@ def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeyp
             "import sys; from adhesis.ensemble.run.lock import described, holder; "
             "print(described(holder(sys.argv[1])))"
         )
-        reported = subprocess.run(
-            [sys.executable, "-c", code, path], capture_output=True, text=True, check=True
-        )
+        reported = run_python("-c", code, path)
     assert reported.stdout.startswith(r"host node\x1b[2J, process ")
     for words in ([], ["--json"]):
         assert main(["status", str(path), *words]) == 0

@@ -6,7 +6,6 @@ import errno
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,10 @@ import pytest
 from adhesis.ensemble.command import main as command_line
 from adhesis.ensemble.command.main import _WITHOUT_NUMERICS, COMMANDS, main
 from tests.support.campaign_support import (
-    ROOT,
     adhesis_here,
     command,
     environment,
+    run_python,
     write_campaign,
 )
 
@@ -174,9 +173,7 @@ def test_a_python_process_survives_a_row_that_the_disk_did_not_take(finished: Pa
     )
     copy = finished / "copy.h5"
     copy.write_bytes((finished / "r.h5").read_bytes())
-    done = subprocess.run(
-        [sys.executable, "-c", code, copy], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = run_python("-c", code, copy)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == f"row 3 of {copy} could not be written: File too large\n"
 

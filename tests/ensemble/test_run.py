@@ -60,13 +60,14 @@ def test_a_run_from_nothing_to_done(tmp_path):
 
 def test_where_there_is_no_mpi_processes_compute_what_ranks_would(tmp_path, monkeypatch):
     monkeypatch.setattr(launch, "launcher", lambda: None)
-    process, out = run(tmp_path, "--ranks", "3", fake=None)
+    few = {"hurst": "[0.8]"}
+    process, out = run(tmp_path, "--ranks", "3", fake=None, **few)
     assert process.returncode == 0, process.stderr
     assert (
         "without MPI (mpirun and mpi4py): 2 workers as processes of this machine" in process.stderr
     )
     (tmp_path / "alone").mkdir()
-    alone, expected = run(tmp_path / "alone", fake=None)
+    alone, expected = run(tmp_path / "alone", fake=None, **few)
     assert alone.returncode == 0, alone.stderr
     assert differences(out, expected) == []
     with h5py.File(out) as file:
