@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,29 +11,15 @@ import pytest
 from adhesis.ensemble import versions
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.doctor import examine as doctor
-from adhesis.ensemble.run import launch
 from adhesis.solver import precompile as warm
 from adhesis.solver.runtime import disk_cache as code_cache
 from adhesis.solver.runtime.disk_cache import CodeFiles
 from tests.support.campaign_support import run_python
 
 
-def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from adhesis.ensemble.command.main import main; sys.exit(main())"
-    return subprocess.run(
-        [sys.executable, "-c", code, "doctor", *options],
-        env=launch.launch_environment(2) | env,
-        cwd=Path(__file__).parent.parent.parent,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-
-
 @pytest.fixture(scope="module")
 def findings() -> dict[str, Any]:
-    done = run_doctor("--json")
+    done = run_python("-m", "adhesis", "doctor", "--json")
     found: dict[str, Any] = json.loads(done.stdout)
     assert done.returncode == (0 if found["usable"] else 1), done.stderr
     return found
@@ -98,9 +82,8 @@ def test_a_launcher_that_hangs_is_given_up(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any]) -> None:
-    nested = run_doctor(
-        "--json", OMPI_COMM_WORLD_SIZE="4", OMPI_MCA_ess="pmi", PMIX_RANK="0", PMI_RANK="0"
-    )
+    of_a_rank = {"OMPI_COMM_WORLD_SIZE": "4", "OMPI_MCA_ess": "pmi", "PMIX_RANK": "0"}
+    nested = run_python("-m", "adhesis", "doctor", "--json", **of_a_rank, PMI_RANK="0")
     alone, within = findings["checks"], json.loads(nested.stdout)["checks"]
     assert [check["name"] for check in within] == [check["name"] for check in alone]
     for one, other in zip(alone, within, strict=True):
