@@ -32,7 +32,7 @@ lint: setup-test  ## ruff, mypy and the contracts of imports
 	$(bin)/mypy
 	$(bin)/lint-imports --no-cache --no-logo
 
-test: setup-slurm  ## the whole test suite, MPI and (where it can be installed) Slurm included
+test: setup-slurm  ## the whole test suite, with MPI, Slurm and a browser where they can be installed
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
 	    export MPIRUN && exec $(bin)/python -m pytest -rs -n $(JOBS) --dist loadscope --no-loadscope-reorder $(ARGS)
 

@@ -3,7 +3,7 @@
 #
 #   tools/setup.sh            MPI, parallel HDF5, Python packages, adhesis itself
 #   tools/setup.sh --test     besides, what tests and linters need (requirements-test.lock)
-#   tools/setup.sh --slurm    besides, as root on Debian or Ubuntu, the Slurm that tests/ensemble/test_slurm.py starts
+#   tools/setup.sh --slurm    besides, as root on Debian or Ubuntu, the Slurm and the browser that tests start
 #
 # What does not wait for one another is done side by side, and every ten seconds a line says what is
 # under way. Does nothing if nothing has changed since the last time. Environment:
@@ -156,15 +156,20 @@ apt_install() { # RUNLEVEL=1: install, but start no service
     apt-get install -y --no-install-recommends "$@" </dev/null ||
         { apt-get update && apt-get install -y --no-install-recommends "$@" </dev/null; }
 }
-need_slurm() {
-    [ "$slurm" = yes ] && ! command -v slurmctld >/dev/null && [ ! -e .setup/no-slurm ] && can_apt
+needs() { # NAME PROGRAM: does a test want a program that is missing and may be installed?
+    [ "$slurm" = yes ] && ! command -v "$2" >/dev/null && [ ! -e ".setup/no-$1" ] && can_apt
 }
-install_slurm() {
-    say "system packages for the test of the batch script: $SLURM"
-    if ! step slurm "system packages for that test" apt_install $SLURM; then
-        # Tried once: the test is skipped and says so, and set-up stays quick.
-        touch .setup/no-slurm
-    fi
+need_programs() { needs slurm slurmctld || needs browser chromium; }
+install_program() { # NAME TEXT PACKAGE…
+    local name=$1 text=$2
+    shift 2
+    say "system packages for $text: $*"
+    # Tried once: the tests are skipped and say so, and set-up stays quick.
+    step "$name" "system packages for $text" apt_install "$@" || touch ".setup/no-$name"
+}
+install_programs() {
+    if needs slurm slurmctld; then install_program slurm "the test of the batch script" $SLURM; fi
+    if needs browser chromium; then install_program browser "the tests of pages in a browser" chromium; fi
 }
 
 # Not the launcher's and not another installation's: what is in .venv is what is meant. Byte code is
@@ -190,10 +195,10 @@ if ready; then
         part tests "packages for tests and linters" install_tests
         required tests
         digest requirements.lock requirements-test.lock >"$stamp-test"
-        if need_slurm; then install_slurm; fi
+        install_programs
         say "done in $SECONDS s"
-    elif need_slurm; then
-        install_slurm
+    elif need_programs; then
+        install_programs
     else
         say "nothing to do"
     fi
@@ -391,7 +396,7 @@ choose_launcher() {
 step ranks "two ranks that see each other" choose_launcher ||
     warn "no mpirun here starts ranks that mpi4py sees as one job: adhesis run works in one process only (adhesis doctor tells more)"
 
-if need_slurm; then install_slurm; fi
+install_programs
 
 if [ -n "$why_serial" ]; then
     warn "no parallel writing, rank 0 writes the results file: $why_serial"

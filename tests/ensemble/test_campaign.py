@@ -89,19 +89,107 @@ def test_what_breaks_the_rule_of_a_key_is_named_with_it(key):
         assert len(sentence) < 400
 
 
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
-        ({"h_rms": "1.0"}, r"h_rms is 1\.0 with period 0\.001, so the rms slope is .+ must .+ are"),
-        ({"h_rms": "1e-18"}, r"h_rms is 1e-18 with period 0\.001, so the rms slope is .+: it must"),
-        ({"h_rms": "[1e-6, 1.0]"}, r"h_rms is 1\.0 with period 0\.001, so the rms slope is"),
-        ({"period": "[1e-3, 1e-9]"}, r"h_rms is 1e-06 with period 1e-09, so the rms slope is"),
-        ({"ratio": "50000", "h_rms": "1e-3"}, r"h_rms is 0\.001 with period 0\.001, so the rms"),
-    ],
-)
-def test_heights_and_period_in_different_units_are_refused_with_the_key(changes, sentence):
-    """Before any work: set up, such a profile would fill the memory."""
-    assert re.match(rf"c\.toml: \[profile\] {sentence}", refused(campaign_text(**changes)))
+# Keys that take the place of the campaign's, or are left out where no value follows; what is said.
+REFUSED = r"""
+# heights and period in different units: set up, such a profile would fill the memory
+h_rms = 1.0 -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
+h_rms = 1e-18 -> [profile] h_rms is 1e-18 with period 0.001, so the rms slope is
+h_rms = [1e-6, 1.0] -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
+period = [1e-3, 1e-9] -> [profile] h_rms is 1e-06 with period 1e-09, so the rms slope is
+ratio = 50000; h_rms = 1e-3 -> [profile] h_rms is 0.001 with period 0.001, so the rms
+ratio = 50000; h_rms = 1e-9; nodes_per_wave = 100000 ->
+    [solver] nodes_per_wave is 100000: with 50000 waves it must be at most 1342
+# numbers that can hardly be meant without a unit
+period = 1000 -> period is 1000, which would be 1000 m: give its unit, as in 1000um (1000m, if
+period = [1e-3, 2.5] -> period is 2.5, which would be 2.5 m
+period = 1e4; h_rms = 1 -> which would be
+work_of_adhesion = [0.04, 40] -> work_of_adhesion is 40, which would be 40 J/m²: give its unit, as
+stiffness = "1 GPa/mm" -> its unit must be one of Pa/m, kPa/m, MPa/m, GPa/m
+# keys that are missing or do not go together
+period = -> [profile] period is missing
+h_rms = -> none of h_rms, m2 and c0
+m2 = 0.1 -> h_rms and m2
+max_penetration = -> max_penetration is missing (Δ~max
+max_penetration =; control = "load" -> max_stress is missing (mean stress in Pa
+max_penetration =; control = "load"; max_stress = -5 -> max_stress is -5: it must be a positive
+max_penetration =; control = "force"; max_stress = 5 ->
+    control is 'force': it must be one of "separation"
+max_stress = 5 ->
+    max_stress is given: with control = "separation" a path turns at max_penetration, so
+control = "load"; max_stress = 5 -> max_penetration is given: with
+max_penetration =; control = "load"; max_stress = 5; stiffness = 1e9 ->
+    stiffness is given: with control = "load" a path turns at max_stress, so leave
+max_penetration =; max_stress = 200 -> which turns at that mean stress, give preload = 200.0
+max_penetration =; preload = 200; control = "load" -> a weight or a machine? For a weight give max
+preload = 200; max_penetration = [0.5, 0.9] -> several values beside a preload
+preload = 200; max_penetration =; stiffness = 1e9 -> max_penetration is missing
+preload = 200; max_penetration = 1.2 ->
+    max_penetration is 1.2: it must be a positive number from 1e-12 to 0.999999
+preload = [200, 200.0] -> a list of different values
+max_penetration = [0.5, 1] -> max_penetration is 1.0: it must be a positive number from
+adhesion_range = 1e-8; strength = 3e6 -> adhesion_range and strength: at most one of them
+work_of_adhesion_open = 0.02 -> _open is 0.02: it must be at least the work of adhesion, 0.04
+work_of_adhesion_open = [0.02, 0.08] -> work_of_adhesion_open is 0.02: it must be at least
+work_of_adhesion_open = 0.08; work_of_adhesion = [0, 0.04] ->
+    must be left out, as γ is 0, in every cell
+work_of_adhesion_open = 0.08; strength = 3e9 -> _open and a range or strength: at most one
+work_of_adhesion_open = 0.08; adhesion_range = 1e-12 -> and a range or strength: at most one
+work_of_adhesion_open = 0.08; method = "grid" ->
+    [solver] method is 'grid' beside a work_of_adhesion_open
+# rules that hold in every cell
+n0 = [1, 2]; ratio = [3, 60000] -> n0 · ratio is 120000
+n0 = 2; ratio = 90000 -> n0 · ratio is 180000
+ratio = [4, 16]; rolloff = [2, 8] -> rolloff is 8
+max_penetration = [0.6, 0.3]; field_penetrations = [0.1] ->
+    field_penetrations is given beside several max_penetration
+max_penetration =; control = "load"; max_stress = 300; field_penetrations = [0.1] ->
+    field_penetrations is given under a load
+field_penetrations = [0.7] -> field_penetrations
+field_penetrations = [-3.5] -> field_penetrations
+realisations = 2000000000 -> tasks: it must make at most
+load_steps = 100000; unloading_until = -1000 -> unloading curve has
+# keys that vary together
+h_rms = [1e-6, 2e-6]; zip = [["hurst", "young"]] ->
+    zip names 'young': it must name keys that are lists
+h_rms = [1e-6, 2e-6]; zip = [["hurst"]] -> zip is
+h_rms = [1e-6, 2e-6]; zip = [["hurst", "h_rms"], ["hurst", "work_of_adhesion"]] -> zip is
+h_rms = [1e-6, 2e-6, 3e-6]; zip = [["hurst", "h_rms"]] ->
+    zip joins lists of different lengths (h_rms 3, hurst 2)
+# a wanted precision
+batch = 8 -> [stop] relative_error is missing
+relative_error = 0.1; most = 1 -> [stop] most is 1: it must be at least realisations
+relative_error = 1.5; most = 70 -> relative_error is 1.5: it must be
+relative_error = 0.1; quantity = "h_max" ->
+    [stop] quantity is 'h_max': it must be one of "loss_dimensionless", "loss"
+"""
+CASES = [
+    line.split("-> ") for line in re.sub(r"->\n +", "-> ", REFUSED).splitlines() if "->" in line
+]
+
+
+def with_keys(changes: str) -> str:
+    """Return the campaign with these keys, each in its table."""
+    text = campaign_text()
+    for change in changes.split(";"):
+        key, _, value = (word.strip() for word in change.partition("="))
+        (table,) = {name for name, entry in RULES if entry == key}
+        text = re.sub(rf"(?m)^{key} = .*\n", "", text)
+        if key == "work_of_adhesion_open":  # which the grid refuses
+            text = text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
+        text = text if f"[{table}]" in text else f"{text}\n[{table}]\n"
+        if value:
+            text = text.replace(f"[{table}]\n", f"[{table}]\n{key} = {value}\n")
+    return text
+
+
+@pytest.mark.parametrize(("changes", "sentence"), CASES, ids=[changes for changes, _ in CASES])
+def test_keys_that_are_impossible_together_are_refused_by_name(changes, sentence, tmp_path):
+    path = tmp_path / "c.toml"
+    path.write_text(with_keys(changes))
+    with pytest.raises(InputError) as refusal:
+        load_campaign(path)
+    assert sentence in str(refusal.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_keys_that_vary_together_are_not_refused_for_what_they_never_are_together():
@@ -111,12 +199,6 @@ def test_keys_that_vary_together_are_not_refused_for_what_they_never_are_togethe
     assert parse_campaign(zipped).task_count
     sentence = refused(campaign_text(**lists))
     assert "h_rms is 1e-06 with period 1e-09, so the rms slope is" in sentence
-
-
-def test_a_grid_that_fills_the_memory_is_refused():
-    text = campaign_text(ratio="50000", h_rms="1e-9", nodes_per_wave="100000")
-    sentence = refused(text)
-    assert "[solver] nodes_per_wave is 100000: with 50000 waves it must be at most 1342" in sentence
 
 
 def test_a_number_of_any_length_is_refused_in_one_short_sentence():
@@ -132,9 +214,6 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         (campaign_text() + "\n[extra]\nx = 1\n", "'extra' is unknown"),
         (campaign_text().replace("n0", '"a\\nb"'), "unknown"),
         ("profile = 3\n", "profile is 3: it must be a table"),
-        (campaign_text().replace("period = 1e-3", ""), "[profile] period is missing"),
-        (campaign_text().replace("h_rms = 1e-6", ""), "none of h_rms, m2 and c0"),
-        (campaign_text().replace("h_rms = 1e-6", "h_rms = 1e-6\nm2 = 0.1"), "h_rms and m2"),
         ("[profile\n", "is not valid TOML"),
         (
             campaign_text().replace("n0 =", "n0 = 3\nn0 ="),
@@ -142,9 +221,6 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         ),
         ("[stop]\nmost = 3\nmost = 3", "the key most on line 3 is given before"),
         ("x = " + "[" * 5000, "is not valid TOML"),
-        (campaign_text(ratio="90000", n0="2"), "n0 · ratio is 180000"),
-        (campaign_text(realisations="2000000000"), "tasks: it must make at most"),
-        (campaign_text(load_steps="100000", unloading_until="-1000"), "unloading curve has"),
         ("# " + "x" * 70_000, "bytes"),
         ("", "[profile] period is missing"),
     ],
@@ -154,10 +230,6 @@ def test_bad_files_are_refused_in_one_sentence(text, words):
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    with pytest.raises(InputError, match="cannot be read: No such file"):
-        load_campaign(tmp_path / "none.toml")
-    with pytest.raises(InputError, match="is a directory, not a file"):
-        load_campaign(tmp_path)
     binary = tmp_path / "b.toml"
     binary.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="not UTF-8"):
@@ -189,10 +261,6 @@ def test_another_measure_is_another_campaign():
     assert changes.other == ("material.measure is 'flat' here and 'arc' there",)
     assert not changes.grown
     assert [make_problem(one, one.tasks()[0]).measure for one in (old, new)] == ["arc", "flat"]
-    with pytest.raises(
-        InputError, match=r"measure is .projected.: it must be one of .arc., .flat."
-    ):
-        parse_campaign(text.replace("[material]", '[material]\nmeasure = "projected"'))
 
 
 def test_growth_and_other_changes_are_told_apart():
@@ -349,14 +417,6 @@ def test_lists_vary_together_where_that_is_asked_for():
     cells = {(h, dict(o)["h_rms"]) for h, o in ((t.hurst, t.others) for t in campaign.tasks())}
     assert cells == {(0.8, 2e-6), (0.7, 1e-6)}
     assert campaign.task_count == 2 * 2 * 2
-    for zipped, words in (
-        ('[["hurst", "young"]]', "zip names 'young': it must name keys that are lists"),
-        ('[["hurst"]]', "zip is"),
-        ('[["hurst", "h_rms"], ["hurst", "work_of_adhesion"]]', "zip is"),
-    ):
-        assert words in refused(campaign_text(h_rms="[1e-6, 2e-6]", seed=f"5\nzip = {zipped}"))
-    longer = campaign_text(h_rms="[1e-6, 2e-6, 3e-6]", seed='5\nzip = [["hurst", "h_rms"]]')
-    assert "zip joins lists of different lengths (h_rms 3, hurst 2)" in refused(longer)
 
 
 def test_a_number_may_become_an_axis_and_an_axis_longer():
@@ -376,13 +436,6 @@ def test_a_number_may_become_an_axis_and_an_axis_longer():
     assert compare(one, three).other
 
 
-def test_rules_hold_in_every_cell():
-    assert "n0 · ratio is 120000" in refused(campaign_text(n0="[1, 2]", ratio="[3, 60000]"))
-    assert "rolloff is 8" in refused(campaign_text(ratio="[4, 16]\nrolloff = [2, 8]"))
-    text = campaign_text(max_penetration="[0.6, 0.3]", jumps="8\nfield_penetrations = [0.1]")
-    assert "field_penetrations is given beside several max_penetration" in refused(text)
-
-
 def under(cycle):
     return campaign_text().replace("max_penetration = 0.6", cycle)
 
@@ -398,41 +451,11 @@ def test_a_path_turns_where_its_control_lets_it_turn():
     assert load.penetration_unit(first) == 1.0
 
 
-@pytest.mark.parametrize(
-    ("cycle", "sentence"),
-    [
-        ("", "max_penetration is missing (Δ~max"),
-        ('control = "load"', "max_stress is missing (mean stress in Pa"),
-        ('control = "load"\nmax_stress = -5', "max_stress is -5: it must be a positive"),
-        (
-            'control = "force"\nmax_stress = 5',
-            "control is 'force': it must be one of \"separation\"",
-        ),
-        (
-            "max_penetration = 0.5\nmax_stress = 5",
-            'max_stress is given: with control = "separation" a path turns at max_penetration, so',
-        ),
-        (
-            'control = "load"\nmax_stress = 5\nmax_penetration = 0.5',
-            "max_penetration is given: with",
-        ),
-        (
-            'control = "load"\nmax_stress = 5\nstiffness = 1e9',
-            'stiffness is given: with control = "load" a path turns at max_stress, so leave',
-        ),
-    ],
-)
-def test_turning_points_that_do_not_belong_to_the_control_are_refused(cycle, sentence):
-    assert sentence in refused(under(cycle))
-
-
 def test_fields_under_a_load_are_kept_at_parts_of_it():
     text = under('control = "load"\nmax_stress = 300')
     plan = field_plan(parse_campaign(text))
     np.testing.assert_allclose(plan.penetration, [0.25, 0.75, 1.0])  # of 4 load steps
     assert plan.max_stress == 300
-    reported = refused(text.replace("jumps = 8", "jumps = 8\nfield_penetrations = [0.1]"))
-    assert "field_penetrations is given under a load" in reported
 
 
 def test_the_strength_of_the_interface_is_a_key_of_the_material_and_may_be_an_axis():
@@ -444,5 +467,3 @@ def test_the_strength_of_the_interface_is_a_key_of_the_material_and_may_be_an_ax
     assert found == {0.01 / 1e-8, 0.04 / 1e-8, 0.01 / 2e-8, 0.04 / 2e-8}
     given = parse_campaign(campaign_text(poisson="0.5\nstrength = 3e6"))
     assert {make_problem(given, task).strength for task in given.tasks()} == {3e6}
-    both = refused(campaign_text(poisson="0.5\nadhesion_range = 1e-8\nstrength = 3e6"))
-    assert "adhesion_range and strength: at most one of them" in both

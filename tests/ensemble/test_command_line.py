@@ -26,8 +26,6 @@ from adhesis.solver.registry import METHOD_NAMES
 from tests.support.campaign_support import environment, write_campaign
 from tests.support.wrong_values import outside
 
-CONTACT = ("--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5")
-
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
@@ -50,132 +48,6 @@ def refused(capsys, words) -> str:
 
 
 # ---------------------------------------------------------------------- bad options
-
-BAD = {
-    "new": [
-        ("my.txt", "FILE.toml is my.txt: the name must end in .toml"),
-        ("c.toml", "FILE.toml is c.toml, which exists: give another name"),
-        ("none/my.toml", "FILE.toml is none/my.toml: there is no directory none"),
-    ],
-    "sample": [
-        ("text", "FILE is text, which exists"),
-        ("directory", "FILE is directory: it is a directory"),
-    ],
-    "completion": [
-        ("", "SHELL is ''"),
-        ("fish", "SHELL is 'fish': it must be one of 'bash', 'zsh'"),
-    ],
-    "run": [
-        ("", "CAMPAIGN.toml is ''"),
-        ("none.toml", "none.toml"),
-        ("directory", "directory"),
-        ("text", "is not valid TOML"),
-        ("c.toml --out ''", "--out is ''"),
-        ("c.toml --out directory", "is a directory"),
-        ("c.toml --out none/r.h5", "no folder"),
-        ("c.toml --out text", "is not a results file"),
-        ("c.toml --ranks 100000", f"at most {launch.largest_number_of_ranks()} are started here"),
-        *((f"c.toml --ranks {bad}", f"--ranks is '{bad}'") for bad in ("x", "0", "-1", "nan")),
-        *(
-            (f"c.toml --walltime {bad}", f"--walltime is '{bad}': it must")
-            for bad in ("x", "0", "-1", "nan")
-        ),
-        *(
-            (f"c.toml {option} {bad}", f"{option} is '{bad}'")
-            for option in ("--max-failures", "--patience")
-            for bad in ("x", "-1", "nan", "1e99", "inf")
-        ),
-        *(
-            (f"c.toml --out p.h5 --part {bad}", f"--part is '{bad}': it must be K/N")
-            for bad in ("x", "0/3", "4/3", "1/0")
-        ),
-        ("c.toml --part 1/2", "--part needs --out"),
-        ("c.toml --redo some", "--redo is 'some'"),
-        ("c.toml --hurst 0.7", "--hurst needs --redo: it chooses the tasks to compute again"),
-        ("c.toml --realisation 1", "--realisation needs --redo"),
-        ("c.toml --redo all --work-of-adhesion 20mJ", "--work-of-adhesion is '20mJ': it must be"),
-        (
-            "c.toml --redo all --work-of-adhesion 40",
-            "--work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2",
-        ),
-        *(
-            (f"c.toml --redo all {option} {bad}", f"{option} is '{bad}'")
-            for option in ("--hurst", "--realisation")
-            for bad in ("x", "-1", "nan")
-        ),
-        ("c.toml --redo all --work-of-adhesion x", "--work-of-adhesion is 'x': it must be"),
-        *(
-            (
-                f"c.toml --redo all --work-of-adhesion {bad}",
-                f"--work-of-adhesion is {bad}: this campaign has no such task",
-            )
-            for bad in ("-1", "nan")
-        ),
-    ],
-    "status": [
-        ("", "FILE.h5 is ''"),
-        ("none.h5", "none.h5"),
-        ("directory", "directory"),
-        ("text", "is not a results file"),
-        *(
-            (f"r.h5 --interval {bad}", f"--interval is '{bad}'")
-            for bad in ("x", "-1", "0", "nan", "inf", "1e9")
-        ),
-        ("r.h5 --watch --json", "--watch and --json"),
-    ],
-    "merge": [
-        ("r.h5", "required: --out"),
-        ("r.h5 --out ''", "--out is ''"),
-        ("'' --out all.h5", "PART.h5 is ''"),
-        ("none.h5 --out all.h5", "none.h5"),
-        ("text --out all.h5", "is not a results file"),
-        ("r.h5 --out none/all.h5", "no folder"),
-    ],
-    "report": [
-        ("r.h5", "required: --to"),
-        ("r.h5 --to ''", "--to is ''"),
-        ("'' --to out", "FILE.h5 is ''"),
-        ("none.h5 --to out", "none.h5"),
-        ("directory --to out", "directory"),
-        ("text --to out", "is not a results file"),
-    ],
-    "loop": [
-        ("--hurst 0.8 --decimal x", "--decimal is 'x': it must be one of ',', '.'"),
-        ("--heights none.npy --period 1e-3", "with --heights the material has to be given"),
-        ("--trace none.csv --young 1e6", "with --trace the material has to be given"),
-        ("--hurst 0.8 --csv directory", "--csv is directory: it is a directory"),
-    ],
-    "trace": [
-        ("text", "required: --work-of-adhesion, --young, --poisson"),
-        (f"none.csv {' '.join(CONTACT)} --to out", "none.csv"),
-        (f"text {' '.join(CONTACT)} --to out --processes 0", "--processes is 0"),
-    ],
-    "validate": [("--method ''", "--method is ''"), ("--method magic", "--method is 'magic'")],
-    "bench": [
-        *((f"--budget {bad}", "--budget is") for bad in ("0", "-1", "nan", "inf")),
-        ("--to text", "--to is text: "),
-        ("--to text/below", "--to is text/below: "),
-    ],
-    "warm": [("--own 3", "unrecognized arguments: 3")],
-    "doctor": [
-        ("--in none", "--in is none: it must be a folder that can be written"),
-        ("--in text", "--in is text: it must be a folder"),
-        ("--in ''", "--in is ''"),
-    ],
-}
-
-
-@pytest.mark.parametrize(
-    ("name", "words", "sentence"),
-    [(name, words, sentence) for name, cases in BAD.items() for words, sentence in cases],
-)
-def test_bad_values_are_one_sentence(name, words, sentence, folder, capsys):
-    before = sorted(path.name for path in folder.iterdir())
-    line = refused(capsys, [name, *(shlex.split(words) or [""])])
-    assert line.startswith(f"adhesis {name}: ")
-    assert sentence in line
-    after = sorted(path.name for path in folder.iterdir())
-    assert [path for path in after if not path.endswith(".lock")] == before
 
 
 # Options of `adhesis loop` that are one number, with the rule that Python and campaigns have too.
@@ -231,30 +103,6 @@ def test_an_option_that_is_given_twice_is_refused(words, capsys):
     many = parser_of("run").parse(["c.toml", "--hurst", "0.7", "--hurst", "0.8"])
     assert many.hurst == [0.7, 0.8]  # may be repeated
     assert not [name for name in vars(many) if name.startswith("_")]
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        *("run c.toml --out {}.h5", "run {}.toml"),
-        *("new {}.toml", "sample {}.csv", "merge a.h5 --out {}.h5", "merge {}.h5 --out a.h5"),
-        *("status {}.h5", "verify {}.h5", "report {}.h5 --to x", "bench --to {}", "doctor --in {}"),
-        *("trace {}.csv --to x CONTACT", "trace c.csv --to {} CONTACT"),
-        "loop --heights {}.csv --period 2mm CONTACT",
-        *(f"loop --hurst 0.8 --{name} {{}}.{name}" for name in ("json", "csv")),
-        *("loop --hurst 0.8 --fields {}.npz", "loop --hurst 0.8 --film {}.html"),
-    ],
-)
-def test_a_name_that_is_too_long_is_one_sentence(words, capsys, tmp_path, monkeypatch):
-    """Of a file or folder, of the folder that it is in, and of the whole path."""
-    monkeypatch.chdir(tmp_path)
-    write_campaign(tmp_path)
-    assert main(["sample", "c.csv"]) == 0
-    capsys.readouterr()
-    words = words.replace("CONTACT", " ".join(CONTACT))
-    for name in ("y" * 256, "y" * 300 + "/x", "z/" * 2100 + "x"):
-        assert name in refused(capsys, words.format(name).split())
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.csv", "c.toml"]
 
 
 def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):

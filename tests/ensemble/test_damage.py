@@ -26,6 +26,7 @@ from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import differences, write_campaign
+from tests.support.crafted_hdf5 import made, put, virtual
 from tests.support.fake_run import fake_engine
 from tools.damage import Damage
 
@@ -166,47 +167,24 @@ def test_an_axis_that_is_not_the_campaigns_is_refused(damage, path):
     assert "its unloading_penetration is not that of its campaign" in sentence
 
 
-def _huge(file):
-    del file["loss"]
-    file.create_dataset("loss", (10**12,), "f8")
+PROMISES = {
+    "a size beyond memory": lambda file: made(file, "loss", (10**12,)),
+    "a name less": lambda file: file.move("loss", "moved"),
+    "what another file holds": lambda file: virtual(file, "loss", "sound.h5", "loss"),
+    "any file": lambda file: made(file, "loss", external=[("/proc/self/environ", 0, 64)]),
+    "a long text": lambda file: put(
+        file.attrs, file.attrs["campaign"] + "#" * 40_000_000, "campaign"
+    ),
+}
 
 
-def _without_one(file):
-    file.move("loss", "moved")
-
-
-def _elsewhere(file):
-    del file["loss"]
-    file["loss"] = h5py.ExternalLink("sound.h5", "/loss")
-
-
-def _virtual(file):
-    shape = file["loss"].shape
-    del file["loss"]
-    layout = h5py.VirtualLayout(shape, "f8")
-    layout[:] = h5py.VirtualSource("sound.h5", "loss", shape)
-    file.create_virtual_dataset("loss", layout)
-
-
-def _from_any_file(file):
-    shape = file["loss"].shape
-    del file["loss"]
-    file.create_dataset("loss", shape, "f8", external=[("/proc/self/environ", 0, 64)])
-
-
-def _long_text(file):
-    file.attrs["campaign"] = file.attrs["campaign"] + "#" * 40_000_000
-
-
-@pytest.mark.parametrize(
-    "change", [_huge, _without_one, _elsewhere, _virtual, _from_any_file, _long_text]
-)
+@pytest.mark.parametrize("kind", PROMISES)
 def test_headers_that_promise_something_else_are_refused_before_they_are_read(
-    path, change, monkeypatch
+    path, kind, monkeypatch
 ):
     read = []
     monkeypatch.setattr(Results, "column", lambda self, name, rows=None: read.append(name))
-    changed(path, change)
+    changed(path, PROMISES[kind])
     sign_all(path)
     with pytest.raises(InputError) as caught:
         Results(path)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,29 +13,15 @@ import pytest
 from adhesis.ensemble import versions
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.doctor import examine as doctor
-from adhesis.ensemble.run import launch
 from adhesis.solver import precompile as warm
 from adhesis.solver.runtime import disk_cache as code_cache
 from adhesis.solver.runtime.disk_cache import CodeFiles
-from tests.support.campaign_support import has_ended
-
-
-def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from adhesis.ensemble.command.main import main; sys.exit(main())"
-    return subprocess.run(
-        [sys.executable, "-c", code, "doctor", *options],
-        env=launch.launch_environment(2) | env,
-        cwd=Path(__file__).parent.parent.parent,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+from tests.support.campaign_support import has_ended, run_python
 
 
 @pytest.fixture(scope="module")
 def findings() -> dict[str, Any]:
-    done = run_doctor("--json")
+    done = run_python("-m", "adhesis", "doctor", "--json")
     found: dict[str, Any] = json.loads(done.stdout)
     assert done.returncode == (0 if found["usable"] else 1), done.stderr
     return found
@@ -92,7 +76,7 @@ def test_a_launcher_that_hangs_is_given_up(tmp_path: Path, monkeypatch: pytest.M
     hanging = tmp_path / "mpirun"
     hanging.write_text('#!/bin/sh\n[ "$1" = --version ] || exec sleep 600\n')
     hanging.chmod(0o755)
-    monkeypatch.setattr(doctor, "_TIME_LIMIT", 5.0)
+    monkeypatch.setattr(doctor, "_TIME_LIMIT", 2.0)
     monkeypatch.setenv("MPIRUN", str(hanging))
     diagnosis = doctor.examine()
     assert not diagnosis.usable
@@ -117,9 +101,8 @@ def test_an_interrupt_ends_what_was_started_before_its_folder_goes(tmp_path: Pat
 
 
 def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any]) -> None:
-    nested = run_doctor(
-        "--json", OMPI_COMM_WORLD_SIZE="4", OMPI_MCA_ess="pmi", PMIX_RANK="0", PMI_RANK="0"
-    )
+    of_a_rank = {"OMPI_COMM_WORLD_SIZE": "4", "OMPI_MCA_ess": "pmi", "PMIX_RANK": "0"}
+    nested = run_python("-m", "adhesis", "doctor", "--json", **of_a_rank, PMI_RANK="0")
     alone, within = findings["checks"], json.loads(nested.stdout)["checks"]
     assert [check["name"] for check in within] == [check["name"] for check in alone]
     for one, other in zip(alone, within, strict=True):
@@ -132,7 +115,7 @@ def test_versions_are_texts_and_do_not_start_mpi() -> None:
         "import json, sys; from adhesis.ensemble.versions import installed; v = installed(); "
         "print(json.dumps([v, 'mpi4py.MPI' in sys.modules]))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = run_python("-c", code)
     texts, loaded = json.loads(done.stdout)
     assert {"mpi", "hdf5", "fftw", "python", "numpy"} <= set(texts)
     assert all(isinstance(text, str) and text for text in texts.values())

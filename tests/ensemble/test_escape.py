@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -19,9 +18,9 @@ from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.lock import RunLock, holder
+from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.session import run_campaign
-from tests.support.campaign_support import adhesis, campaign_text, write_campaign
+from tests.support.campaign_support import adhesis, campaign_text, run_python, write_campaign
 from tests.support.fake_run import fake_engine
 
 HOSTILE = [
@@ -78,9 +77,7 @@ def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeyp
             "import sys; from adhesis.ensemble.run.lock import described, holder; "
             "print(described(holder(sys.argv[1])))"
         )
-        reported = subprocess.run(
-            [sys.executable, "-c", code, path], capture_output=True, text=True, check=True
-        )
+        reported = run_python("-c", code, path)
     assert reported.stdout.startswith(r"host node\x1b[2J, process ")
     for words in ([], ["--json"]):
         assert main(["status", str(path), *words]) == 0
@@ -115,38 +112,6 @@ def test_images_come_from_the_folder_of_the_page_alone(tmp_path):
 
 
 # ---------------------------------------------------------------------------------- links
-
-
-@pytest.mark.parametrize("kind", ["symbolic", "dangling", "hard", "pipe"])
-def test_a_link_in_place_of_the_lock_is_refused_and_nothing_written(tmp_path, kind):
-    precious, results = tmp_path / "precious", tmp_path / "r.h5"
-    precious.write_text("mine")
-    lock = tmp_path / "r.h5.lock"
-    if kind == "symbolic":
-        lock.symlink_to(precious)
-    elif kind == "dangling":
-        lock.symlink_to(tmp_path / "new")
-    elif kind == "hard":
-        lock.hardlink_to(precious)
-    else:
-        os.mkfifo(lock)
-    with pytest.raises(InputError, match=r"r\.h5\.lock is a link or no ordinary file.* remove it"):
-        RunLock(results).acquire(1, 0.0)
-    assert holder(results) is None
-    assert precious.read_text() == "mine"
-    assert not (tmp_path / "new").exists()
-    assert lock.is_symlink() or lock.exists()
-
-
-def test_a_link_in_place_of_the_unfinished_file_is_removed_and_not_followed(tmp_path, campaign):
-    precious, results = tmp_path / "precious", tmp_path / "r.h5"
-    precious.write_text("mine")
-    (tmp_path / "r.h5.part").symlink_to(precious)
-    create(results, campaign)
-    assert precious.read_text() == "mine"
-    assert not results.is_symlink()
-    with Results(results) as file:
-        assert len(file) == campaign.task_count
 
 
 def test_two_names_of_one_results_file_have_one_lock(tmp_path):

@@ -6,18 +6,18 @@ import errno
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from adhesis.ensemble.command import main as command_line
 from adhesis.ensemble.command.main import _WITHOUT_NUMERICS, COMMANDS, main
 from tests.support.campaign_support import (
-    ROOT,
     adhesis_here,
     command,
     environment,
+    run_python,
     write_campaign,
 )
 
@@ -47,14 +47,32 @@ WORDS: dict[str, tuple[object, ...]] = {
     "doctor": (),
     "completion": ("bash",),
 }
-# Every command meets the value of each limit that is hardest to bear, and these all five.
-HARDEST = {"n": 5, "v": 600_000, "f": 0, "u": 1}
-ALL_FIVE = {"n": ("status",), "v": ("status",), "f": ("run", "merge"), "u": ("status",)}
+# The value of each limit that is hardest to bear, and the commands that meet it each in a way of
+# their own: with few modules or many, files, threads, processes. --slow: all commands and values.
+HARDEST = {
+    "n": (5, ("new", "run", "status", "loop", "doctor")),
+    "v": (600_000, ("run", "report", "loop", "trace", "warm")),
+    "f": (0, ("new", "run", "merge", "loop", "sample", "warm", "doctor")),
+    "u": (1, ("run", "verify", "loop", "validate", "bench", "doctor")),
+}
+RANGES = {"n": ("status",), "v": ("status",), "f": ("run",), "u": ("status",)}
+AS_OTHERS = pytest.mark.slow(reason="a start of Python each, refused where other commands are")
+
+
+def case(limit: str, value: int, name: str) -> Any:
+    """Return the case, marked as slow if others are like it."""
+    hardest, names = HARDEST[limit]
+    alone = (value == hardest and name in names) or (
+        name in RANGES[limit] and value in LIMITS[limit][1::2]
+    )
+    return pytest.param(limit, value, name, marks=() if alone else AS_OTHERS)
+
+
 CASES = [
-    (limit, value, name)
+    case(limit, value, name)
     for limit, values in LIMITS.items()
     for name in WORDS
-    for value in (values if name in ALL_FIVE[limit] else (HARDEST[limit],))
+    for value in (values if name in (*RANGES[limit], "merge") else (HARDEST[limit][0],))
     if (limit, name) not in (("f", "bench"), ("f", "report"))  # see test_outputs.py: both write so
 ]
 # It goes on for long where files are limited; its first line shows that it has begun.
@@ -155,9 +173,7 @@ def test_a_python_process_survives_a_row_that_the_disk_did_not_take(finished: Pa
     )
     copy = finished / "copy.h5"
     copy.write_bytes((finished / "r.h5").read_bytes())
-    done = subprocess.run(
-        [sys.executable, "-c", code, copy], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = run_python("-c", code, copy)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == f"row 3 of {copy} could not be written: File too large\n"
 

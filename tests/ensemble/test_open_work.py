@@ -12,7 +12,6 @@ import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report.findings import verdict
 from adhesis.ensemble.report.paper import is_reading
 from adhesis.ensemble.report.tables.loss_tables import losses
@@ -60,21 +59,6 @@ def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     assert line in capsys.readouterr().out.splitlines()
 
 
-def test_a_loop_of_one_work_of_adhesion_is_as_before(tmp_path, capsys):
-    found = []
-    for more in ((), ("--work-of-adhesion-open", 0.04)):
-        out = tmp_path / "loop.json"
-        words = ("--work-of-adhesion", 0.04, *more, "--json", out, "--quiet")
-        assert run("loop", *ROUGH, "--load-steps", 4, *words) == 0
-        found.append(json.loads(out.read_text()))
-    changing = ("seconds", "provenance", "warnings")
-    one, both = ({k: v for k, v in data.items() if k not in changing} for data in found)
-    assert one == both
-    assert (one["work_of_adhesion_open"], one["friction"]) == (0.04, 0.0)
-    assert "receded" not in one
-    assert "friction" not in capsys.readouterr().out
-
-
 def test_a_path_lists_its_friction(tmp_path, capsys):
     words = ("--work-of-adhesion-open", 0.08, "--load-steps", 5, "--quiet")
     out = tmp_path / "path.json"
@@ -85,25 +69,6 @@ def test_a_path_lists_its_friction(tmp_path, capsys):
     (part,) = data["minor_loops"]
     assert abs(part["audit_residual"]) < 1e-3 * data["loss"]
     assert "\nfriction    " in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--work-of-adhesion-open", 0.01), "-open is 0.01 J/m²: it must be at least the work of"),
-        (("--work-of-adhesion-open", "0,08"), "--work-of-adhesion-open"),
-        (("--work-of-adhesion-open", 0.08, "--strength", 1e9), "beside a strength of"),
-        (("--work-of-adhesion-open", 0.08, "--adhesion-range", "1nm"), "give one of them"),
-        (("--work-of-adhesion-open", 0.08, "--work-of-adhesion", 0), "left out, as γ is 0"),
-        (("--work-of-adhesion-open", 0.08, "--method", "grid"), "--method is 'grid' beside a work"),
-        (("--work-of-adhesion-open", 0.08, "--nodes-per-wave", 32), "--nodes-per-wave is 32 besi"),
-    ],
-)
-def test_impossible_options_are_refused_in_one_sentence(words, message, capsys):
-    assert run("loop", *ROUGH, *words, "--quiet") == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1 or error.startswith("usage")
 
 
 # ---------------------------------------------------------------------- trace
@@ -143,26 +108,6 @@ def test_the_answer_of_a_trace_has_its_friction(capsys):
     assert "which recede at 0.02 J/m²" in str(answer)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("0.04,0.02", "--work-of-adhesion-open", 0.1), "beside 2 works of adhesion: give one of"),
-        (("0.04", "--work-of-adhesion-open", 0.01), "-open is 0.01 J/m²: it must be at least the"),
-        (("0.04", "--work-of-adhesion-open", 0.08, "--strength", 1e9), "beside a strength of 1e"),
-        (("0.04", "--work-of-adhesion-open", 0.08, "--method", "grid"), "--method is 'grid' besi"),
-    ],
-)
-def test_a_trace_refuses_them_before_its_loops(words, message, tmp_path, capsys):
-    file, prepared = tmp_path / "t.txt", small_trace()
-    np.savetxt(
-        file, np.column_stack([prepared.trace.step * np.arange(200), prepared.trace.heights])
-    )
-    more = ("--unit", "m", "--young", 1e6, "--poisson", 0.5, "--to", tmp_path / "out", "--quiet")
-    assert run("trace", file, "--work-of-adhesion", *words, *more) == 2
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 # ---------------------------------------------------------------------- campaign
 
 
@@ -185,29 +130,6 @@ def test_zip_joins_it_with_the_work_of_adhesion():
         for task in campaign.tasks()
     }
     assert found == {(0.01, 0.02), (0.04, 0.08)}
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (text("0.02"), "_open is 0.02: it must be at least the work of adhesion, 0.04"),
-        (text("[0.02, 0.08]"), "work_of_adhesion_open is 0.02: it must be at least"),
-        (text("0.08", work_of_adhesion="[0, 0.04]"), "must be left out, as γ is 0, in every cell"),
-        (text("-1"), "work_of_adhesion_open is -1: it must be"),
-        (text('"80 mm"'), "work_of_adhesion_open"),
-        (text("0.08\nstrength = 3e9"), "_open and a range or strength: at most one"),
-        (text("0.08\nadhesion_range = 1e-12"), "and a range or strength: at most one"),
-        (
-            campaign_text(poisson="0.5\nwork_of_adhesion_open = 0.08"),
-            "[solver] method is 'grid' beside a work_of_adhesion_open",
-        ),
-    ],
-)  # fmt: skip
-def test_campaigns_that_cannot_be_computed_are_refused(given, message):
-    with pytest.raises(InputError) as error:
-        parse_campaign(given)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_equal_works_of_adhesion_are_those_of_one():

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 import adhesis
 from adhesis.ensemble.campaign.tasks import Part
-from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report.figures.catalogue import (
     HEIGHTS,
     LOOPS,
@@ -150,8 +149,3 @@ def test_every_figure_is_drawn_into_axes_that_are_given(results):
             draw(ax=Figure().subplots(1, len(alone.axes) + 1))
         with pytest.raises(TypeError, match="ax is 3: it must be one Axes of matplotlib"):
             draw(ax=3)
-
-
-def test_bad_files_are_refused(tmp_path):
-    with pytest.raises(InputError, match="does not exist"):
-        adhesis.open(tmp_path / "none.h5")

@@ -22,6 +22,7 @@ import adhesis.ensemble.command.loop as loop_command
 import adhesis.ensemble.command.trace as trace_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.run.lock import holder
 from adhesis.ensemble.run.session import run_campaign
 from adhesis.solver.references.exact_wave import ExactWave
 from tests.support.campaign_support import campaign_text
@@ -33,7 +34,6 @@ LONGEST = 20  # s; nothing here takes one
 PROBLEM = adhesis.Problem(adhesis.single_wave(1e-6, 1e-3), adhesis.HalfSpace(1e6, 0.5), 1e-4)
 MATERIAL = ("--work-of-adhesion", "0.01", "--young", "1e6", "--poisson", "0.5")
 LOOP = ("loop", "--heights", "wave.csv", "--period", "1e-3", *MATERIAL, "--load-steps", "2")
-TRACE = (*MATERIAL, "--unit", "um")
 
 # ------------------------------------------------------------------------------- crafted paths
 
@@ -50,6 +50,12 @@ def _shared(path: Path, target: str) -> None:
     os.lchown(path, ANOTHER_USER, ANOTHER_USER)
 
 
+def _chained(path: Path) -> None:
+    Path("all").mkdir()
+    _shared(Path("all/planted"), "../apart/precious")
+    path.symlink_to("all/planted")
+
+
 MADE: dict[str, Callable[[Path], None]] = {
     "pipe": os.mkfifo,
     "socket": _socket,
@@ -63,29 +69,34 @@ MADE: dict[str, Callable[[Path], None]] = {
     "link to nothing": lambda path: path.symlink_to("apart/new"),
     "link to itself": lambda path: path.symlink_to(path.name),
     "link of another user": lambda path: _shared(path, "apart/precious"),
+    "link to that of another user": lambda path: _chained(path),
     "second name": lambda path: path.hardlink_to("apart/precious"),
 }
 NAMED = {
     "a file for a folder": "apart/precious/x",
     "no folder": "none/x",
     "a name too long": 300 * "x",
+    "a name of a folder too long": 300 * "x" + "/x",
+    "a path too long": 2100 * "z/" + "x",
     "a device": "/dev/zero",
     "a block device": "/dev/loop-none",
 }
+LONG = ("a name too long", "a name of a folder too long", "a path too long")
 OF_READING = (
     *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
     *("link to an endless device", "link to nothing", "link to itself"),
-    *("a file for a folder", "no folder", "a name too long", "a device"),
+    *("a file for a folder", "no folder", "a device", *LONG),
 )
 OF_WRITING = (
     *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
-    *("link to itself", "link of another user", "a file for a folder", "no folder"),
-    "a name too long",
+    *("link to itself", "link of another user", "link to that of another user"),
+    *("a file for a folder", "no folder"),
+    *LONG,
 )
 OF_FOLDERS = (
     *("pipe", "socket", "file", "link to a pipe", "link to a socket", "link to a file"),
     *("link to an endless device", "link to nothing", "link to itself", "link of another user"),
-    *("a file for a folder", "a name too long", "a device"),
+    *("a file for a folder", "a device", *LONG),
 )
 
 
@@ -120,7 +131,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     Path("c.toml").write_text(campaign_text())
 
     def make(kind: str, ending: str = "") -> str:
-        if kind == "link of another user" and os.geteuid() != 0:
+        if kind.endswith("of another user") and os.geteuid() != 0:
             pytest.skip("only root can give files to other users")
         if kind in NAMED:
             return NAMED[kind] if kind == "a device" else NAMED[kind] + ending
@@ -166,120 +177,92 @@ def loop() -> adhesis.LoopResult:
 
 # ------------------------------------------------------------------------------------ commands
 
-Words = Callable[[str, str], tuple[str, ...]]
-READ: dict[str, tuple[Words, str]] = {
-    "run CAMPAIGN": (lambda path, _: ("run", path), ".toml"),
-    "run --out": (lambda path, _: ("run", "c.toml", "--out", path), ".h5"),
-    "run --dry-run --out": (lambda path, _: ("run", "c.toml", "--dry-run", "--out", path), ".h5"),
-    "status": (lambda path, _: ("status", path), ".h5"),
-    "verify": (lambda path, _: ("verify", path), ".h5"),
-    "report": (lambda path, _: ("report", path, "--to", "new"), ".h5"),
-    "report --beside": (
-        lambda path, sound: ("report", sound, "--to", "new", "--beside", path),
-        ".h5",
-    ),
-    "merge": (lambda path, _: ("merge", path, "--out", "all.h5"), ".h5"),
-    "merge, the second": (lambda path, sound: ("merge", sound, path, "--out", "all.h5"), ".h5"),
-    "merge --out": (lambda path, sound: ("merge", sound, "--out", path), ".h5"),
-    "loop --heights": (
-        lambda path, _: ("loop", "--heights", path, "--period", "1e-3", *MATERIAL),
-        ".csv",
-    ),
-    "loop --trace": (lambda path, _: ("loop", "--trace", path, *TRACE), ".csv"),
-    "trace": (lambda path, _: ("trace", path, *TRACE, "--to", "new"), ".csv"),
-    "trace, an array": (lambda path, _: ("trace", path, *TRACE, "--to", "new"), ".npy"),
-    "trace, of an instrument": (lambda path, _: ("trace", path, *TRACE, "--to", "new"), ".sdf"),
+# {} is the crafted path and SOUND a sound results file; what follows -> is how the path ends.
+COMMANDS = {
+    OF_READING: """
+run {} -> .toml
+run c.toml --out {} -> .h5
+run c.toml --dry-run --out {} -> .h5
+status {} -> .h5
+verify {} -> .h5
+report {} --to new -> .h5
+report SOUND --to new --beside {} -> .h5
+merge {} --out all.h5 -> .h5
+merge SOUND {} --out all.h5 -> .h5
+merge SOUND --out {} -> .h5
+loop --heights {} --period 1e-3 MATERIAL -> .csv
+loop --trace {} --unit um MATERIAL -> .csv
+trace {} --unit um MATERIAL --to new -> .csv
+trace {} --unit um MATERIAL --to new -> .npy
+trace {} --unit um MATERIAL --to new -> .sdf
+""",
+    OF_WRITING: """
+LOOP --json {} -> .json
+LOOP --csv {} -> .csv
+LOOP --figure {} -> .png
+LOOP --film {} -> .html
+LOOP --fields {} -> .npz
+sample {} -> .csv
+new {} -> .toml
+""",
+    OF_FOLDERS: """
+trace trace.csv --unit um MATERIAL --to {} ->
+report SOUND --to {} ->
+bench --quick --to {} ->
+doctor --in {} ->
+""",
 }
-WRITTEN: dict[str, tuple[Words, str]] = {
-    "loop --json": (lambda path, _: (*LOOP, "--json", path), ".json"),
-    "loop --csv": (lambda path, _: (*LOOP, "--csv", path), ".csv"),
-    "loop --figure": (lambda path, _: (*LOOP, "--figure", path), ".png"),
-    "loop --film": (lambda path, _: (*LOOP, "--film", path), ".html"),
-    "loop --fields": (lambda path, _: (*LOOP, "--fields", path), ".npz"),
-    "sample": (lambda path, _: ("sample", path), ".csv"),
-    "new": (lambda path, _: ("new", path), ".toml"),
-}
-FOLDERS: dict[str, Words] = {
-    "trace --to": lambda path, _: ("trace", "trace.csv", *TRACE, "--to", path),
-    "report --to": lambda path, sound: ("report", sound, "--to", path),
-    "bench --to": lambda path, _: ("bench", "--quick", "--to", path),
-    "doctor --in": lambda path, _: ("doctor", "--in", path),
+Call = Callable[[str, str, adhesis.LoopResult], object]
+FUNCTIONS: dict[tuple[str, ...], dict[str, tuple[Call, str]]] = {
+    OF_READING: {
+        "open": (lambda path, _, __: adhesis.open(path), ".h5"),
+        "open, beside": (lambda path, sound, _: adhesis.open(sound, beside=[path]), ".h5"),
+        "load": (lambda path, _, __: adhesis.load(path), ".nc"),
+        "read_trace": (lambda path, _, __: adhesis.read_trace(path), ".csv"),
+        "Campaign": (lambda path, _, __: adhesis.Campaign(path), ".toml"),
+        "Campaign.price": (lambda path, _, __: adhesis.Campaign("c.toml").price(path), ".h5"),
+        "Campaign.run": (lambda path, _, __: adhesis.Campaign("c.toml").run(path), ".h5"),
+    },
+    OF_WRITING: {
+        "save": (lambda path, _, loop: loop.save(path), ".nc"),
+        "film": (lambda path, _, loop: loop.film(frames=2).save(path), ".html"),
+    },
 }
 # A new results file is made through a link, and one that is missing where it is looked at.
-MAKES = {"run --out", "run --dry-run --out", "merge --out"}
+MAKES = ("run c.toml", "merge SOUND --out", "Campaign.price", "Campaign.run")
+CASES = [
+    (name, kind)
+    for named in (COMMANDS, FUNCTIONS)
+    for kinds, names in named.items()
+    for name in (names.strip().splitlines() if isinstance(names, str) else names)
+    for kind in kinds
+    if not (kind == "link to nothing" and name.startswith(MAKES))
+]
 
 
-def refused(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> str:
-    """Return the one sentence with which a command refuses its paths, before it does anything."""
-    folder = Path.cwd()
-    before = kept(folder)
-    code = main(list(words))
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_a_crafted_path_is_refused_in_one_sentence_before_anything_is_done(
+    name, kind, place, results, loop, capsys
+):
+    if "->" in name:
+        text, _, ending = (word.strip() for word in name.partition("->"))
+        text = text.replace("LOOP", " ".join(LOOP)).replace("MATERIAL", " ".join(MATERIAL))
+        words = {"{}": place(kind, ending), "SOUND": results}
+        refused_by(lambda: commanded([words.get(word, word) for word in text.split()], capsys))
+    else:
+        call, ending = next(names[name] for names in FUNCTIONS.values() if name in names)
+        path = place(kind, ending)
+        refused_by(lambda: call(path, results, loop))
+
+
+def commanded(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    """Run a command, and raise the one sentence with which it refuses."""
+    code = main(words)
     out, error = capsys.readouterr()
     assert (code, out) == (2, ""), (code, out, error)
     (line,) = error.splitlines()
-    assert kept(folder) == before
-    return line
-
-
-@pytest.mark.usefixtures("no_loop")
-@pytest.mark.parametrize("kind", OF_READING)
-@pytest.mark.parametrize("name", READ)
-def test_a_command_refuses_what_is_no_file_to_read(
-    name: str,
-    kind: str,
-    place: Callable[..., str],
-    results: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    if name in MAKES and kind == "link to nothing":
-        pytest.skip("the file that the link names is made")
-    words, ending = READ[name]
-    assert refused(words(place(kind, ending), results), capsys)
-
-
-@pytest.mark.usefixtures("no_loop")
-@pytest.mark.parametrize("kind", OF_WRITING)
-@pytest.mark.parametrize("name", WRITTEN)
-def test_a_command_refuses_what_is_no_file_to_write(
-    name: str,
-    kind: str,
-    place: Callable[..., str],
-    results: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    words, ending = WRITTEN[name]
-    assert refused(words(place(kind, ending), results), capsys)
-
-
-@pytest.mark.usefixtures("no_loop")
-@pytest.mark.parametrize("kind", OF_FOLDERS)
-@pytest.mark.parametrize("name", FOLDERS)
-def test_a_command_refuses_what_is_no_folder(
-    name: str,
-    kind: str,
-    place: Callable[..., str],
-    results: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert refused(FOLDERS[name](place(kind), results), capsys)
-
-
-# ----------------------------------------------------------------------------------- functions
-
-Call = Callable[[str, str, adhesis.LoopResult], object]
-FUNCTIONS: dict[str, tuple[Call, str]] = {
-    "open": (lambda path, _, __: adhesis.open(path), ".h5"),
-    "open, beside": (lambda path, sound, _: adhesis.open(sound, beside=[path]), ".h5"),
-    "load": (lambda path, _, __: adhesis.load(path), ".nc"),
-    "read_trace": (lambda path, _, __: adhesis.read_trace(path), ".csv"),
-    "Campaign": (lambda path, _, __: adhesis.Campaign(path), ".toml"),
-    "Campaign.price": (lambda path, _, __: adhesis.Campaign("c.toml").price(path), ".h5"),
-    "Campaign.run": (lambda path, _, __: adhesis.Campaign("c.toml").run(path), ".h5"),
-}
-SAVING: dict[str, tuple[Call, str]] = {
-    "save": (lambda path, _, loop: loop.save(path), ".nc"),
-    "film": (lambda path, _, loop: loop.film(frames=2).save(path), ".html"),
-}
+    raise InputError(line)
 
 
 def refused_by(call: Callable[[], object]) -> None:
@@ -289,37 +272,6 @@ def refused_by(call: Callable[[], object]) -> None:
         call()
     assert "\n" not in str(error.value)
     assert kept(folder) == before
-
-
-@pytest.mark.usefixtures("no_loop")
-@pytest.mark.parametrize("kind", OF_READING)
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_a_function_refuses_what_is_no_file_to_read(
-    name: str,
-    kind: str,
-    place: Callable[..., str],
-    results: str,
-    loop: adhesis.LoopResult,
-) -> None:
-    if name.startswith("Campaign.") and kind == "link to nothing":
-        pytest.skip("the file that the link names is made")
-    call, ending = FUNCTIONS[name]
-    path = place(kind, ending)
-    refused_by(lambda: call(path, results, loop))
-
-
-@pytest.mark.parametrize("kind", OF_WRITING)
-@pytest.mark.parametrize("name", SAVING)
-def test_a_function_refuses_what_is_no_file_to_write(
-    name: str,
-    kind: str,
-    place: Callable[..., str],
-    results: str,
-    loop: adhesis.LoopResult,
-) -> None:
-    call, ending = SAVING[name]
-    path = place(kind, ending)
-    refused_by(lambda: call(path, results, loop))
 
 
 # ------------------------------------------------------------- files beside the results of a run
@@ -332,6 +284,7 @@ def test_what_stands_in_the_place_of_the_lock_is_refused(
     place(kind, ".h5.lock")
     run = adhesis.Campaign("c.toml").tables
     refused_by(lambda: run_campaign(run, "crafted.h5", engine=fake_engine("")))
+    assert holder("crafted.h5") is None
     assert capsys.readouterr().err == ""
 
 

@@ -1,12 +1,210 @@
-"""Numbers with units and errors, as commands print them."""
+"""Quantities with units: read from options and campaign files by one reader, and printed."""
 
 from __future__ import annotations
 
+import argparse
 from math import inf, nan
+from pathlib import Path
 
 import pytest
 
-from adhesis.ensemble.quantities import bytes_text, with_error
+from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.command.main import COMMANDS, parser_of
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.cycle import turns_of
+from adhesis.ensemble.quantities import (
+    HEIGHT,
+    LENGTH,
+    QUANTITIES,
+    STIFFNESS,
+    STRESS,
+    WORK_OF_ADHESION,
+    Quantity,
+    bytes_text,
+    percent,
+    rounded_percent,
+    stress_text,
+    with_error,
+)
+from adhesis.solver.model.control import Control
+from tests.support.campaign_support import campaign_text
+
+READ: list[tuple[Quantity, str, float]] = [
+    *((LENGTH, "1e-6", 1e-6), (LENGTH, "0.5", 0.5), (LENGTH, "-1e-3", -1e-3)),
+    *((LENGTH, "2.5um", 2.5e-6), (LENGTH, "7 µm", 7e-6), (LENGTH, "7μm", 7e-6)),
+    *((LENGTH, "3e2nm", 3e-7), (LENGTH, " .5 mm ", 5e-4), (LENGTH, "12m", 12.0)),
+    *((LENGTH, "-1um", -1e-6), (LENGTH, "1 inch", 0.0254), (STRESS, "2e4", 2e4)),
+    *((STRESS, "20kPa", 2e4), (STRESS, "0.3 MPa", 3e5), (STRESS, "7GPa", 7e9)),
+    *((STRESS, "1.5 Pa", 1.5), (STRESS, "inf", inf), (WORK_OF_ADHESION, "0.02", 0.02)),
+    *((WORK_OF_ADHESION, "20mJ/m2", 0.02), (WORK_OF_ADHESION, "20 mJ/m²", 0.02)),
+    *((WORK_OF_ADHESION, "20mN/m", 0.02), (WORK_OF_ADHESION, "20 mN / m", 0.02)),
+    *((WORK_OF_ADHESION, "40J/m^2", 40.0), (WORK_OF_ADHESION, "40 N/m", 40.0)),
+]
+LENGTHS, WORKS = "m, cm, mm, µm, nm, Å, inch", "J/m², mJ/m², N/m, mN/m"
+IS_WORK = "it must be a number in J/m² with a decimal point, as in 0.02, or with"
+REFUSED: list[tuple[Quantity, str, str]] = [
+    (LENGTH, "", "is '': it must be a length, as in 5e-6 (m) or 5um"),
+    (LENGTH, "um", "is 'um': it must be a length"),
+    (LENGTH, "5 parsec", f"is '5 parsec': its unit must be one of {LENGTHS}"),
+    (LENGTH, "1,5mm", "is '1,5mm': it must be a length"),
+    (LENGTH, "5um5", "is '5um5': it must be a length"),
+    (LENGTH, "9" * 400 + "x", "…': its unit must be one of m, cm"),
+    (
+        LENGTH,
+        "20",
+        "is 20, which would be 20 m: give its unit, as in 20um (20m, if metres are meant)",
+    ),
+    (HEIGHT, "0.4", "is 0.4, which would be 0.4 m: give"),
+    (STRESS, "", "is '': it must be a stress, as in 2e4 (Pa) or 20kPa"),
+    (
+        STRESS,
+        "1mPa",
+        "is '1mPa': its unit must be one of Pa, kPa, MPa, GPa",
+    ),  # a thousandth of 1 Pa
+    (STRESS, "1 bar", "is '1 bar': its unit must be one of Pa"),
+    (
+        WORK_OF_ADHESION,
+        "20",
+        "is 20, which would be 20 J/m²: give its unit, as in 20mJ/m2 (20J/m2, if",
+    ),
+    (WORK_OF_ADHESION, "20mJ", f"is '20mJ': {IS_WORK}"),
+    (WORK_OF_ADHESION, "0,02", f"is '0,02': {IS_WORK}"),
+    (WORK_OF_ADHESION, "20kJ/m2", f"its unit must be one of {WORKS}"),
+    (WORK_OF_ADHESION, "20J/m", f"its unit must be one of {WORKS}"),
+    (WORK_OF_ADHESION, "20mN/m²", f"its unit must be one of {WORKS}"),
+    (WORK_OF_ADHESION, "20Nm", "it must be a number in J/m²"),
+]
+
+
+@pytest.mark.parametrize(("quantity", "text", "value"), READ)
+def test_a_quantity_is_the_number_nearest_to_its_decimals(quantity, text, value) -> None:
+    """So that 7um has the bits of 7e-6, and the same loss."""
+    assert quantity.option(text) == value
+
+
+@pytest.mark.parametrize(("quantity", "text", "sentence"), REFUSED)
+def test_what_is_no_quantity_is_refused_with_the_rule(quantity, text, sentence) -> None:
+    with pytest.raises(argparse.ArgumentTypeError) as refusal:
+        quantity.option(text)
+    assert sentence in str(refusal.value)
+    assert len(str(refusal.value)) < 220
+
+
+def test_heights_of_a_metre_are_asked_about_and_a_nan_is_left_to_its_rule() -> None:
+    assert HEIGHT.option("1e-3") == 1e-3
+    assert HEIGHT.option("10m") == 10.0
+    assert HEIGHT.option("nan") != HEIGHT.option("nan")
+    assert LENGTH.option("inf") == float("inf")
+
+
+# Options that are numbers, but no quantities.
+NUMBERS = {
+    *("--hurst", "--m2", "--c0", "--poisson"),
+    *("--accuracy", "--field-penetrations", "--budget"),
+}
+
+
+def test_every_option_that_is_a_quantity_takes_a_unit() -> None:
+    actions = [action for name in COMMANDS for action in parser_of(name)._actions]
+    options: dict[object, set[str]] = {}
+    for action in actions:
+        if action.option_strings:
+            options.setdefault(action.type, set()).add(action.option_strings[-1])
+    assert options[HEIGHT.option] == {"--h-rms"}
+    lengths = {"--period", "--step", "--cut-off", "--tip-radius", "--longest-gap", "--layer"}
+    assert options[LENGTH.option] == lengths | {"--adhesion-range"}
+    assert options[STRESS.option] == {"--young", "--strength", "--field-stresses"}
+    # and --max-stress and --preload, lists
+    assert options[STIFFNESS.option] == {"--stiffness"}
+    assert options[WORK_OF_ADHESION.option] == {"--work-of-adhesion", "--work-of-adhesion-open"}
+    assert options[float] == NUMBERS
+
+
+@pytest.mark.parametrize("quantity", [*QUANTITIES.values(), HEIGHT], ids=lambda q: q.name)
+def test_a_quantity_is_read_in_each_of_its_units(quantity: Quantity) -> None:
+    """An option, a list and a key of a campaign file know the same ones."""
+    for unit, size in quantity.units.items():
+        for text in (f"3{unit}", f" 3 {unit} ", f"3e0 {unit.replace('/', ' / ')}"):
+            assert quantity.option(text) == pytest.approx(3 * size, rel=1e-15)
+    with pytest.raises(InputError, match=f"its unit must be one of {', '.join(quantity.units)}$"):
+        quantity.read("3 " + ("pounds/m2" if "/" in quantity.unit else "pounds"))
+    assert quantity.read_with_unit(quantity.example) > 0
+
+
+def test_blanks_within_a_unit_make_no_unit_of_it() -> None:
+    for text in ("5 m m", "5 k Pa"):
+        with pytest.raises(InputError, match="it must be a"):
+            (LENGTH if "m m" in text else STRESS).read(text)
+    with pytest.raises(InputError, match=r"'m m' is no unit of length: it must be one of m, cm"):
+        LENGTH.unit_named("m m")
+
+
+# ---------------------------------------------------------------------- campaign files
+
+
+def test_lengths_of_a_campaign_may_have_units() -> None:
+    assert parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"')) == parse_campaign(
+        campaign_text(period="1e-3", h_rms="1e-6")
+    )
+    several = parse_campaign(campaign_text(h_rms='["1 µm", 2e-6]'))
+    assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
+
+
+def test_a_stiffness_of_a_campaign_may_have_a_unit() -> None:
+    text = campaign_text()
+    assert parse_campaign(
+        text.replace("[cycle]\n", '[cycle]\nstiffness = "2 GPa/m"\n')
+    ) == parse_campaign(text.replace("[cycle]\n", "[cycle]\nstiffness = 2e9\n"))
+
+
+def test_a_campaign_file_is_asked_for_units_and_the_text_in_a_results_file_is_not(
+    tmp_path: Path,
+) -> None:
+    """What is computed stays readable. Of the file: test_campaign.py."""
+    assert parse_campaign(campaign_text(period="1000")).tasks()
+    text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
+    (tmp_path / "c.toml").write_text(text)
+    assert load_campaign(tmp_path / "c.toml").sweep.work_of_adhesion == (40.0,)
+
+
+# ---------------------------------------------------------------------- stresses
+
+
+def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_units() -> None:
+    parser = parser_of("loop")
+    args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500, 1e-3MPa"])
+    assert turns_of(args, Control(0.0)).points == (200.0, 500.0, 1000.0)
+    args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,5bar"])
+    with pytest.raises(InputError, match="--max-stress is '5bar': its unit must be one of Pa, kPa"):
+        turns_of(args, Control(0.0))
+    assert parse_campaign(campaign_text(young='"1 MPa"')) == parse_campaign(
+        campaign_text(young="1e6")
+    )
+
+
+def test_lengths_are_shown_in_a_unit_of_their_size() -> None:
+    assert LENGTH.text(5e-6) == "5 µm"
+    assert LENGTH.text(2e-3) == "2 mm"
+    assert LENGTH.read_with_unit("2 mm") == 2e-3
+
+
+def test_quantities_are_shown_in_a_unit_of_their_size() -> None:
+    texts = [stress_text(pascals) for pascals in (0.0, 1.5, 999.9, 2e4, -3e6, 2.5e9)]
+    assert texts == ["0 Pa", "1.5 Pa", "1 kPa", "20 kPa", "-3 MPa", "2.5 GPa"]
+    assert LENGTH.text(0.99999e-6) == "1 µm"
+    assert STIFFNESS.text(1e9) == "1e+09 Pa/m"
+
+
+def test_a_share_is_shown_in_percent_without_an_exponent() -> None:
+    assert percent(1.234) == "120 %"
+    assert percent(0.0123, 0.5) == "1.2 to 50 %"
+    assert percent(1.234, digits=3) == "123 %"
+    assert [rounded_percent(share, sign="+") for share in (0.03, -0.0123, -1e-5)] == [
+        *("+3.0 %", "-1.2 %", "0.0 %")
+    ]
+
+
+# ---------------------------------------------------------------------- as commands print them
 
 
 @pytest.mark.parametrize(

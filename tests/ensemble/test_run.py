@@ -16,12 +16,14 @@ import xarray
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.run import launch, session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
 from adhesis.ensemble.task.compute import check_task
 from tests.support.campaign_support import (
+    TIMING,
     adhesis,
     adhesis_here,
     differences,
@@ -58,13 +60,14 @@ def test_a_run_from_nothing_to_done(tmp_path):
 
 def test_where_there_is_no_mpi_processes_compute_what_ranks_would(tmp_path, monkeypatch):
     monkeypatch.setattr(launch, "launcher", lambda: None)
-    process, out = run(tmp_path, "--ranks", "3", fake=None)
+    few = {"hurst": "[0.8]"}
+    process, out = run(tmp_path, "--ranks", "3", fake=None, **few)
     assert process.returncode == 0, process.stderr
     assert (
         "without MPI (mpirun and mpi4py): 2 workers as processes of this machine" in process.stderr
     )
     (tmp_path / "alone").mkdir()
-    alone, expected = run(tmp_path / "alone", fake=None)
+    alone, expected = run(tmp_path / "alone", fake=None, **few)
     assert alone.returncode == 0, alone.stderr
     assert differences(out, expected) == []
     with h5py.File(out) as file:
@@ -124,11 +127,16 @@ def test_walltime_ends_the_run_in_time(tmp_path):
 
 def test_growing_computes_exactly_what_is_new(tmp_path):
     _, out = run(tmp_path, realisations="1", hurst="[0.8]")
+    with Results(out) as results:
+        before = [results.column(name).tolist() for name in TIMING]
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}", realisations="3")
     assert process.returncode == 0
     assert "12 of 12 tasks done; 10 computed" in process.stderr
-    assert len(log.read_text().splitlines()) == 10
+    new = {f"{h}:{g}:{r}" for h in (0.7, 0.8) for g in (0.01, 0.04) for r in range(3)}
+    assert set(log.read_text().split()) == new - {"0.8:0.01:0", "0.8:0.04:0"}
+    with Results(out) as results:
+        assert [results.column(name)[[6, 9]].tolist() for name in TIMING] == before
     (tmp_path / "whole").mkdir()
     _, whole = run(tmp_path / "whole", realisations="3")
     assert differences(out, whole) == []
@@ -187,24 +195,6 @@ def test_done_tasks_can_be_computed_again_too(tmp_path):
     process, _ = run(tmp_path, *words, fake=f"log={log}")
     assert process.returncode == 0
     assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
-
-
-def test_rows_that_do_not_exist_cannot_be_computed_again(tmp_path):
-    _, out = run(tmp_path)
-    before = out.read_bytes()
-    for words, sentence in (
-        (
-            ("--redo", "failed", "--hurst", "0.75"),
-            "--hurst is 0.75: this campaign has no such task",
-        ),
-        (("--redo", "all", "--realisation", "9"), "only 0, 1"),
-        (("--redo", "all", "--work-of-adhesion", "4"), "only 0.01, 0.04"),
-    ):
-        process, _ = run(tmp_path, *words)
-        assert process.returncode == 2
-        assert sentence in process.stderr
-        assert len(process.stderr.splitlines()) == 1
-    assert out.read_bytes() == before
 
 
 def test_an_interrupted_campaign_has_every_cell_about_as_often(tmp_path):
@@ -303,16 +293,6 @@ def test_a_cell_that_is_new_is_tried_before_the_file_grows(tmp_path):
     assert out.read_bytes() == before
 
 
-def test_bad_options(tmp_path):
-    """Of single options: test_command_line.py."""
-    assert "no folder" in refused(tmp_path, "--out", tmp_path / "none" / "r.h5")
-    assert "is a directory" in refused(tmp_path, "--out", tmp_path)
-    sentence = "the name of a new results file must end in .h5"
-    assert sentence in refused(tmp_path, "--out", tmp_path / "new.txt")
-    itself = write_campaign(tmp_path)
-    assert "the campaign file itself" in refused(tmp_path, "--out", itself)
-
-
 def test_an_existing_results_file_keeps_its_name(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "old.dat"
     run(tmp_path)
@@ -326,11 +306,6 @@ def test_a_results_file_of_another_campaign(tmp_path):
     assert "material.young is 2000000.0 here and 1000000.0 there" in sentence
     assert "cycle.load_steps is 5 here and 4 there" in sentence
     assert "sweep.hurst" in refused(tmp_path, hurst="[0.7]")
-
-
-def test_a_file_that_is_no_results_file(tmp_path):
-    (tmp_path / "r.h5").write_text("my notes")
-    assert "is not a results file of adhesis" in refused(tmp_path)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

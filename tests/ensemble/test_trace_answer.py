@@ -422,17 +422,6 @@ def test_the_command_excludes_ranges(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "excluded    200 µm to 230 µm, as given: 13 heights treated as drop-outs" in said
     assert "excluded    900 µm to 2 mm, as given: 40 heights" in said
     assert "ends        cut off where heights are missing: 40" in said
-    for text, reported in (
-        ("1mm", "--exclude is '1mm': it must be two positions with a colon between them"),
-        ("0.1:0.2:0.3mm", "it must be two positions with a colon"),
-        ("1,2mm:1,3mm", "--exclude is '1,2mm:1,3mm': a position of it is '1,2mm': it must be a"),
-        ("200:300um", "a position of it is 200, which would be 200 m: give its unit"),
-        ("0.3mm:0.2mm", "--exclude holds the range from 300 µm to 200 µm: a range must begin"),
-    ):
-        assert main([*words, "--exclude", text]) == 2
-        assert reported in capsys.readouterr().err
-    assert main(["loop", "--hurst", "0.8", "--exclude", "1mm:2mm"]) == 2
-    assert "--exclude belongs to --trace" in capsys.readouterr().err
 
 
 def test_the_summary_states_the_scope(document: dict[str, Any], folder: Path) -> None:
@@ -566,16 +555,6 @@ def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert "400 points" in capsys.readouterr().out
     loop = json.loads((tmp_path / "l.json").read_text())
     assert loop["period"] == pytest.approx(0.95 * LENGTH)
-    for more, reported in (
-        (["--seed", "1"], "--seed belongs to --hurst"),
-        (["--period", "1"], "--period belongs to --hurst"),
-        (["--hurst", "0.8"], "--hurst and --trace are given: give one of"),
-        (["--degree", "8"], "--degree is 8"),
-    ):
-        assert main([*words, *more]) == 2
-        assert reported in capsys.readouterr().err
-    assert main(["loop", "--hurst", "0.8", "--cut-off", "1um"]) == 2
-    assert "--cut-off belongs to --trace" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("gamma", [0.04, 0.001])

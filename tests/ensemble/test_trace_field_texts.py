@@ -10,13 +10,12 @@ import pytest
 import xarray as xr
 
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.heights import read_heights
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import instrument
 from adhesis.ensemble.trace.reading.header_units import step_of_header
-from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver import checks
 from adhesis.solver.model.problem import Problem
 from tests.support.campaign_support import campaign_text
@@ -34,10 +33,6 @@ TWO = [f"{x},{z}" for x, z in PAIRS]
 def with_codes(codes: dict[int, str]) -> list[str]:
     """Rows of two columns, with other heights at some points."""
     return [f"{x},{codes.get(k, z)}" for k, (x, z) in enumerate(PAIRS)]
-
-
-def commas(lines: Iterable[str]) -> list[str]:
-    return [line.replace(",", ";").replace(".", ",") for line in lines]
 
 
 def grouped(sign: str) -> list[str]:
@@ -417,35 +412,6 @@ def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> 
 
 # ---------------------------------------------------------------------- options and objects
 
-LOOP = ["loop", "--hurst", "0.8", "--ratio", "4"]
-TRACE = ["trace", "none.csv", "--young", "1e6", "--poisson", "0.5", "--plan"]
-LISTS: dict[str, list[str]] = {
-    "γ": [*TRACE, "--work-of-adhesion", "0,04"],
-    "several γ": [*TRACE, "--work-of-adhesion", "0.02,0,04"],
-    "γ with a unit": [*TRACE, "--work-of-adhesion", "2,5mJ/m2"],
-    "turning point": [*LOOP, "--max-penetration", "0,5"],
-    "turning points": [*LOOP, "--max-penetration", "0,3,0,6"],
-    "beyond one": [*LOOP, "--stiffness", "1e9", "--max-penetration", "1,5"],
-    "stress": [*LOOP, "--stiffness", "0", "--max-stress", "2,5kPa"],
-    "path": [*LOOP, "--path", "0,5,0,2,out"],
-    "of a trace": [*TRACE, "--work-of-adhesion", "0.04", "--max-penetration", "0,5"],
-}
-
-
-@pytest.mark.parametrize("kind", LISTS)
-def test_no_list_takes_a_decimal_comma(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(LISTS[kind]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert f"{LISTS[kind][-2]} is '{LISTS[kind][-1]}': numbers have a decimal point, as in" in line
-
-
-@pytest.mark.parametrize("words", [["--field-penetrations", "0,5"], ["--adhesion-range", "0,3nm"]])
-def test_no_number_takes_a_decimal_comma(
-    words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([*LOOP, "--fields", "f.npz", *words]) == 2
-    assert f"{words[0]} is '{words[1]}': it must be a" in capsys.readouterr().err
-
 
 def array_of_xarray() -> object:
     return xr.DataArray(Z, dims="x", coords={"x": PLACE})
@@ -477,7 +443,3 @@ def test_a_sign_that_is_not_of_toml_is_named_with_its_place(old: str, new: str, 
     text = campaign_text(young="1e6").replace(old, new, 1)
     with pytest.raises(InputError, match=rf"not valid TOML: line \d+, column \d+ {words}"):
         parse_campaign(text)
-
-
-def test_a_trace_says_how_it_was_read() -> None:
-    assert isinstance(read_trace(np.column_stack([PLACE, 1e6 * Z]), unit="um"), Trace)

@@ -191,30 +191,6 @@ def test_what_is_excluded_at_an_end_is_cut_off_and_positions_stay() -> None:
     assert kept.max() < found.level().max() - 6e-6
 
 
-@pytest.mark.parametrize(
-    ("exclude", "text"),
-    [
-        ([(2e-3, 1e-3)], "exclude holds the range from 2 mm to 1 mm: a range must begin at 0"),
-        ([(-1e-6, 1e-3)], "a range must begin at 0 or later"),
-        ([(np.nan, 1e-3)], "a range must begin at 0 or later"),
-        ([(5e-3, 6e-3)], "in which there is no height: t.txt reaches from 0 to 1.599 mm"),
-        ([(0.0, 1.59e-3)], "exclude leaves 9 heights of t.txt: at least 32 must be left"),
-        ([(0.2e-3, 0.5e-3)], r"lacks 18\.8 % of its heights, with what exclude removes"),
-    ],
-)
-def test_an_excluded_range_that_cannot_be_is_refused(
-    exclude: list[tuple[float, float]], text: str
-) -> None:
-    with pytest.raises(InputError, match=text):
-        prepared(Z, exclude=exclude)
-
-
-@pytest.mark.parametrize("exclude", ["1mm:2mm", 3.0, [1e-3, 2e-3], [("1mm", "2mm")], [(1.0,)]])
-def test_excluded_ranges_are_pairs_of_numbers(exclude: object) -> None:
-    with pytest.raises(TypeError, match=r"it must hold pairs of positions in m, as in"):
-        prepared(Z, exclude=exclude)
-
-
 @pytest.mark.parametrize(("sign", "word"), [(1.0, "crest"), (-1.0, "trough")])
 def test_a_feature_far_out_of_all_others_is_warned_of_with_what_leaves_it_out(
     sign: float, word: str

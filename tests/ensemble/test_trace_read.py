@@ -6,7 +6,6 @@ import copy
 import dataclasses
 import io
 import pickle
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,9 +15,7 @@ import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.heights import read_heights
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
-from tests.support.options import replacing
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -48,7 +45,6 @@ def assert_right(trace: Trace, tolerance: float = 1e-11) -> None:
 
 UM = "x (µm);z (µm)"
 TEXTS: dict[str, list[str]] = {
-    "csv": ["x [um],z [um]", *rows(",", ".")],
     "comment header": ["# Position / µm   Height / µm", *rows("  ", ".")],
     "names and units between single spaces": ["# x (mm) h (um)", *rows(" ", ".", 1e3, 1e6, ".7f")],
     "brackets and spaces": ["# x [mm]  z [µm]", *rows(" ", ".", 1e3, 1e6, ".7f")],
@@ -59,7 +55,6 @@ TEXTS: dict[str, list[str]] = {
         *rows("\t", ".", 1e3, 1e6, ".7f"),
     ],
     "tabs": ["Distance (mm)\tHeight (nm)", *rows("\t", ".", 1e3, 1e9, ".7f")],
-    "semicolons and decimal commas": [UM, *rows(";", ",")],
     "tabs and decimal commas": ["Weg [mm]\tHöhe [µm]", *rows("\t", ",", 1e3, 1e6, ".7f")],
     "spaces and decimal commas": ["x_um  z_um", *rows(" ", ",")],
     "units on a line of their own": ["Position;Profile", "mm;µm", *rows(";", ".", 1e3, 1e6, ".7f")],
@@ -77,8 +72,6 @@ TEXTS: dict[str, list[str]] = {
         "End of file",
     ],
     "scientific, in metres, untold": rows(" ", ".", 1, 1, ".9e"),
-    "quoted": ['"x (µm)","z (µm)"', *(re.sub(r"([^,]+)", r"\1", r) for r in rows(",", "."))],
-    "trailing delimiter": ["x (µm);z (µm)", *(row + ";" for row in rows(";", "."))],
 }
 
 
@@ -87,18 +80,9 @@ def test_every_usual_text_gives_the_same_heights(kind: str, tmp_path: Path) -> N
     assert_right(read(tmp_path, TEXTS[kind]))
 
 
-def test_encodings_and_line_ends(tmp_path: Path) -> None:
-    text = "\r\n".join(["x (µm);z (µm)", *rows(";", ",")])
-    for encoding in ("utf-8-sig", "utf-16", "latin-1"):
-        path = tmp_path / f"{encoding}.csv"
-        path.write_bytes(text.encode(encoding))
-        assert_right(read_trace(path))
-
-
 def test_units_by_option(tmp_path: Path) -> None:
     assert_right(read(tmp_path, rows(" ", "."), unit="um"))
     assert_right(read(tmp_path, rows(",", ".", 1e3, 1e9, ".7f"), unit="mm,nm"))
-    assert_right(read(tmp_path, ["x (um),z (um)", *rows(",", ".")], unit="µm"))
 
 
 def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path) -> None:
@@ -197,7 +181,7 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "a decimal sign": (BOTH, {"decimal": ","}, InputError, "decimal belongs to files"),
     "an empty stream": (io.BytesIO(b""), {}, InputError, "the stream is empty"),
     "a zip": (io.BytesIO(b"\x1f\x8b0"), {}, InputError, "the stream is compressed"),
-    "neither": (3, {}, TypeError, "source is 3: it must be a path"),
+    "neither": (3, {}, TypeError, r"source is 3: .* a path, an open file .* list .* Series"),
 }
 
 
@@ -235,20 +219,6 @@ def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -
     assert trace.drop_outs == 3
     good = ~np.isnan(trace.heights)
     np.testing.assert_allclose(trace.heights[good], Z[good], atol=1e-11)
-
-
-def test_rows_left_out_are_gaps(tmp_path: Path) -> None:
-    lines = rows(";", ".")
-    trace = read(tmp_path, [UM, *lines[:50], *lines[53:]])
-    np.testing.assert_array_equal(np.flatnonzero(np.isnan(trace.heights)), [50, 51, 52])
-
-
-def test_empty_lines_of_one_column_keep_their_place(tmp_path: Path) -> None:
-    heights = [f"{z * 1e6:.6f}" for z in Z]
-    heights[30] = ""
-    trace = read(tmp_path, ["z (um)", *heights, ""], step=STEP)
-    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [30]
-    assert trace.points == N
 
 
 def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
@@ -307,11 +277,9 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
         {"unit": "um"},
         "give decimal",
     ),
-    "no numbers": (["a trace", "of words"], {}, "no line of numbers"),
     "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),
     "flat": ([f"{k} 1.0" for k in range(99)], {"unit": "um"}, "flat trace has no loss"),
     "no heights": ([f"{k} NaN" for k in range(99)], {"unit": "um"}, "holds 0 heights"),
-    "empty": ([""], {}, "is empty"),
 }
 
 
@@ -323,68 +291,7 @@ def test_what_is_in_doubt_is_refused_in_one_sentence(kind: str, tmp_path: Path) 
     assert "\n" not in str(refusal.value)
 
 
-def test_refusals_of_files(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        read_trace(tmp_path / "none.txt")
-    with pytest.raises(InputError, match="is a directory"):
-        read_trace(tmp_path)
-    (tmp_path / "a.npy").write_bytes(b"not an array")
-    with pytest.raises(InputError, match=r"no \.npy of numbers"):
-        read_trace(tmp_path / "a.npy")
-    np.save(tmp_path / "b.npy", np.zeros((9, 9)))
-    with pytest.raises(InputError, match="9 × 9 numbers"):
-        read_trace(tmp_path / "b.npy")
-    (tmp_path / "c.txt").write_bytes(b"\x00\x01\x02" * 100)
-    with pytest.raises(InputError, match="neither text nor"):
-        read_trace(tmp_path / "c.txt")
-
-
 CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
-
-
-@pytest.mark.parametrize(
-    ("words", "reported"),
-    [
-        (["--plan"], "states no unit"),
-        (["--plan", "--unit", "um", "--columns", "3"], "--columns is 3: it must name two of the 2"),
-        (["--plan", "--unit", "um", "--columns", "2"], "header states no step with its unit: give"),
-        (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
-        (["--plan", "--unit", "um", "--tip-radius", "5"], "--tip-radius is 5, which would be 5 m"),
-        (["--plan", "--unit", "um", "--tip-radius", "5m"], "trusted from 50 µm on (what a tip of"),
-        (["--plan", "--unit", "um", "--tip-radius=-1um"], "--tip-radius is -1e-06: it must be"),
-        (["--plan", "--unit", "um", "--longest-gap", "5 parsec"], "'5 parsec': its unit must be"),
-        (["--plan", "--unit", "um", "--max-stress", "5"], "a weight or a machine?"),
-        (["--plan", "--unit", "um", "--stiffness", "0"], "(--stiffness 0) needs --max-stress"),
-        (["--plan", "--unit", "um", "--stiffness", "0", "--max-stress", "0"], "--max-stress is 0"),
-        (
-            ["--plan", "--unit", "um", "--stiffness", "1", "--layer", "1mm"],
-            "--stiffness and --layer are given: give one of them",
-        ),
-        (["--plan", "--unit", "um", "--degree", "9"], "--degree is 9"),
-        (["--plan", "--unit", "um", "--max-penetration", "deep"], "--max-penetration is 'deep'"),
-        (["--plan", "--unit", "um", "--step", "1um"], "--step belongs to heights without"),
-        (["--plan", "--unit", "um", "--method", "magic"], "method is 'magic'"),
-        (["--unit", "um"], "--to is missing: give the directory for the page, or --plan"),
-        (["--plan", "--unit", "um", "--columns", "x"], "--columns is 'x': it must be two whole"),
-        (["--plan", "--work-of-adhesion", "1.0,1.0"], "is '1.0,1.0': its values must"),
-        (
-            ["--plan", "--work-of-adhesion", "1;2"],
-            "--work-of-adhesion is '1;2': it must be a",
-        ),
-        (["--plan", "--unit", "um", "--processes", "0"], "--processes is 0"),
-        (["--plan", "--unit", "um", "--work-of-adhesion", "-1"], "--work-of-adhesion is -1"),
-    ],
-)
-def test_the_command_refuses_with_one_sentence_and_code_2(
-    words: list[str], reported: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "t.txt"
-    path.write_text("\n".join(rows(" ", ".")))
-    assert main(["trace", str(path), *replacing(CONTACT, words)]) == 2
-    error = capsys.readouterr().err
-    assert reported in error
-    assert len(error.splitlines()) == 1
-    assert sorted(tmp_path.iterdir()) == [path]
 
 
 def test_a_plan_is_said_and_nothing_is_written(
@@ -397,14 +304,3 @@ def test_a_plan_is_said_and_nothing_is_written(
     for words in ("200 points, step 500 nm", "decimal commas", "positions in µm", "plan ", "waves"):
         assert words in said
     assert sorted(tmp_path.iterdir()) == [path]
-
-
-def test_what_cannot_be_read_names_all_that_can() -> None:
-    with pytest.raises(TypeError, match=r"source is 3: .* a path, an open file .* list .* Series"):
-        read_trace(3)  # type: ignore[arg-type]
-
-
-def test_a_foreign_line_says_what_to_do_with_it(tmp_path: Path) -> None:
-    (tmp_path / "h.csv").write_text("1\n2\n3\n4\npause\n5\n6\n7\n")
-    with pytest.raises(InputError, match=r"line 5 .* 'pause': it ends the rows .* lines 1 to 4"):
-        read_heights(tmp_path / "h.csv")

@@ -18,7 +18,13 @@ from adhesis.solver.runtime import disk_cache as code_cache
 from adhesis.solver.runtime import jit as door
 from adhesis.solver.runtime.disk_cache import CodeFiles
 from adhesis.solver.runtime.jit import Compilation
-from tests.support.campaign_support import ROOT, campaign_text, environment, write_campaign
+from tests.support.campaign_support import (
+    ROOT,
+    campaign_text,
+    environment,
+    run_python,
+    write_campaign,
+)
 from tests.support.launchers import MPIRUN
 
 # Another setting than any cache was made with: nothing is compiled yet, and it is quickly done.
@@ -102,13 +108,7 @@ def test_after_warming_up_neither_campaigns_nor_traces_compile_anything(tmp_path
     sharp = campaign_text(**few, method='"sharp"').replace("nodes_per_wave = 16\n", "")
     several = sharp.replace("max_penetration = 0.6", "max_penetration = [0.3, 0.6]")
     texts = (several, campaign_text(**few))
-    done = subprocess.run(
-        [sys.executable, "-c", AFTER_WARMING, *texts],
-        env=environment(ADHESIS_CACHE=str(tmp_path)),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_python("-c", AFTER_WARMING, *texts, ADHESIS_CACHE=str(tmp_path))
     assert done.stdout.split() == ["0"], done.stdout + done.stderr
 
 

@@ -7,8 +7,6 @@ import shutil
 import sys
 from pathlib import Path
 
-import numpy as np
-import pytest
 from matplotlib.image import imread
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -53,31 +51,3 @@ def test_a_stamp_is_read_again_and_leaves_the_picture_as_it_was(tmp_path):
         assert figures.stamped(path) == text != before
     assert path.read_bytes().count(b"tEXtSource") == 1
     assert (imread(path) == imread(original)).all()
-
-
-def test_a_figure_that_is_no_longer_made_is_removed(tmp_path, monkeypatch):
-    figures = tool()
-    folder = tmp_path / "docs" / "paper"
-    folder.mkdir(parents=True)
-    for name in ("fig4.png", "fig5.png"):
-        shutil.copyfile(ROOT / "docs" / "figures" / "loop.png", folder / name)
-    (tmp_path / "draw.py").write_text(
-        "import shutil, sys; shutil.copyfile('docs/paper/fig5.png', sys.argv[1])\n"
-        "open(sys.argv[1].replace('png', 'csv'), 'w').close()"
-    )
-    (tmp_path / "numbers").mkdir()
-    monkeypatch.setattr(figures, "ROOT", tmp_path)
-    part = figures.Part(("draw.py OUT/fig5a.png",), "*.*", "paper", data="numbers")
-    monkeypatch.setattr(figures, "PARTS", {"paper": part})
-    figures.make("paper", 1)
-    assert [path.name for path in folder.iterdir()] == ["fig5a.png"]
-    assert figures.stamped(folder / "fig5a.png").endswith("ARGS=paper")
-    assert [path.name for path in (tmp_path / "numbers").iterdir()] == ["fig5a.csv"]
-
-
-@pytest.mark.parametrize("path", kept(), ids=lambda path: path.stem)
-def test_figures_have_a_white_ground_so_that_a_dark_page_shows_them(path):
-    image = imread(path)
-    edge = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
-    assert (image[..., 3:] == 1).all()
-    assert np.median(edge[:, :3]) == 1

@@ -22,7 +22,6 @@ STAND_INS = {
     "adhesis": """
         if [ "$1" = run ]; then
             file=$4
-            [ -e "$file" ] && echo "found $(cat "$file")" >>"$CALLS"
             echo "$CODE" >"$file"
             if [ -n "${SIGNAL:-}" ]; then
                 trap 'exit $CODE' USR1
@@ -315,45 +314,6 @@ def test_parts_are_counted(cluster: Cluster, parts: str) -> None:
     done = cluster.run(JOBS / "parts.sh", parts, "s.toml")
     assert (done.returncode, cluster.calls("sbatch")) == (2, [])
     assert f"PARTS is '{parts}'" in done.stderr
-
-
-# ------------------------------------------------------------------------------- scratch staging
-
-
-@pytest.mark.parametrize("env", [{"CODE": "0"}, {"CODE": "75", "SIGNAL": "USR1"}])
-def test_staged_results_come_back_whole(cluster: Cluster, env: dict[str, str]) -> None:
-    (cluster.folder / "s.h5").write_text("earlier rows")
-    scratch = cluster.folder / "node local"
-    slurm(cluster, "s.toml", STAGING=str(scratch), **env)
-    (words,) = (words for words in cluster.calls("adhesis") if words[0] == "run")
-    assert words[3].startswith(str(scratch))
-    assert "found earlier rows" in (cluster.folder / "calls").read_text()
-    assert (cluster.folder / "s.h5").read_text().strip() == env["CODE"]
-    assert list(scratch.iterdir()) == []
-
-
-def test_staged_results_of_a_killed_job_are_not_lost(cluster: Cluster) -> None:
-    """The next start on this disk goes on with them; it replaces no results but those it had."""
-    file, scratch = cluster.folder / "s.h5", cluster.folder / "scratch"
-    file.write_text("earlier rows")
-    changed = "echo by another run >s.h5; exit 0\n"
-    launcher = cluster.folder / "bin" / "other"
-    launcher.write_text(f'#!/bin/bash\n"$@"\n{changed}')
-    launcher.chmod(0o755)
-    done, action = slurm(cluster, "s.toml", STAGING=str(scratch), LAUNCHER="other")
-    assert (done.returncode, action) == (74, "nothing")
-    assert "was changed by somebody else" in done.stdout
-    assert file.read_text().strip() == "by another run"
-    (kept,) = scratch.glob("*/s.h5")
-    assert kept.read_text().strip() == "0"
-    done, _ = slurm(cluster, "s.toml", STAGING=str(scratch))
-    assert done.returncode == 2
-    assert f"adhesis merge {kept} --out s.h5" in done.stderr
-    file.unlink()  # as before a first job that was killed
-    (kept.parent / "version").write_text("none\n")
-    done, _ = slurm(cluster, "s.toml", STAGING=str(scratch), CODE="1")
-    assert "found 0" in (cluster.folder / "calls").read_text()
-    assert file.read_text().strip() == "1"
 
 
 # ------------------------------------------------------------------------------- PBS

@@ -236,11 +236,11 @@ def interleave(folder: Path, seed: int) -> None:
             assert [*(folder / "disk1").iterdir(), *folder.glob("s.h5.*")] == [], at_work
 
 
-@pytest.mark.parametrize("first", range(0, 100, 25))
+@pytest.mark.parametrize("first", range(0, 60, 20))
 def test_no_interleaving_of_jobs_loses_a_row(tmp_path: Path, first: int) -> None:
     with ThreadPoolExecutor(8) as pool:
         for done in [
-            pool.submit(interleave, tmp_path / f"{seed}", seed) for seed in range(first, first + 25)
+            pool.submit(interleave, tmp_path / f"{seed}", seed) for seed in range(first, first + 20)
         ]:
             done.result()
 
@@ -350,6 +350,10 @@ def test_a_run_of_somebody_else_and_a_job_do_not_destroy_each_other(real: Site) 
     (real.folder / "free").touch()
     assert by_hand.wait(120) == 0
     assert done_rows(results) == 40
+    again = real.start(STAGING="disk1")
+    text, _ = again.communicate(timeout=60)
+    assert again.returncode == 2, text
+    assert f"adhesis merge {staged(real).relative_to(real.folder)} --out s.h5" in text
     joined = adhesis_here("merge", staged(real), "--out", results)
     assert joined.returncode == 0, joined.stderr
 

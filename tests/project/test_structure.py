@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.support.campaign_support import environment
+from tests.support.campaign_support import run_python
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -53,13 +51,7 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     small = campaign(realisations=2)
     results = write(tmp_path / "r.h5", small, rows(small))
     (tmp_path / "c.toml").write_text(text_of(realisations=2))
-    done = subprocess.run(
-        [sys.executable, "-c", COMMANDS, tmp_path / "c.toml", results, tmp_path / "report"],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=environment(),
-    )
+    done = run_python("-c", COMMANDS, tmp_path / "c.toml", results, tmp_path / "report")
     assert done.returncode == 0, done.stderr
     lines = (line.split() for line in done.stdout.splitlines() if line.startswith("loaded "))
     loaded = {stage: set(names) for _, stage, *names in lines}

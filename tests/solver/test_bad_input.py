@@ -132,6 +132,16 @@ NUMBERS: dict[str, tuple[Callable[[Any], Any], Bounds]] = {
     ),
     "load_steps": (lambda v: loop(load_steps=v), checks.LOAD_STEPS),
     "max_penetration": (lambda v: loop(max_penetration=v), checks.MAX_PENETRATION),
+    "preload": (lambda v: loop(max_penetration=None, preload=v), checks.MAX_STRESS),
+    "strength": (lambda v: Problem(WAVE, SOLID, 0.04, strength=v), checks.STRENGTH),
+    "adhesion_range": (
+        lambda v: Problem(WAVE, SOLID, 0.04, adhesion_range=v),
+        checks.ADHESION_RANGE,
+    ),
+    "work_of_adhesion_open": (
+        lambda v: Problem(WAVE, SOLID, 0.0, work_of_adhesion_open=v),
+        checks.WORK_OF_ADHESION,
+    ),
     "max_stress": (
         lambda v: loop(method=UNDER_LOAD, max_penetration=None, max_stress=v),
         checks.MAX_STRESS,
@@ -144,7 +154,10 @@ NUMBERS: dict[str, tuple[Callable[[Any], Any], Bounds]] = {
     "height": (lambda v: WAVE.scaled(v), checks.FINITE),
     "length": (lambda v: WAVE.scaled(1.0, v), checks.FINITE),
 }
-OPTIONAL = {"max_penetration", "max_stress", "h_rms", "m2", "nodes_per_wave"}
+OPTIONAL = {
+    *("max_penetration", "max_stress", "preload", "h_rms", "m2", "nodes_per_wave"),
+    *("strength", "adhesion_range", "work_of_adhesion_open"),
+}
 
 
 @pytest.mark.parametrize("name", NUMBERS)
@@ -303,8 +316,37 @@ path([]) -> ValueError: a path needs at least one turning point
 path([0.5, np.nan, 0.6]) ->
     ValueError: turning_points[1] is nan: every turning point must be a finite number
 path([0.3, 0.5]) -> ValueError: the path goes from 0.3 to 0.5: after loading it must unload
+path([0.5, 0.5]) -> ValueError: after loading it must unload
+path([0.5, 0.3, 0.2]) -> ValueError: after unloading it must load
+path([0.5, 0.3]) -> ValueError: omit that turning point
+path([1.2]) -> ValueError: max_penetration is 1.2
 path([-0.3]) -> ValueError: the path starts with -0.3: it must start with loading
 path([0.5], out='no') -> TypeError: out is 'no': it must be True or False
+loop(preload=20.0, max_stress=20.0) -> ValueError: preload and max_stress are given
+loop(method=UNDER_LOAD, max_penetration=None, preload=20.0) -> ValueError: a weight or a machine
+loop(max_penetration=None, max_stress=20.0) -> ValueError: a weight or a machine
+loop(preload=20.0, max_penetration=1.0) -> ValueError: max_penetration is 1.0: it must be
+loops(None, preload=[20.0, 20.0]) -> ValueError: there must be some, all different
+# interfaces
+Problem(WAVE, SOLID, 0.3, measure='projected') ->
+    ValueError: measure is 'projected': it must be one of arc, flat
+Problem(WAVE, SOLID, 0.04, adhesion_range=1e-09, strength=1000000.0) ->
+    ValueError: adhesion_range is 1e-09 and strength is
+Problem(WAVE, SOLID, 0.04, strength=1000.0) -> ValueError: strength is 1000 Pa: it must be at least
+Problem(WAVE, SOLID, 0.04, adhesion_range=0.001) ->
+    ValueError: adhesion_range is 0.001 m: it must be at most
+Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=0.001) ->
+    ValueError: 0.001 J/m²: it must be at least the work of adhesion
+Problem(WAVE, SOLID, 0.0, work_of_adhesion_open=0.1) ->
+    ValueError: it must be left out, as γ is 0
+Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, strength=1000000.0) ->
+    ValueError: beside a strength of 1e+06 Pa: give
+Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, adhesion_range=1e-09) ->
+    ValueError: give one of them
+make_method('grid', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0)) ->
+    ValueError: method is 'grid' beside a work_of_adhesion_open
+make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), nodes_per_wave=32) ->
+    ValueError: nodes_per_wave is 32 beside a work_of_adhesion_open
 # units
 Problem(WAVE.scaled(1000000.0), SOLID, 0.04) ->
     ValueError: rms slope is 4,443: it must be a positive number from 1e-12 to 100; are heights
@@ -344,6 +386,18 @@ one_loop().on_axis('loading', one_loop().energy[:3]) ->
     ValueError: values have the shape (3,): there must be one for each
 one_loop().at('loading', 'a', one_loop().energy) ->
     TypeError: drives is 'a': it must be a real number
+one_loop().to_dataframe('patches') -> ValueError: of is 'patches': it must be
+one_loop().save('loop.h5') -> InputError: the name must end in .nc
+one_loop().save(3) -> TypeError: path is 3
+one_loop().save('none/x.nc') -> InputError: path is none/x.nc: there is no directory none
+one_loop().film('a.avi') -> InputError: path is a.avi: the name must end in .html,
+one_loop().film(3) -> TypeError: path is 3
+one_loop().film(frames=1) -> ValueError: frames is 1: it must be
+one_loop().film(frames=1001) -> ValueError: frames is 1001: it must be
+one_loop().film(frames=2.5) -> ValueError: frames is 2.5
+one_loop().film(progress=3) -> TypeError: progress is 3
+one_loop().film('none/a.html', frames=2) -> InputError: no directory
+replace(one_loop(), contact_states=()).film() -> ValueError: this result holds no contact states
 one_loop().mean_stress.__setitem__(0, 1.0) -> ValueError: assignment destination is read-only
 setattr(one_loop(), 'loss', 0.0) -> AttributeError: cannot assign to field 'loss'
 one_path().potential.__setitem__(0, 1.0) -> ValueError: assignment destination is read-only
@@ -371,6 +425,20 @@ prepare_trace(TRACE, cut_off=-1e-06) -> InputError: cut_off is -1e-06: it must b
 prepare_trace(TRACE, cut_off=1.0) -> InputError: cut_off is 1 m: it must lie between 2.2 steps
 prepare_trace(TRACE, tip_radius=np.nan) -> InputError: tip_radius is nan: it must be
 prepare_trace(TRACE, longest_gap=-1) -> InputError: longest_gap is -1: it must be a number from 0
+prepare_trace(TRACE, exclude=[(0.002, 0.001)]) ->
+    InputError: exclude holds the range from 2 mm to 1 mm: a range must begin at 0
+prepare_trace(TRACE, exclude=[(-1e-06, 0.001)]) -> InputError: a range must begin at 0 or later
+prepare_trace(TRACE, exclude=[(np.nan, 0.001)]) -> InputError: a range must begin at 0 or later
+prepare_trace(TRACE, exclude=[(0.005, 0.006)]) ->
+    InputError: in which there is no height: t.csv reaches from 0 to 1.995 mm
+prepare_trace(TRACE, exclude=[(0.0, 0.00195)]) ->
+    InputError: exclude leaves 9 heights of t.csv: at least 32 must be left
+prepare_trace(TRACE, exclude=[(0.0002, 0.0008)]) -> InputError: % of its heights, with what exclude
+prepare_trace(TRACE, exclude='1mm:2mm') -> TypeError: it must hold pairs of positions in m, as in
+prepare_trace(TRACE, exclude=3.0) -> TypeError: it must hold pairs of positions in m, as in
+prepare_trace(TRACE, exclude=[0.001, 0.002]) -> TypeError: it must hold pairs of positions in m
+prepare_trace(TRACE, exclude=[('1mm', '2mm')]) -> TypeError: it must hold pairs of positions in m
+prepare_trace(TRACE, exclude=[(1.0,)]) -> TypeError: it must hold pairs of positions in m, as in
 prepare_trace(TRACE, invert='yes') -> TypeError: invert is 'yes': it must be True or False
 prepare_trace(TRACE, keep_outliers=1) -> TypeError: keep_outliers is 1: it must be True or
 replace(TRACE, heights=np.full(400, np.nan)) -> InputError: t.csv holds 0 heights: at least 32
@@ -396,6 +464,7 @@ answer(control=Control(0)) -> ValueError: a path under a load turns at max_stres
 answer(control=Control(0), max_penetration=0.5) ->
     ValueError: a path under a load turns at max_stress: give that, and no max_penetration
 answer(max_stress=500.0) -> ValueError: max_stress is given, but a path under a separation
+answer(max_stress=500.0, preload=500.0) -> ValueError: preload and max_stress are given
 answer(quick=1) -> TypeError: quick is 1: it must be True or False
 answer(watch=1) -> TypeError: watch is 1: it must be a function, or None
 # files

@@ -36,10 +36,6 @@ def test_far_side_moves_by_the_penetration_and_the_springs_shortening():
 
 
 def test_a_layer_without_room_to_spread():
-    """ν = 0: E/d. Towards ν = 0.5 it becomes rigid, and there it is refused."""
+    """ν = 0: E/d. Towards ν = 0.5 it becomes rigid."""
     assert HalfSpace(2e6, 0.0).layer_stiffness(1e-2) == pytest.approx(2e8)
     assert HalfSpace(2e6, 0.4999).layer_stiffness(1e-2) > 1e11
-    with pytest.raises(ValueError, match=r"poisson is 0\.5"):
-        HalfSpace(2e6, 0.5).layer_stiffness(1e-2)
-    with pytest.raises(ValueError, match="thickness is 0"):
-        HalfSpace(2e6, 0.3).layer_stiffness(0)

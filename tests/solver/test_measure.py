@@ -55,8 +55,3 @@ def test_a_steep_wave_in_the_flat_measure_is_johnsons():
     found = loop_of(profile, wave.work_of_adhesion, "flat")
     assert found.loss == pytest.approx(wave.loop.loss, rel=1e-4)
     assert loop_of(profile, wave.work_of_adhesion, "arc").loss > 1.03 * found.loss
-
-
-def test_an_unknown_measure_is_refused():
-    with pytest.raises(ValueError, match="measure is 'projected': it must be one of arc, flat"):
-        Problem(ROUGH, SOFT, 0.3, measure="projected")

@@ -399,18 +399,3 @@ def test_a_range_is_a_strength():
     assert problem == Problem(rough(), SOLID, 1e-4, strength=1e6)
     assert replace(problem, work_of_adhesion=2e-4).strength == 1e6
     assert Problem(rough(), SOLID, 0.0, adhesion_range=1e-10).strength == math.inf
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"adhesion_range": 1e-9, "strength": 1e6}, "adhesion_range is 1e-09 and strength is"),
-        ({"adhesion_range": 0.0}, "adhesion_range is 0.0: it must be"),
-        ({"strength": -1.0}, "strength is -1.0: it must be"),
-        ({"strength": 1e3}, r"strength is 1000 Pa: it must be at least .* Pa for this profile"),
-        ({"adhesion_range": 1e-6}, r"adhesion_range is 1e-06 m: it must be at most .* m for this"),
-    ],
-)
-def test_a_strength_has_to_be_one_that_edges_of_zero_range_describe(options, message):
-    with pytest.raises(ValueError, match=message):
-        Problem(rough(), SOLID, 0.04, **options)

@@ -78,16 +78,6 @@ def test_a_loop_has_the_same_bits_whichever_others_were_followed_before_it():
     assert np.array_equal(after_another.loop(0.7).energy, branch().loop(0.7).energy)
 
 
-def test_a_path_of_one_turning_point_is_a_loop():
-    path = run_path(make_method("sharp", problem_of()), [0.8], load_steps=8)
-    loop = run_loop(make_method("sharp", problem_of()), max_penetration=0.8, load_steps=8)
-    assert path.work == pytest.approx(loop.loss, rel=1e-12)
-    assert path.loss_from_drops == loop.loss_from_drops
-    assert path.energy_change == 0
-    assert path.ends_out
-    assert path.minor_loops == ()
-
-
 @pytest.mark.parametrize("stiffness", [np.inf, 2e8])
 def test_minor_loops_are_found_and_audited(stiffness):
     """0.8 → 0.3 → 0.6 → out closes 0.3-0.6-0.3; a whole turn is work = energy change + drops."""
@@ -125,21 +115,3 @@ def test_a_path_may_end_in_contact():
     assert path.penetration[-1] == pytest.approx(0.3)
     assert path.energy_change < 0
     assert abs(path.audit_residual) < 1e-4
-
-
-@pytest.mark.parametrize(
-    ("points", "rule"),
-    [
-        ([], "at least one"),
-        ([-0.1], "start with loading"),
-        ([0.5, 0.6], "after loading it must unload"),
-        ([0.5, 0.3, 0.2], "after unloading it must load"),
-        ([0.5, 0.5], "after loading it must unload"),
-        ([0.5, np.nan, 0.6], "must be a finite number"),
-        ([1.2], "max_penetration is 1.2"),
-        ([0.5, 0.3], "omit that turning point"),
-    ],
-)
-def test_impossible_paths_are_refused(points, rule):
-    with pytest.raises(ValueError, match=rule):
-        run_path(make_method("sharp", problem_of()), points, load_steps=5)

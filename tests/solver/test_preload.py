@@ -197,24 +197,8 @@ def test_a_jump_beyond_the_preload_ends_the_leg_at_its_end():
     assert (part, reached) == (path, False)
 
 
-def test_what_cannot_be_a_preload_is_refused():
-    fixed, weight = (make_method("sharp", rough(Control(k))) for k in (np.inf, 0.0))
-    with pytest.raises(ValueError, match="a weight or a machine"):
-        run_loop(weight, preload=PRELOAD)
-    with pytest.raises(ValueError, match="a weight or a machine"):
-        run_loop(fixed, max_stress=PRELOAD)
-    with pytest.raises(ValueError, match="preload and max_stress are given"):
-        run_loop(fixed, max_stress=PRELOAD, preload=PRELOAD)
-    for bad in (0.0, -1.0, np.inf, np.nan):
-        with pytest.raises(ValueError, match=r"preload is .*: it must be"):
-            run_loop(fixed, preload=bad)
-    with pytest.raises(TypeError, match="preload is '20 kPa': it must be"):
-        run_loop(fixed, preload="20 kPa")
-    with pytest.raises(ValueError, match=r"max_penetration is 1\.0: it must be"):
-        run_loop(fixed, preload=PRELOAD, max_penetration=1.0)
-    with pytest.raises(ValueError, match="there must be some, all different"):
-        run_loops(fixed, preload=[PRELOAD, PRELOAD])
-    loop = run_loop(fixed, preload=PRELOAD, load_steps=5)
+def test_curves_of_a_preload_are_on_no_axis_of_load_steps():
+    loop = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=5)
     with pytest.raises(ValueError, match="between two load steps"):
         loop.on_axis("loading", loop.mean_stress)
 

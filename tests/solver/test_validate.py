@@ -172,13 +172,6 @@ def test_order_of_convergence_is_measured_from_the_losses(monkeypatch):
     assert not half.passed
 
 
-def test_names_that_are_not_validated_are_refused(capsys):
-    with pytest.raises(ValueError, match="method is 'auto'"):
-        validate(("auto",))
-    assert main(["validate", "--method", "magic"]) == 2
-    assert "method is 'magic': it must be one of grid, sharp" in capsys.readouterr().err
-
-
 def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, capsys):
     good = Row("loss", "grid", "64 nodes", 1e-4, 5e-3)
     bad = Row("width", "grid", "64 nodes", 1e-2, 5e-3, "note")

@@ -154,6 +154,18 @@ def start_python(*words: object) -> subprocess.Popen[str]:
     )
 
 
+def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]:
+    """Run this interpreter to its end, in an environment in which it can start ranks."""
+    return subprocess.run(
+        [sys.executable, *map(str, words)],
+        env=environment(**extra),
+        capture_output=True,
+        text=True,
+        timeout=150,
+        check=False,
+    )
+
+
 def ranks_of(launcher: int) -> list[int]:
     """Return the process ids of the ranks that a launcher has started."""
     found = []

@@ -1,0 +1,333 @@
+"""Command lines that are refused: code 2, one sentence with the option's name, and nothing done."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import adhesis.ensemble.command.loop as loop_command
+import adhesis.ensemble.command.trace as trace_command
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.run import launch
+from tests.support.campaign_support import write_campaign
+from tests.support.options import replacing
+
+# A case begins with a command or one of these, whose options give way to those of the case.
+BASES = {
+    "LOOP": "loop --hurst 0.8 --n0 2 --ratio 4",
+    "WAVE": "loop --heights wave.csv --period 1e-3 --work-of-adhesion 1e-10 --young 1e6"
+    " --poisson 0.5 --load-steps 2 --max-penetration 0.5",
+    "TRACE": "trace t.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5",
+    "BENCH": "bench --quick",
+}
+# Of {a,b} each is tried, and {} is the one that is. Indented lines go on.
+REFUSED = rf"""
+# files to start from
+new my.txt -> FILE.toml is my.txt: the name must end in .toml
+new c.toml -> FILE.toml is c.toml, which exists: give another name
+new none/my.toml -> FILE.toml is none/my.toml: there is no directory none
+sample text -> FILE is text, which exists
+sample directory -> FILE is directory: it is a directory
+completion '' -> SHELL is ''
+completion fish -> SHELL is 'fish': it must be one of 'bash', 'zsh'
+# campaigns
+run '' -> CAMPAIGN.toml is ''
+run text -> is not valid TOML
+run c.toml --out '' -> --out is ''
+run c.toml --out directory -> is a directory
+run c.toml --out none/r.h5 -> no folder
+run c.toml --out new.txt -> the name of a new results file must end in .h5
+run c.toml --out c.toml -> the campaign file itself
+run c.toml --out text -> text is not a results file of adhesis
+run c.toml --ranks 100000 -> at most {launch.largest_number_of_ranks()} are started here
+run c.toml --ranks {{x,0,-1,nan}} -> --ranks is '{{}}'
+run c.toml --walltime {{x,0,-1,nan}} -> --walltime is '{{}}': it must
+run c.toml --max-failures {{x,-1,nan,1e99,inf}} -> --max-failures is '{{}}'
+run c.toml --patience {{x,-1,nan,1e99,inf}} -> --patience is '{{}}'
+run c.toml --out p.h5 --part {{x,0/3,4/3,1/0}} -> --part is '{{}}': it must be K/N
+run c.toml --part 1/2 -> --part needs --out
+run c.toml --redo some -> --redo is 'some'
+run c.toml --hurst 0.7 -> --hurst needs --redo: it chooses the tasks to compute again
+run c.toml --realisation 1 -> --realisation needs --redo
+run c.toml --redo all --hurst {{x,-1,nan}} -> --hurst is '{{}}'
+run c.toml --redo all --realisation {{x,-1,nan}} -> --realisation is '{{}}'
+run c.toml --redo all --work-of-adhesion {{x,20mJ}} -> --work-of-adhesion is '{{}}': it must be
+run c.toml --redo all --work-of-adhesion {{-1,nan}} ->
+    --work-of-adhesion is {{}}: this campaign has no such task
+run c.toml --redo all --work-of-adhesion 40 ->
+    --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
+run c.toml --out r.h5 --redo failed --hurst 0.75 ->
+    --hurst is 0.75: this campaign has no such task
+run c.toml --out r.h5 --redo all --realisation 9 -> only 0, 1
+run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
+status '' -> FILE.h5 is ''
+status text -> is not a results file
+status r.h5 --interval {{x,-1,0,nan,inf,1e9}} -> --interval is '{{}}'
+status r.h5 --watch --json -> --watch and --json
+merge r.h5 -> required: --out
+merge r.h5 --out '' -> --out is ''
+merge '' --out all.h5 -> PART.h5 is ''
+merge text --out all.h5 -> is not a results file
+merge r.h5 --out none/all.h5 -> no folder
+report r.h5 -> required: --to
+report r.h5 --to '' -> --to is ''
+report '' --to out -> FILE.h5 is ''
+report text --to out -> is not a results file
+report r/curves.nc --to r -> curves.nc would be written there over r/curves.nc
+report r/curves.nc --to /proc/x/y -> --to is /proc/x/y: it cannot be written
+report r/curves.nc --to text -> --to is text:
+# tools
+validate --method '' -> --method is ''
+validate --method magic -> method is 'magic': it must be one of grid, sharp
+BENCH --budget {{0,-1,nan,inf}} -> --budget is
+BENCH --budget 0 -> --budget is 0.0: it must be a positive number of seconds
+BENCH --to {{text,text/below}} -> text is not a directory
+BENCH --to /proc/x -> --to is /proc/x: it cannot be written
+warm --own 3 -> unrecognized arguments: 3
+doctor --in none -> --in is none: it must be a folder that can be written
+doctor --in text -> --in is text: it must be a folder
+doctor --in '' -> --in is ''
+# the profile and the material of a loop
+loop -> no profile is given: give one of --hurst, --heights and --trace
+LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
+LOOP --amplitudes gauss -> --amplitudes is 'gauss': it must be one of
+LOOP --method magic -> --method is 'magic': it must be one of grid
+LOOP --decimal x -> --decimal is 'x': it must be one of ',', '.'
+LOOP --unit um -> --unit belongs to --trace
+LOOP --cut-off 1um -> --cut-off belongs to --trace
+LOOP --exclude 1mm:2mm -> --exclude belongs to --trace
+LOOP --period 1e300 -> --period is 1e+300, which would be 1e+300 m: give
+LOOP --period 1e-300 -> --period is 1e-300:
+LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
+LOOP --period 0mm -> --period is 0.0: it must be a positive number
+LOOP --h-rms 10 -> --h-rms is 10, which would be 10 m: give its unit, as in 10um (10m,
+LOOP --h-rms '0.5 furlong' -> --h-rms is '0.5 furlong': its unit must be one of m, cm
+LOOP --h-rms 100mm -> rms slope is
+LOOP --layer 5 -> --layer is 5, which would be 5 m: give its unit
+LOOP --layer 1e-3 -> poisson is 0.5
+LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
+LOOP --adhesion-range 0,3nm -> --adhesion-range is '0,3nm': it must be a
+LOOP --work-of-adhesion-open 0.01 -> -open is 0.01 J/m²: it must be at least the work of
+LOOP --work-of-adhesion-open 0,08 -> --work-of-adhesion-open
+LOOP --work-of-adhesion-open 0.08 --strength 1e9 -> beside a strength of
+LOOP --work-of-adhesion-open 0.08 --adhesion-range 1nm -> give one of them
+LOOP --work-of-adhesion-open 0.08 --work-of-adhesion 0 -> left out, as γ is 0
+LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
+LOOP --work-of-adhesion-open 0.08 --nodes-per-wave 32 -> --nodes-per-wave is 32 besi
+loop --heights none.npy --period 1e-3 -> with --heights the material has to be given
+loop --trace none.csv --young 1e6 -> with --trace the material has to be given
+loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
+loop --heights wave.csv --period 1e-3 --work-of-adhesion 0.01 --young 1e6 ->
+    --poisson is missing: with --heights
+loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
+    --heights needs --period
+WAVE --hurst 0.8 -> --hurst and --heights are given: give one of --hurst, --heights and --trace
+WAVE --seed 4 -> --seed belongs to --hurst
+WAVE --period=-1 -> --period is -1.0: it must be a positive number
+WAVE --step 1um -> --step belongs to --trace
+WAVE --degree 2 -> --degree belongs to --trace
+WAVE --delimiter : -> --delimiter is ':': it must be one of
+WAVE --strength 1e4 --adhesion-range 1e-9 -> --adhesion-range is 1e-09 and
+WAVE --strength 1e-4 -> --strength is 0.0001 Pa: it must be at least
+WAVE --measure projected -> --measure is 'projected': it must be one of arc, flat
+# the path of a loop
+LOOP --path=0.5,0.6,out -> after loading it must unload
+LOOP --path=-0.5,out -> it must start with loading
+LOOP --path=0.5,0.2,out -> ends with unloading to 0.2 and goes out: omit that turning
+LOOP --path=out -> holds no turning point
+LOOP --path=0.5,x -> must be numbers with commas
+LOOP --path=0.5 --max-penetration 0.5 -> a loop has one of them
+LOOP --path 0,5,0,2,out -> --path is '0,5,0,2,out': numbers have a decimal point, as in
+LOOP --max-penetration 90% -> --max-penetration is '90%': it must be one or more numbers between
+LOOP --max-penetration 0.5,0.5 -> turning points must differ
+LOOP --max-penetration {{0\,5,0\,3\,0\,6}} ->
+    --max-penetration is '{{}}': numbers have a decimal point
+LOOP --stiffness 1e9 --max-penetration 1,5 -> --max-penetration is '1,5': numbers have a decimal
+LOOP --stiffness 0 -> needs --max-stress
+LOOP --stiffness 0 --max-stress 2,5kPa -> --max-stress is '2,5kPa': numbers have a decimal point
+LOOP --max-stress 100 -> belongs to load control
+LOOP --max-stress 20kPa -> a weight or a machine? For a weight give --stiffness 0 with
+LOOP --max-stress 20kPa -> --max-stress 20kPa; for a machine, which turns at that mean
+LOOP --max-stress 20kPa --stiffness 1e9 -> give --preload 20kPa instead
+LOOP --preload 20kPa --stiffness 0 -> For a weight give --max-stress 20kPa with
+LOOP --preload 20kPa --max-stress 1 -> --max-stress and --preload are given
+LOOP --preload 20kPa --path 0.5,0.2 -> --path and --preload are given
+LOOP --preload 20kPa --max-penetration 0.5,0.6 -> beside --preload: it must be one
+LOOP --preload 1kPa --max-penetration 1 -> --max-penetration is 1.0: it must be
+LOOP --preload 20bar -> --preload is '20bar': its unit must be one of Pa, kPa
+LOOP --preload 20kPa,2e4 -> --preload is 20kPa,2e4: turning points must differ
+# outputs of a loop
+LOOP --csv directory -> --csv is directory: it is a directory
+LOOP --figure loop.bmp -> --figure is loop.bmp: the name must end in .png
+LOOP --film a.avi -> --film is a.avi: the name must end in .html, .gif or .mp4
+LOOP --film no/a.html -> --film is no/a.html: there is no directory no
+LOOP --film a.html --max-penetration 0.5,0.6 -> --film is given with 2 turning
+LOOP --film a.html --json a.html -> --json and --film are both a.html
+LOOP --film a.html --preload 1.0,2.0 -> give --preload one value
+LOOP --path 0.5,out --fields f.npz -> --fields belongs to one loop
+LOOP --fields f.txt -> must end in .npz
+LOOP --fields f.npz --nodes-per-wave 16 --field-nodes 9 -> 9 nodes are too few: the shortest wave
+WAVE --fields f.npz --field-nodes 1 -> 1 nodes are too few
+WAVE --fields f.npz --field-nodes 1000000000000 ->
+    --field-nodes is 1000000000000: with the fields of 8 states it must be at most 8388608
+WAVE --fields f.npz --field-penetrations 0.2 0.6 -> holds 0.6: the loop goes no deeper than 0.5
+LOOP --fields f.npz --field-penetrations 0,5 -> --field-penetrations is '0,5': it must be a
+LOOP --field-penetrations 0.5 -> --field-penetrations needs --fields, the file
+LOOP --preload 1 --field-stresses 1 -> --field-stresses needs --fields
+LOOP --preload 1 --fields f.npz --field-penetrations 0.1 ->
+    give --field-stresses, as 5kPa 10kPa, instead
+WAVE --json {{wave.csv,sub/../wave.csv,soft.csv,hard.csv}} ->
+    --json is {{}}, the file that --heights reads: it would be overwritten, so give another file
+WAVE --json new.png --figure new.png ->
+    --json and --figure are both new.png: each output needs a file of its own
+WAVE --json new.npz --fields ./sub/../new.npz -> --json and --fields are both
+WAVE --json there.json --figure there.png -> --json and --figure are both there.png
+WAVE --json sub -> --json is sub: it is a directory
+WAVE --json '' -> --json is '': it must be the name of a file
+WAVE --json 'a{chr(0)}b' -> --json is 'a\x00b': it must be the name of a file
+WAVE --json wave.csv/o.json -> there is no directory
+WAVE --json {300 * "x"} -> it cannot be written (File name too long)
+WAVE --fields no/f.npz -> --fields is no/f.npz: there is no directory
+WAVE --figure /proc/f.png -> --figure is /proc/f.png: it cannot be written
+loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --json t.txt ->
+    the file that --trace reads
+# traces
+trace t.txt -> required: --work-of-adhesion, --young, --poisson
+TRACE -> --to is missing: give the directory for the page, or --plan
+TRACE --plan -> states no unit
+TRACE --plan --unit um --columns 3 -> --columns is 3: it must name two of the 2
+TRACE --plan --unit um --columns 2 -> header states no step with its unit: give
+TRACE --plan --unit um --columns x -> --columns is 'x': it must be two whole
+TRACE --plan --unit um --cut-off 1m -> --cut-off is 1 m
+TRACE --plan --unit um --tip-radius 5 -> --tip-radius is 5, which would be 5 m
+TRACE --plan --unit um --tip-radius 5m -> trusted from 50 µm on (what a tip of
+TRACE --plan --unit um --tip-radius=-1um -> --tip-radius is -1e-06: it must be
+TRACE --plan --unit um --longest-gap '5 parsec' -> '5 parsec': its unit must be
+TRACE --plan --unit um --max-stress 5 -> a weight or a machine?
+TRACE --plan --unit um --stiffness 0 -> (--stiffness 0) needs --max-stress
+TRACE --plan --unit um --stiffness 0 --max-stress 0 -> --max-stress is 0
+TRACE --plan --unit um --stiffness 1 --layer 1mm -> --stiffness and --layer are given: give one
+TRACE --plan --unit um --degree 9 -> --degree is 9
+TRACE --plan --unit um --max-penetration deep -> --max-penetration is 'deep'
+TRACE --plan --max-penetration 0,5 -> --max-penetration is '0,5': numbers have a decimal point
+TRACE --plan --unit um --step 1um -> --step belongs to heights without
+TRACE --plan --unit um --method magic -> method is 'magic'
+TRACE --plan --unit um --processes 0 -> --processes is 0
+TRACE --plan --work-of-adhesion {{0\,04,0.02\,0\,04,2\,5mJ/m2}} ->
+    --work-of-adhesion is '{{}}': numbers have a decimal point, as in
+TRACE --plan --work-of-adhesion 1.0,1.0 -> is '1.0,1.0': its values must
+TRACE --plan --work-of-adhesion '1;2' -> --work-of-adhesion is '1;2': it must be a
+TRACE --plan --work-of-adhesion 0.04,40 -> --work-of-adhesion is 40, which would be 40 J/m²
+TRACE --plan --work-of-adhesion 20mJ -> --work-of-adhesion is '20mJ': it must be a number in J/m²
+TRACE --plan --unit um --work-of-adhesion=-1 -> --work-of-adhesion is -1
+TRACE --plan --unit um --exclude 1mm -> --exclude is '1mm': it must be two positions with a colon
+TRACE --plan --unit um --exclude 0.1:0.2:0.3mm -> it must be two positions with a colon
+TRACE --plan --unit um --exclude 1,2mm:1,3mm ->
+    --exclude is '1,2mm:1,3mm': a position of it is '1,2mm': it must be a
+TRACE --plan --unit um --exclude 200:300um ->
+    a position of it is 200, which would be 200 m: give its unit
+TRACE --plan --unit um --exclude 0.3mm:0.2mm ->
+    --exclude holds the range from 300 µm to 200 µm: a range must begin
+TRACE --unit um --to out --work-of-adhesion 0.04,0.02 --work-of-adhesion-open 0.1 ->
+    beside 2 works of adhesion: give one of
+TRACE --unit um --to out --work-of-adhesion-open 0.01 -> -open is 0.01 J/m²: it must be at least the
+TRACE --unit um --to out --work-of-adhesion-open 0.08 --strength 1e9 -> beside a strength of 1e
+TRACE --unit um --to out --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' besi
+loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --seed 1 ->
+    --seed belongs to --hurst
+loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --period 1 ->
+    --period belongs to --hurst
+loop --trace t.txt --hurst 0.8 --work-of-adhesion 1 --young 1e6 --poisson 0.5 ->
+    --hurst and --trace are given: give one of
+loop --trace t.txt --unit um --work-of-adhesion 1 --young 1e6 --poisson 0.5 --degree 8 ->
+    --degree is 8
+trace ow/trace.md --work-of-adhesion 1 --young 1e6 --poisson 0.5 --unit um --to ow ->
+    --to is ow: trace.md would be written there over ow/trace.md, the file that the command reads
+trace ow/trace.md --work-of-adhesion 1 --young 1e6 --poisson 0.5 --unit um --to linked ->
+    --to is linked: trace.md would
+TRACE --unit um --to {{text,text/x}} -> text is not a directory
+TRACE --unit um --to /proc/x -> --to is /proc/x: it cannot be written
+TRACE --unit um --to way -> trace.html is to be written there
+"""
+
+
+def cases() -> list[Any]:
+    """Return the words and the sentence of each case."""
+    found = []
+    for line in re.sub(r"->\n +", "-> ", REFUSED).split("\n"):
+        if not line or line.startswith("#"):
+            continue
+        text, sentence = line.split("-> ", 1)
+        braces = re.search(r"\{(.*?)\}", text)
+        several = re.split(r"(?<!\\),", braces[1]) if braces else [""]
+        for one in (value.replace("\\,", ",") for value in several):
+            command, *more = shlex.split(text.replace(braces[0], one) if braces else text)
+            words = replacing(shlex.split(BASES.get(command, command)), more)
+            name = " ".join(words)[:80].replace("\0", "NUL")
+            found.append(pytest.param(words, sentence.replace("{}", one), id=name))
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The current folder, with what the cases name, in which no work begins."""
+    folder = tmp_path_factory.mktemp("refused")
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.chdir(folder)
+        fill(folder)
+        for name in ("run_loop", "run_loops", "run_path"):
+            monkeypatch.setattr(loop_command, name, begins)
+        monkeypatch.setattr(trace_command, "run_plan", begins)
+        monkeypatch.setattr("adhesis.ensemble.bench.equal_error.benchmark", begins)
+        yield folder
+
+
+def begins(*_: object, **__: object) -> None:
+    raise AssertionError("bad input reached the computation")
+
+
+def fill(folder: Path) -> None:
+    create(folder / "r.h5", load_campaign(write_campaign(folder)))
+    for name in ("directory", "sub", "ow", "r", "way/trace.html"):
+        Path(name).mkdir(parents=True)
+    Path("text").write_text("notes")
+    Path("r/curves.nc").write_bytes(b"")
+    heights = 1e-9 * np.cos(np.arange(16) * np.pi / 8)
+    Path("wave.csv").write_text("\n".join(map(repr, heights.tolist())))
+    os.link("wave.csv", "hard.csv")
+    x = np.arange(200)
+    lines = [f"{a / 2} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
+    for name in ("t.txt", "ow/trace.md"):
+        Path(name).write_text("\n".join(lines))
+    for link, target in {"soft.csv": "wave.csv", "there.json": "there.png", "linked": "ow"}.items():
+        Path(link).symlink_to(target)
+
+
+def content(folder: Path) -> dict[str, bytes | None]:
+    """Return the files of a folder and what they hold, but for locks."""
+    files = (path for path in folder.rglob("*") if path.suffix != ".lock")
+    return {str(path): path.read_bytes() if path.is_file() else None for path in files}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("words", "sentence"), cases())
+def test_bad_words_are_one_sentence(
+    words: list[str], sentence: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = content(folder)
+    assert main(words) == 2
+    printed = capsys.readouterr()
+    (line,) = printed.err.splitlines()
+    assert printed.out == ""
+    assert line.startswith(f"adhesis {words[0]}: ")
+    assert sentence in line
+    assert content(folder) == before
