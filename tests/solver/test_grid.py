@@ -23,6 +23,7 @@ from tests.support.scenes import HALF_SPACE
 from tests.support.wave_stress_intensity import stress_intensity
 
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5
+ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 
 
 def wave(alpha: float) -> SingleWave:
@@ -45,6 +46,64 @@ def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6, **opti
 
 
 # ------------------------------------------------------------------ the single wave
+
+
+@pytest.mark.parametrize("alpha", ALPHAS)
+def test_a_single_wave_has_two_large_jumps(alpha):
+    """Its losses are held to the closed form by ``adhesis validate``, in test_validate.py."""
+    result = run_loop(wave_method(alpha, nodes=1024), max_penetration=0.1, load_steps=2)
+    large = [j.kind for j in result.jumps if j.energy_drop > 0.01 * wave(alpha).loop.loss]
+    assert large == ["snap-in", "pull-off"]
+
+
+@pytest.mark.parametrize("alpha", [0.2, 0.4])
+def test_drops_converge_to_the_exact_loss(alpha):
+    nodes = np.array([64, 128, 256, 512])
+    exact = wave(alpha).loop.loss
+    errors = []
+    for n in nodes.tolist():
+        method = wave_method(alpha, nodes=n, accuracy=1e-4)
+        result = run_loop(method, max_penetration=0.05, load_steps=1)
+        errors.append(abs(result.loss_from_drops / exact - 1))
+    order = -np.polyfit(np.log(nodes), np.log(errors), 1)[0]
+    assert order > 1.2
+    assert errors[-1] < 2e-3
+
+
+def test_branch_states_are_johnsons():
+    exact = wave(0.3)
+    method = wave_method(0.3, nodes=2048)
+    state = method.follow(method.detached(AMPLITUDE), AMPLITUDE).states[-1]
+    for separation in (0.9, 0.7, 0.5, 0.8, 1.2, 1.3):
+        state = method.follow(state, separation * AMPLITUDE).states[-1]
+        a = exact.half_width(separation * AMPLITUDE)
+        assert state.separation == separation * AMPLITUDE
+        assert state.contact_fraction == pytest.approx(2 * a / PERIOD, abs=1.5 / 2048)
+        scale = exact.full_contact_stress
+        assert state.mean_stress / scale == pytest.approx(
+            float(exact.mean_stress(a)) / scale, abs=1e-3
+        )
+        assert state.energy == pytest.approx(
+            float(exact.energy(a)), abs=1e-3 * scale * AMPLITUDE * PERIOD
+        )
+
+
+@pytest.mark.parametrize("penetration", [0.1, 0.5, 0.9, 0.99])
+def test_without_adhesion_the_single_wave_is_westergaards(penetration):
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, 0.0)
+    method = grid_of(problem, nodes=2048)
+    s = (1 - penetration) * AMPLITUDE
+    state = method.follow(method.detached(AMPLITUDE), s).states[-1]
+    # s = A (1 - y + y ln y), p̄ = p* y, y = sin²(πa/λ)
+    y = np.sin(0.5 * np.pi * state.contact_fraction) ** 2
+    assert AMPLITUDE * (1 - y + y * np.log(y)) == pytest.approx(s, abs=3e-3 * AMPLITUDE)
+    full = np.pi * HALF_SPACE.modulus * AMPLITUDE / PERIOD
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        mid = 0.5 * (low + high)
+        low, high = (mid, high) if 1 - mid + mid * np.log(mid) > 1 - penetration else (low, mid)
+    assert state.mean_stress == pytest.approx(full * low, rel=2e-5)
+    assert method.fields(state, 2048).stress.min() >= 0
 
 
 def test_edge_stress_is_that_of_the_stress_intensity():

@@ -168,6 +168,18 @@ def test_no_loss_without_adhesion():
     assert result.mean_stress.min() > -1e-3 * result.mean_stress.max()
 
 
+def test_westergaard_without_adhesion():
+    amplitude, period = 1e-6, 1e-3
+    result = loop(single_wave(amplitude, period), 0.0, max_penetration=0.95, accuracy=1e-6)
+    p_star = np.pi * HALF_SPACE.modulus * amplitude / period
+    inside = (result.contact_fraction > 0.05) & (result.branch == "loading")
+    y = np.sin(np.pi * result.contact_fraction[inside] / 2) ** 2
+    assert inside.sum() > 5
+    assert np.allclose(result.mean_stress[inside] / p_star, y, atol=2e-6)
+    separation = amplitude * (1 - y + y * np.log(y))
+    assert np.allclose(result.separation[inside], separation, rtol=1e-4, atol=1e-12)
+
+
 def test_first_touch_may_run_to_almost_full_contact():
     """Strong adhesion: one jump closes all but the last gap, which stays as the mean gap is s."""
     result = loop(rough(), 5.0, max_penetration=0.5, load_steps=5)
