@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import signal
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -83,21 +83,23 @@ def test_a_launcher_that_hangs_is_given_up(tmp_path: Path, monkeypatch: pytest.M
     assert any("did not end within" in check.text for check in diagnosis.checks)
 
 
-def test_an_interrupt_ends_what_was_started_before_its_folder_goes(tmp_path: Path) -> None:
-    hanging = tmp_path / "mpirun"
-    hanging.write_text(f"#!/bin/sh\necho $$ >{tmp_path}/pid; kill -TERM $PPID; exec sleep 600\n")
-    hanging.chmod(0o755)
+def test_an_interrupt_ends_what_was_started_before_its_folder_goes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """While it waits: an interrupt in the middle of the start is the standard library's."""
+    started: list[subprocess.Popen[str]] = []
+    wait = subprocess.Popen.communicate
 
-    def interrupt(*_: object) -> None:
+    def interrupted(process: subprocess.Popen[str], *_: object, **options: Any) -> object:
+        if process in started:
+            return wait(process, **options)
+        started.append(process)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            doctor._failure_of([str(hanging)], dict(os.environ))
-    finally:
-        signal.signal(signal.SIGTERM, before)
-    assert has_ended(int((tmp_path / "pid").read_text()))
+    monkeypatch.setattr(subprocess.Popen, "communicate", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        doctor._failure_of(["sleep", "600"], dict(os.environ))
+    assert has_ended(started[0].pid)
 
 
 def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any]) -> None:
