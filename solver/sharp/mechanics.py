@@ -8,6 +8,16 @@ from typing import Any
 import numpy as np
 
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.core import (
+    choose_orders,
+    descend,
+    equilibrium_many,
+    map_gaps,
+    shortest_length,
+    solve_many,
+    solve_separately,
+    tangent_between,
+)
 from adhesis.solver.sharp.descent.implicit_flow import (
     AT_REST,
     NO_FIELD,
@@ -15,22 +25,16 @@ from adhesis.solver.sharp.descent.implicit_flow import (
     VANISHED,
     Descent,
     Running,
-    descend,
 )
 from adhesis.solver.sharp.descent.saddle import leaving_step, positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.condensed import tangent_between
 from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
     imbalance,
     move_edges,
-    shortest_length,
     step_limits,
 )
-from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
-    EquilibriumOfMany,
-    equilibrium_many,
-)
+from adhesis.solver.sharp.equilibrium.hierarchical_newton import EquilibriumOfMany
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import (
@@ -38,12 +42,9 @@ from adhesis.solver.sharp.field.gap_field import (
     GapField,
     respond_at_fixed_edges,
 )
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import (

@@ -17,8 +17,8 @@ from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
+from adhesis.solver.sharp.core import shortest_length
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
-from adhesis.solver.sharp.equilibrium.griffith import shortest_length
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound

@@ -15,11 +15,11 @@ from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
 from adhesis.solver.sharp.continuation.jump import Jumps, Orders
 from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.sharp.core import map_gaps
 from adhesis.solver.sharp.descent.saddle import positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import step_limits
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED

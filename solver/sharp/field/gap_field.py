@@ -38,7 +38,8 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.solution import LoadingDevice, Solution, edge_openings
+from adhesis.solver.sharp.core import edge_openings
+from adhesis.solver.sharp.field.solution import LoadingDevice, Solution
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES
 

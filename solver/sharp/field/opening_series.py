@@ -17,6 +17,7 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp import core, native
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.conformal_map import (
@@ -119,6 +120,11 @@ def _work_of_gaps(
 def work_of_gaps(field: GapField) -> float:
     """Integrate S_full T dθ over the gaps."""
     solution, source = field.solution, field.source
+    if core.is_native:
+        return native.work_of_gaps(
+            solution.nodes, solution.equations.load[:, 0].copy(), solution.scaled_opening,
+            source.top, source.panels,
+        )  # fmt: skip
     return _work_of_gaps(
         solution.nodes, solution.equations.load, solution.scaled_opening, GAUSS_RULES, source.top,
         source.panels,
@@ -154,7 +160,9 @@ def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> GapO
     solution = field.solution
     fewest = GAUSS_RULES.counts[solution.nodes.orders[k]]
     count = count_sine_nodes(solution.nodes.table[k], fewest, field.source.top, per_wave)
-    theta, theta_by_t, opening, modes = open_gap(
+    theta, theta_by_t, opening, modes = native.open_gap(
+        solution.nodes, k, solution.scaled_opening, count, field.source.panels
+    ) if core.is_native else open_gap(
         solution.nodes, k, solution.scaled_opening, tabulate_circle(count + 1), GAUSS_RULES,
         field.source.panels,
     )  # fmt: skip

@@ -134,7 +134,8 @@ class StressSource:
         self._piece_x = ((start + (y + 1) / 2) / pieces).ravel()
         self._piece_w = np.tile(v / (2 * pieces), pieces)
         # ∫ sqrt(1 + h'²) dθ from 0 to the start of each finest panel
-        whole = _lengths(np.arange(count), np.ones(count), tilt, self._piece_x, self._piece_w)
+        on_nodes = chebyshev.chebval(2 * self._piece_x - 1, tilt.T)
+        whole = np.sqrt(1 + on_nodes**2) @ self._piece_w
         self._measure_before = np.concatenate([[0.0], np.cumsum(whole * width)])
 
         # ω of the finest level, then each parent from its two children: exact for polynomials.
@@ -173,6 +174,12 @@ class StressSource:
 
         Patches have shape (L, 2), by their left edges, which lie in [0, 2π).
         """
+        from adhesis.solver.sharp import core, native
+
+        if core.is_native:
+            return native.contact_between(
+                gaps, self._measure_before, self.panels, self._piece_x, self._piece_w
+            )
         patches, measure = _contact_between(
             gaps, self._measure_before, self.panels.tilt, self._piece_x, self._piece_w
         )

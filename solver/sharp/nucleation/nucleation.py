@@ -18,6 +18,7 @@ import numpy as np
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp import core, native
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.gap_field import GapField
@@ -206,6 +207,13 @@ class Nucleation:
         Only those are searched; see ``clearance``.
         """
         solution = field.solution
+        if core.is_native:
+            least, count, found, self.searched = native.search(
+                field.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES,
+                field.source.panels, self._lengths, self.searched,
+            )  # fmt: skip
+            self.edges.count.openings += count
+            return least, Minima(*found)
         least, count, minima, self.searched = search(
             field.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES, field.source.panels,
             self._lengths, self.searched,
@@ -226,6 +234,11 @@ class Nucleation:
         """Compute the clearance of each of some gaps."""
         self.edges.count.openings += len(indices)
         solution, out = field.solution, np.empty(len(field.gaps))
+        if core.is_native:
+            return native.least_clearances(
+                indices, solution.nodes, solution.scaled_opening, field.source.panels,
+                self._lengths,
+            )  # fmt: skip
         search_gaps(
             indices, solution.nodes, solution.scaled_opening, GAUSS_RULES, field.source.panels,
             self._lengths, out,
@@ -235,11 +248,17 @@ class Nucleation:
     def track_between(self, clear: Point, hit: Point) -> ClearanceInterpolation | None:
         """Track the gaps that are open at one point and overlap at another."""
         solution, lengths = hit.field.solution, self._lengths
-        left = clearance_left(
-            hit.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES, self.searched,
-            lengths.max_displacement, lengths.closing_per_motion,
-        )  # fmt: skip
-        closed = np.flatnonzero(left.clearance <= 0)
+        if core.is_native:
+            remaining = native.clearance_left(
+                solution.nodes, solution.scaled_opening, hit.field.source.panels, lengths,
+                self.searched,
+            )  # fmt: skip
+        else:
+            remaining = clearance_left(
+                hit.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES, self.searched,
+                lengths.max_displacement, lengths.closing_per_motion,
+            ).clearance  # fmt: skip
+        closed = np.flatnonzero(remaining <= 0)
         after = self._clearance_of(hit.field, closed)
         closed, after = closed[after < 0], after[after < 0]
         if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:

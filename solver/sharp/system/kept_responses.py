@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.griffith import shortest_length
-from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
-from adhesis.solver.sharp.equilibrium.renewal import settle_response
-from adhesis.solver.sharp.equilibrium.response_setup import (
+from adhesis.solver.sharp.core import (
+    choose_orders,
     count_unknown,
+    map_gaps,
     set_up_response,
+    settle_response,
+    shortest_length,
     update_response,
 )
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.tolerances import RESPONSE_TRIALS, RESPONSES_KEPT
 
