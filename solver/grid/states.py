@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from adhesis.solver._kernels import total
 from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.edges import Indices
-from adhesis.solver.grid.kernels import patch_ranges, total
 from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.method import ContactState
 
 EDGE_OFFSET = 0.190

@@ -61,7 +61,7 @@ double clearance_since(const Field& field, int k, const SearchedGap& was,
 }  // namespace
 
 RemainingClearance clearance_left(const Field& field, const SearchedGaps& searched,
-                                  const SearchLengths& lengths, const Model& model) {
+                                  const SearchLengths& lengths) {
   const int count = field.nodes.gap_count();
   RemainingClearance out{Vector(count, -1), Integers(count, -1), {}};
   size_t j = 0;
@@ -69,7 +69,7 @@ RemainingClearance clearance_left(const Field& field, const SearchedGaps& search
     const double least = field.nodes.gaps[k].end[0] - lengths.max_displacement;
     while (j < searched.size() && searched[j]->end[0] < least) ++j;
     if (j < searched.size()) {
-      const GaussRule& rule = (*model.rules)[field.nodes.orders[k]];
+      const GaussRule& rule = gauss_rules()[field.nodes.orders[k]];
       const double left = clearance_since(field, k, *searched[j], lengths, rule);
       // a clearance that is left is positive: below zero it would have to be searched
       if (left != -1) {
@@ -104,14 +104,13 @@ Vector least_clearances(const std::vector<Minimum>& minima, int gaps,
   return out;
 }
 
-Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths,
-              const Model& model) {
+Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths) {
   const Nodes& nodes = field.nodes;
   const int count = nodes.gap_count();
-  RemainingClearance left = clearance_left(field, searched, lengths, model);
+  RemainingClearance left = clearance_left(field, searched, lengths);
   Search out;
   out.count = int(left.to_search.size());
-  out.minima = find_minima(field, left.to_search, lengths.top, model);
+  out.minima = find_minima(field, left.to_search);
   const Vector found = least_clearances(out.minima, count, lengths);
   for (int k : left.to_search) left.clearance[k] = found[k];
   out.least = *std::min_element(left.clearance.begin(), left.clearance.end());
@@ -120,7 +119,7 @@ Search search(const Field& field, const SearchedGaps& searched, const SearchLeng
       out.searched.push_back(searched[left.before[k]]);
       continue;
     }
-    const GaussRule& rule = (*model.rules)[nodes.orders[k]];
+    const GaussRule& rule = gauss_rules()[nodes.orders[k]];
     const auto first = nodes.theta.begin() + nodes.offset[k];
     out.searched.push_back(std::make_shared<SearchedGap>(
         SearchedGap{nodes.gaps[k].end, nodes.orders[k], Vector(first, first + rule.count),

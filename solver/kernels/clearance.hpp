@@ -23,7 +23,6 @@ struct SearchLengths {
   double closing_per_motion;  // closing beside an edge over the motion of the edge
   double surface;             // Γ
   double narrowest, widest;   // of a seed
-  int top;                    // highest harmonic of the profile
 };
 
 // A gap as it was when it was last searched; its clearance is infinite where there is no minimum.
@@ -43,7 +42,7 @@ struct RemainingClearance {
 };
 
 RemainingClearance clearance_left(const Field& field, const SearchedGaps& searched,
-                                  const SearchLengths& lengths, const Model& model);
+                                  const SearchLengths& lengths);
 
 // Opening left at a minimum before a seed is put; not positive at a touch.
 double clearance_of(double opening, double curvature, const SearchLengths& lengths);
@@ -59,8 +58,7 @@ struct Search {
 };
 
 // Find the least clearance of a field, searching only gaps that may have closed.
-Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths,
-              const Model& model);
+Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths);
 
 // Find the least clearance at these minima in each of so many gaps, infinite where there is none.
 Vector least_clearances(const std::vector<Minimum>& minima, int gaps, const SearchLengths& lengths);

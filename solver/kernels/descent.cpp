@@ -2,42 +2,12 @@
 
 #include <algorithm>
 
-#include "edge_model.hpp"
+#include "signals.hpp"
+#include "step_size.hpp"
 
 namespace adhesis {
 
 namespace {
-
-// Measure by how much the openings of the model are wrong, in units of what is allowed.
-//
-// `residual` is C - C_c of the field at the end. On the way the errors are taken to grow as the
-// square of its length, and far from balance more is allowed.
-double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
-                   const Vector& ends, const EdgeLaw& law, const Panels& panels) {
-  double worst = 0;
-  for (size_t e = 0; e < residual.size(); ++e) {
-    const double critical = critical_opening(ends[edges[e]], law, panels).value;
-    const double at_end = std::abs(residual[e] + critical - flow.opening[e]);
-    for (size_t i = 0; i < flow.lengths.size(); ++i) {
-      const double share = flow.lengths[i] / flow.lengths.back();
-      const double error = share * share * at_end;
-      const double unbalance = std::max(std::abs(flow.residuals[i][e]) - error, 0.0);
-      const double allowed = MODEL_ERROR * law.critical + MODEL_SHARE * unbalance;
-      // not written as > : an error that is no number is too large
-      if (!(error <= worst * allowed)) worst = error / allowed;
-    }
-  }
-  return worst;
-}
-
-// Choose the next reach after a long step of this length, in longest steps, and error.
-double next_reach(double before, double length, double error) {
-  const double safe = REACH_SAFETY / std::sqrt(std::max(error, 1e-9));
-  const double factor = std::min(REACH_GROWTH, std::max(REACH_CUT, safe));
-  double reach = length * factor;
-  if (error <= 1) reach = std::max(reach, factor >= 1 ? before : 0.0);
-  return std::min(reach, LONGEST_REACH);
-}
 
 // Compute the norm of the forces C_c² - C |C| from C - C_c at some edges.
 double force_at(const Vector& residual, const Integers& edges, const Vector& ends,
@@ -208,8 +178,9 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   double pressure = response.pressure_at(prescribed, device), strongest = 0;
   bool moved = true, judges = false;
   while (out.steps < most_steps) {
+    check_signals();
     if (!moved) {
-      condense_gaps(response, hold_edges(response, ends, held), model);
+      condense_gaps(response, hold_edges(response, ends, held));
     } else if (!move_references(response, ends, held, pressure, prescribed, law, model)) {
       out.event = DescentEvent::outgrown;
       break;

@@ -23,17 +23,8 @@ double share_within(const EdgeModel& model, const Vector& step, const Vector& li
   return share;
 }
 
-struct ImplicitStep {
-  Vector step;
-  double size = 0;     // largest motion
-  bool stable = true;  // with the time of the largest force
-};
+}  // namespace
 
-// Take a linearly implicit step in which no edge moves further than `longest`.
-//
-// The time Δτ is that in which the largest force alone would move its edge so far; with equal
-// speeds every edge has its own time, in which its own force would. It is less where 1/Δτ + H is
-// not positive definite: the step would not be downhill.
 ImplicitStep implicit_step(const Matrix& hessian, const Vector& force, double longest,
                            bool equal_speeds) {
   const int n = hessian.n;
@@ -62,8 +53,6 @@ ImplicitStep implicit_step(const Matrix& hessian, const Vector& force, double lo
   }
   return out;
 }
-
-}  // namespace
 
 EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& residual,
                      const Matrix& tangent, const EdgeLaw& law, const Panels& panels)

@@ -48,10 +48,13 @@ class EdgeModel {
   // H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others.
   void hessian(Matrix& out) const;
 
+  // ∂C_e/∂n_f over C_f; zero on the diagonal.
+  const Matrix& coupling() const { return coupling_; }
+
  private:
   const EdgeLaw& law_;
   const Panels& panels_;
-  Matrix coupling_;  // ∂C_e/∂n_f over C_f; zero on the diagonal
+  Matrix coupling_;
 
   // Evaluate R, C_c and the rates at the present edges.
   void evaluate(MovingEdge& edge) const;
@@ -59,6 +62,20 @@ class EdgeModel {
   // Move the edges by half the steps; coupling and rates of neighbours follow the lengths between.
   void follow_lengths(const Vector& step);
 };
+
+struct ImplicitStep {
+  Vector step;
+  double size = 0;     // largest motion
+  bool stable = true;  // with the time of the largest force
+};
+
+// Take a linearly implicit step in which no edge moves further than `longest`.
+//
+// The time Δτ is that in which the largest force alone would move its edge so far; with equal
+// speeds every edge has its own time, in which its own force would. It is less where 1/Δτ + H is
+// not positive definite: the step would not be downhill.
+ImplicitStep implicit_step(const Matrix& hessian, const Vector& force, double longest,
+                           bool equal_speeds);
 
 // Flow through the model.
 struct ModelFlow {

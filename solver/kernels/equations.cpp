@@ -76,11 +76,11 @@ void fill_block(const Gap& gap, const double* theta, const double* weight, const
 
 }  // namespace
 
-Nodes::Nodes(std::vector<Gap> given, Integers orders_given, const GaussRules& rules)
+Nodes::Nodes(std::vector<Gap> given, Integers orders_given)
     : gaps(std::move(given)), orders(std::move(orders_given)), offset{0}, square{0},
       slope(gaps.size()) {
   for (int order : orders) {
-    const int m = rules[order].count;
+    const int m = gauss_rules()[order].count;
     offset.push_back(offset.back() + m);
     square.push_back(square.back() + m * m);
   }
@@ -94,7 +94,7 @@ Equations allocate_equations(const Nodes& nodes) {
 }
 
 void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model& model) {
-  const GaussRule& rule = (*model.rules)[nodes.orders[k]];
+  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   Vector s(m * fields);
   EndTerms ends = {};

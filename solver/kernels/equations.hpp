@@ -19,7 +19,7 @@ struct Nodes {
   std::vector<std::array<double, 2>> slope;    // dη/dθ at both ends of each gap
 
   Nodes() = default;
-  Nodes(std::vector<Gap> gaps, Integers orders, const GaussRules& rules);
+  Nodes(std::vector<Gap> gaps, Integers orders);
 
   int gap_count() const { return int(gaps.size()); }
   int size() const { return int(theta.size()); }

@@ -14,11 +14,11 @@ void weigh_inverse(const double* inverse, const GaussRule& rule, double* respons
       response[i * m + j] = rule.weights[i] * inverse[i * m + j] * rule.weights[j];
 }
 
-Tree build_tree(const Nodes& nodes, const GaussRules& rules, double digits) {
+Tree build_tree(const Nodes& nodes, double digits) {
   const auto halves = pair_runs(nodes.gap_count());
   Tree tree(nodes, halves, Integers(halves.size(), 0), digits);
   for (int k = 0; k < nodes.gap_count(); ++k) {
-    const Vector& w = rules[nodes.orders[k]].weights;
+    const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     for (int i = 0; i < nodes.size_of(k); ++i) {
       const int node = nodes.offset[k] + i;
       tree.theta[node] = nodes.theta[node];
@@ -56,25 +56,24 @@ Vector solve_load(const Nodes& nodes, const FactoredGaps& gaps, const Vector& we
   return apply_inverse(nodes, gaps.inverse, rest);
 }
 
-// Evaluate C = sqrt(2 dη/dθ) [f(±1) - end terms] at every gap end.
+}  // namespace
+
 Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equations,
-                     const GaussRules& rules) {
+                     bool with_end_terms) {
   Vector out(2 * nodes.gap_count());
-  for (int k = 0; k < nodes.gap_count(); ++k)
-    for (int side = 0; side < 2; ++side) {
-      const Vector& end_values = rules[nodes.orders[k]].end_values[side];
-      const double value = dot(end_values.data(), &f[nodes.offset[k]], nodes.size_of(k));
-      out[2 * k + side] =
-          std::sqrt(2 * nodes.slope[k][side]) * (value - equations.end_terms[k][side][0]);
-    }
+  for (int e = 0; e < int(out.size()); ++e) {
+    const int k = e / 2, side = e % 2;
+    const Vector& end_values = gauss_rules()[nodes.orders[k]].end_values[side];
+    double value = dot(end_values.data(), &f[nodes.offset[k]], nodes.size_of(k));
+    if (with_end_terms) value -= equations.end_terms[k][side][0];
+    out[e] = std::sqrt(2 * nodes.slope[k][side]) * value;
+  }
   return out;
 }
 
-}  // namespace
-
 SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders, int fields,
                         const Model& model) {
-  const GaussRules& rules = *model.rules;
+  const std::vector<GaussRule>& rules = gauss_rules();
   std::vector<Gap> gaps = map_gaps(ends);
   const int count = int(gaps.size());
   bool solvable = in_order(gaps);
@@ -83,9 +82,9 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
     for (int e = 0; e < 2 * count; ++e) any[e] = e * pi / count;
     gaps = map_gaps(any);
   }
-  SolvedField out;
+  SolvedField out{Field(model), {}};
   Field& field = out.field;
-  field.nodes = Nodes(gaps, orders, rules);
+  field.nodes = Nodes(gaps, orders);
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
   const int n = nodes.size();
@@ -96,7 +95,7 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
     solvable &= invert_definite(&field.equations.blocks[at], nodes.size_of(k),
                                 &out.factored.inverse[at]);
   }
-  out.factored.tree = build_tree(nodes, rules, model.digits);
+  out.factored.tree = build_tree(nodes, model.digits);
   Tree& tree = out.factored.tree;
   Vector weights(n);
   for (int k = 0; k < count; ++k) {
@@ -120,16 +119,16 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
   field.scaled_opening.resize(n);
   for (int i = 0; i < n; ++i)
     field.scaled_opening[i] = -field.solved[0][i] - field.pressure * field.solved[1][i];
-  field.opening = edge_openings(field.scaled_opening, nodes, field.equations, rules);
+  field.opening = edge_openings(field.scaled_opening, nodes, field.equations, true);
   return out;
 }
 
 Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,
                        const Vector& potential, double pressure, double prescribed,
                        const Model& model) {
-  const GaussRules& rules = *model.rules;
-  Field field;
-  field.nodes = Nodes(map_gaps(ends), orders, rules);
+  const std::vector<GaussRule>& rules = gauss_rules();
+  Field field(model);
+  field.nodes = Nodes(map_gaps(ends), orders);
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
   const int n = nodes.size();
@@ -158,16 +157,16 @@ Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const 
   field.pressure = pressure + more;
   add_scaled(-more, by_pressure.data(), f.data(), n);
   field.separation = compliance != 0 ? (mean - more * unit_mean) / (2 * pi) : prescribed;
-  field.opening = edge_openings(f, nodes, field.equations, rules);
+  field.opening = edge_openings(f, nodes, field.equations, true);
   field.scaled_opening = f;
   return field;
 }
 
-Vector gap_potentials(const Field& field, const GaussRules& rules) {
+Vector gap_potentials(const Field& field) {
   const Nodes& nodes = field.nodes;
   Vector out(nodes.size());
   for (int k = 0; k < nodes.gap_count(); ++k) {
-    const Vector& w = rules[nodes.orders[k]].weights;
+    const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     const int m = nodes.size_of(k), first = nodes.offset[k];
     for (int i = 0; i < m; ++i) {
       // A f + w g + S~ + p X = 0

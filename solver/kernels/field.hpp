@@ -9,6 +9,7 @@
 namespace adhesis {
 
 struct Field {
+  Model model;
   Nodes nodes;
   Equations equations;
   Pair solved;            // (B + G)⁻¹ of S~ and of X; empty if the potential was known
@@ -18,6 +19,8 @@ struct Field {
   double separation = not_a_number;  // q0 s
   Vector scaled_opening;  // f: the openings over sqrt(1-η²)
   Vector opening;         // C at each edge
+
+  explicit Field(const Model& model) : model(model) {}
 };
 
 // The tree of a field with its edges held, and what it was made of.
@@ -41,8 +44,12 @@ Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const 
                        const Vector& potential, double pressure, double prescribed,
                        const Model& model);
 
+// Evaluate C = sqrt(2 dη/dθ) f(±1) at every gap end, less the terms of higher modes if asked for.
+Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equations,
+                     bool with_end_terms);
+
 // Potential of the other gaps at every node, from the balance of its own gap.
-Vector gap_potentials(const Field& field, const GaussRules& rules);
+Vector gap_potentials(const Field& field);
 
 // Interpolate a potential g at θ from G = g dθ/dη at the nodes of a gap; beyond an end of the gap
 // it is the potential at that end.

@@ -76,7 +76,7 @@ void load_gap(const LinearResponse& response, int k, const GaussRule& rule, Spac
 }  // namespace
 
 void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
-  const GaussRule& rule = (*model.rules)[nodes.orders[k]];
+  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   const double* own = &inverse[nodes.square[k]];
   Space space(m);
@@ -127,11 +127,11 @@ void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
       charge_by_edge[side][first + i] =
           strength[side] * (w * space.solved[by_left_end + side][i] + space.singular[side][i]);
   }
-  condense(k, model);
+  condense(k);
 }
 
-void LinearResponse::condense(int k, const Model& model) {
-  const Vector& w = (*model.rules)[nodes.orders[k]].weights;
+void LinearResponse::condense(int k) {
+  const Vector& w = gauss_rules()[nodes.orders[k]].weights;
   const int m = nodes.size_of(k), first = nodes.offset[k];
   const double pressure = about_pressure[k];
   Edge &left = edges[2 * k], &right = edges[2 * k + 1];

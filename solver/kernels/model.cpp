@@ -46,16 +46,6 @@ void interpolate(const Vector& coefficients, const double* position, int count,
   }
 }
 
-Vector derivative_matrix(const Vector& eta, const Vector& weights) {
-  const int m = int(eta.size());
-  Vector out(m * m, 0.0);
-  for (int i = 0; i < m; ++i)
-    for (int j = 0; j < m; ++j)
-      if (j != i)
-        out[i * m + j] = ((i + j) % 2 == 0 ? 1 : -1) * weights[j] / weights[i] / (eta[i] - eta[j]);
-  return out;
-}
-
 ShortRule::ShortRule(int count) : minus(count), plus(count), eta(count), sine(count) {
   for (int i = 0; i < count; ++i) {
     double t = (i + 0.5) * pi / count;
@@ -72,11 +62,12 @@ ValueAndSlope measure_at(double theta, const Panels& panels) {
   return {measure, tilt / measure * rate};
 }
 
-double length_up_to(double theta, const Panels& panels, const LengthRule& rule) {
+double length_up_to(double theta, const Panels& panels) {
   const double turns = std::floor(theta / (2 * pi));
   const double position = (theta - turns * 2 * pi) / panels.width;
   const int panel = std::min(std::max(int(position), 0), panels.finest_count - 1);
   const double share = std::min(std::max(position - panel, 0.0), 1.0);
+  const LengthRule& rule = panels.length;
   double part = 0;
   for (size_t i = 0; i < rule.nodes.size(); ++i) {
     const double at = (panel + share * rule.nodes[i]) * panels.width;
@@ -85,17 +76,11 @@ double length_up_to(double theta, const Panels& panels, const LengthRule& rule) 
   return turns * rule.before.back() + rule.before[panel] + part * share * panels.width;
 }
 
-int choose_order(const Gap& gap, double digits, const GaussRules& rules) {
-  double wanted = digits / convergence_rate(gap);
-  int order = 0;
-  while (order < int(rules.size()) - 1 && rules[order].count < wanted) ++order;
-  return order;
-}
-
-Integers choose_orders(const std::vector<Gap>& gaps, const Model& model) {
-  Integers orders;
-  for (const Gap& gap : gaps) orders.push_back(choose_order(gap, model.digits, *model.rules));
-  return orders;
+double contact_length(const Vector& ends, const Panels& panels) {
+  double total = length_up_to(2 * pi, panels);
+  for (size_t e = 0; e < ends.size(); ++e)
+    total += (e % 2 == 0 ? 1 : -1) * length_up_to(ends[e], panels);
+  return total;
 }
 
 }  // namespace adhesis

@@ -1,33 +1,22 @@
-// Inputs of a field besides its gaps: quadrature rules, the compressed profile, the device.
+// Inputs of a field besides its gaps: the compressed profile, the device, the accuracy.
 #pragma once
 
 #include <memory>
 
-#include "gap.hpp"
+#include "quadrature.hpp"
 
 namespace adhesis {
-
-// Gauss-Chebyshev rule of M nodes of the second kind; matrices M×M, rows nodes.
-struct GaussRule {
-  int count;
-  Vector eta, weights;
-  std::array<Vector, 2> end_values;  // f(-1) and f(+1) from the nodes' values
-  Vector crack;                      // of a straight crack
-  Vector modes;                      // U_n(η_i)
-  Vector derivative;                 // of a potential by η: Σ_j of it times (g_j - g_i)
-};
-
-// A gap's order is the index of its rule; their numbers of nodes rise.
-// Compute the derivative of the polynomial through the nodes (barycentric formula).
-Vector derivative_matrix(const Vector& eta, const Vector& weights);
-
-using GaussRules = std::vector<GaussRule>;
 
 // Gauss-Chebyshev nodes of the first kind, η = cos t.
 struct ShortRule {
   Vector minus, plus, eta, sine;  // 1 - η and 1 + η, to rounding, η, and sin t
 
   explicit ShortRule(int count);
+};
+
+// Rule on a finest panel from 0 to 1, and ∫ sqrt(1 + h'²) dθ from 0 to the start of each panel.
+struct LengthRule {
+  Vector nodes, weights, before;
 };
 
 // The full-contact stress, compressed on panels; see full_contact_stress.py.
@@ -42,6 +31,8 @@ struct Panels {
   Integers level_start;                     // row of the weights at which each level starts
   Vector end_x, end_w;                      // Gauss-Legendre rule on (0, 1) of an end piece
   ShortRule short_rule;                     // of a short gap, unless it needs more nodes
+  LengthRule length;
+  int top;                                  // highest harmonic of the profile
 
   int nodes() const { return int(x.size()); }
 };
@@ -54,7 +45,6 @@ struct Device {
 struct Model {
   Device device;
   double digits;  // -ln of the relative accuracy of the field
-  std::shared_ptr<const GaussRules> rules;
   std::shared_ptr<const Panels> panels;
 };
 
@@ -72,22 +62,16 @@ void interpolate(const Vector& coefficients, const double* position, int count,
 // sqrt(1 + h'²) and its derivative by θ.
 ValueAndSlope measure_at(double theta, const Panels& panels);
 
-// Rule on a finest panel from 0 to 1, and ∫ sqrt(1 + h'²) dθ from 0 to the start of each panel.
-struct LengthRule {
-  Vector nodes, weights, before;
-};
-
 // Integrate sqrt(1 + h'²) dθ from 0 to θ.
-double length_up_to(double theta, const Panels& panels, const LengthRule& rule);
+double length_up_to(double theta, const Panels& panels);
+
+// Integrate it over the patches between gaps with these ends.
+double contact_length(const Vector& ends, const Panels& panels);
 
 // C and dC/dθ of a half-plane crack that begins (side 0) or ends (1) at θ.
 inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& panels) {
   return evaluate_series(panels.half_plane[side], theta, panels);
 }
-
-// Choose the order of a gap whose modes leave an error of exp(-digits), or the largest.
-int choose_order(const Gap& gap, double digits, const GaussRules& rules);
-Integers choose_orders(const std::vector<Gap>& gaps, const Model& model);
 
 // Compute the moments of S, and with two columns of S', over a gap; see chebyshev_moments.py.
 //

@@ -1,5 +1,7 @@
 #include "newton.hpp"
 
+#include "signals.hpp"
+
 namespace adhesis {
 
 Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed,
@@ -12,6 +14,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
   bool judged_again = false;
   double pressure = response.pressure_at(prescribed, model.device);
   while (true) {
+    check_signals();
     ++out.corrections;
     if (!move_references(response, ends, none_held, pressure, prescribed, law, model)) {
       out.is_outgrown = true;
@@ -47,6 +50,8 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     last = size;
   }
   out.potential = response.potential_at(pressure);
+  out.references = response.nodes.gaps;
+  out.orders = response.nodes.orders;
   out.ends = ends;
   return out;
 }

@@ -12,6 +12,8 @@ struct Equilibrium {
   Vector potential;          // of the other gaps at the reference nodes, as G
   ResponseSolution at;
   int corrections = 0;
+  std::vector<Gap> references;  // of the gaps, and the orders of their rules
+  Integers orders;
 };
 
 // Find the equilibrium next to these edges. The references of gaps follow where they move by more

@@ -101,18 +101,28 @@ int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave) {
   return fast_size(std::max(waves, modes));
 }
 
-FineOpening open_gap(const Nodes& nodes, int k, const Vector& f, const Circle& circle,
-                     const Model& model) {
-  const GaussRule& rule = (*model.rules)[nodes.orders[k]];
-  FineOpening out = fine_moments(nodes.gaps[k], circle, *model.panels);
+FineOpening open_gap(const Field& field, int k, const Circle& circle) {
+  const Nodes& nodes = field.nodes;
+  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
+  FineOpening out = fine_moments(nodes.gaps[k], circle, *field.model.panels);
   const int m = rule.count;
   for (int n = m; n < int(out.modes.size()); ++n) out.modes[n] /= -(n + 1);
   for (int n = 0; n < m; ++n) {
     double total = 0;
     for (int j = 0; j < m; ++j)
-      total += rule.weights[j] * f[nodes.offset[k] + j] * rule.modes[j * m + n];
+      total += rule.weights[j] * field.scaled_opening[nodes.offset[k] + j] * rule.modes[j * m + n];
     out.modes[n] = 2 / pi * total;
   }
+  sine_sums(out.modes, circle, out.opening);
+  return out;
+}
+
+FineOpening refine_opening(const Gap& gap, Vector modes, int count) {
+  const Circle circle(count + 1);
+  FineOpening out{Vector(count), Vector(count), Vector(count), std::move(modes)};
+  out.modes.resize(count);
+  const std::span<const double> cosine(&circle.cosine[1], count), sine(&circle.sine[1], count);
+  place_nodes(gap, cosine, sine, out.theta.data(), out.theta_by_t.data());
   sine_sums(out.modes, circle, out.opening);
   return out;
 }
@@ -128,30 +138,31 @@ double sum_modes(const Gap& gap, double theta, const Vector& modes) {
   return b1 * std::sqrt(at.square);
 }
 
-double work_of_gaps(const Field& field, int top, const Model& model) {
+double work_of_gaps(const Field& field) {
+  const Panels& panels = *field.model.panels;
   const Nodes& nodes = field.nodes;
   double total = 0;
   std::optional<Circle> circle;
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const int m = nodes.size_of(k);
-    const int count = count_sine_nodes(nodes.gaps[k], m, top, ENERGY_NODES);
+    const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, ENERGY_NODES);
     if (!circle || circle->count != count + 1) circle.emplace(count + 1);
-    const FineOpening fine = fine_moments(nodes.gaps[k], *circle, *model.panels);
+    const FineOpening fine = fine_moments(nodes.gaps[k], *circle, panels);
     for (int n = m; n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);
   }
   return -pi / 2 * total +
          dot(field.equations.load.data(), field.scaled_opening.data(), nodes.size());
 }
 
-std::vector<Minimum> find_minima(const Field& field, const Integers& gaps, int top,
-                                 const Model& model) {
+std::vector<Minimum> find_minima(const Field& field, const Integers& gaps) {
+  const int top = field.model.panels->top;
   std::vector<Minimum> out;
   std::optional<Circle> circle;
   for (int k : gaps) {
     const Gap& gap = field.nodes.gaps[k];
     const int count = count_sine_nodes(gap, field.nodes.size_of(k), top, SHAPE_NODES);
     if (!circle || circle->count != count + 1) circle.emplace(count + 1);
-    const FineOpening fine = open_gap(field.nodes, k, field.scaled_opening, *circle, model);
+    const FineOpening fine = open_gap(field, k, *circle);
     for (Candidate minimum : local_minima(fine.theta, fine.opening)) {
       const double low = MINIMUM_IS_LOW * minimum.half * minimum.width * minimum.width;
       if (minimum.opening < std::max(low, MINIMUM_DOUBT * minimum.error))

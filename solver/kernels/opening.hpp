@@ -21,15 +21,17 @@ int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave);
 // Round up a number N of nodes to one that many gaps share, N + 1 with small prime factors.
 int fast_size(int fewest);
 
-// Evaluate the opening of gap k from all f.
-FineOpening open_gap(const Nodes& nodes, int k, const Vector& f, const Circle& circle,
-                     const Model& model);
+// Evaluate the opening of gap k at the nodes of a circle.
+FineOpening open_gap(const Field& field, int k, const Circle& circle);
+
+// Evaluate θ and T of a gap, θ falling, at `count` nodes, from fewer modes.
+FineOpening refine_opening(const Gap& gap, Vector modes, int count);
 
 // Sum b_n sin((n+1)t), cos t = η(θ), over n.
 double sum_modes(const Gap& gap, double theta, const Vector& modes);
 
 // Integrate S_full T dθ over the gaps: by f, less π/2 s_n²/(n+1) of all modes above those of f.
-double work_of_gaps(const Field& field, int top, const Model& model);
+double work_of_gaps(const Field& field);
 
 struct Minimum {
   double theta, opening, curvature;
@@ -37,7 +39,6 @@ struct Minimum {
 };
 
 // Find the minima of some gaps.
-std::vector<Minimum> find_minima(const Field& field, const Integers& gaps, int top,
-                                 const Model& model);
+std::vector<Minimum> find_minima(const Field& field, const Integers& gaps);
 
 }  // namespace adhesis

@@ -12,7 +12,7 @@ bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
                const EdgeLaw& law, const Model& model) {
   const Nodes& nodes = response.nodes;
   Tree& tree = response.tree;
-  const GaussRule& rule = (*model.rules)[nodes.orders[k]];
+  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int first = nodes.offset[k], m = rule.count;
   response.about_pressure[k] = pressure;
   Vector known(m);
@@ -95,7 +95,7 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 bool move_references(LinearResponse& response, const Vector& ends, const Flags& held,
                      double pressure, double prescribed, const EdgeLaw& law, const Model& model) {
   const std::vector<Gap> gaps = map_gaps(ends);
-  const GaussRules& rules = *model.rules;
+  const std::vector<GaussRule>& rules = gauss_rules();
   Nodes& nodes = response.nodes;
   const int count = nodes.gap_count();
   Flags changed(count), far(count);
@@ -120,7 +120,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
     if (far[e / 2]) both[e] = true;
   const Flags others = hold_edges(response, ends, both);
   if (!any(changed)) {
-    condense_gaps(response, others, model);
+    condense_gaps(response, others);
     return true;
   }
   for (int k = 0; k < count; ++k)
@@ -131,7 +131,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
     if (changed[k] && renewed) {
       renewed = renew_gap(response, k, before[k], pressure, law, model);
     } else if (others[k]) {
-      response.condense(k, model);
+      response.condense(k);
       again[k] = true;
     }
   }
@@ -166,9 +166,9 @@ Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held
   return changed;
 }
 
-void condense_gaps(LinearResponse& response, const Flags& some, const Model& model) {
+void condense_gaps(LinearResponse& response, const Flags& some) {
   for (int k = 0; k < response.gap_count(); ++k)
-    if (some[k]) response.condense(k, model);
+    if (some[k]) response.condense(k);
   if (any(some)) response.factor_runs(some);
 }
 

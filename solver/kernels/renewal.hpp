@@ -38,7 +38,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
 Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held);
 
 // Eliminate the edges of some gaps anew, and factor the runs that hold them.
-void condense_gaps(LinearResponse& response, const Flags& some, const Model& model);
+void condense_gaps(LinearResponse& response, const Flags& some);
 
 // Renew the response for a known equilibrium; returns false as move_references does.
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
@@ -49,12 +49,12 @@ struct NewResponse {
   bool has_field;
 };
 
-// Solve the field of these gaps, and linearise about it.
-NewResponse set_up_response(const Vector& ends, double prescribed, const Integers& orders,
+// Solve the field of these gaps, and linearise about it; `least` are the least orders of the gaps,
+// or empty.
+NewResponse set_up_response(const Vector& ends, double prescribed, const Integers& least,
                             const EdgeLaw& law, const Model& model);
 
-// Set up a response of gaps of which most are those of another; `least` are the least orders of the
-// gaps, or empty.
+// Set up a response of gaps of which most are those of another.
 NewResponse update_response(const LinearResponse& known, const Vector& ends, double prescribed,
                             const Integers& least, const EdgeLaw& law, const Model& model);
 

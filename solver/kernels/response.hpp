@@ -68,7 +68,7 @@ struct LinearResponse {
                                       const Model& model);
 
   // Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
-  void condense(int k, const Model& model);
+  void condense(int k);
 
   // Factor the runs that have changed, or hold gaps that have.
   void factor_runs(Flags changed);

@@ -9,7 +9,7 @@ namespace {
 Integers find_known_gaps(const LinearResponse& known, const std::vector<Gap>& gaps,
                          const EdgeLaw& law, const Model& model) {
   const std::vector<Gap>& references = known.nodes.gaps;
-  const GaussRules& rules = *model.rules;
+  const std::vector<GaussRule>& rules = gauss_rules();
   Integers found(gaps.size(), -1);
   int j = 0;
   for (int k = 0; k < int(gaps.size()); ++k) {
@@ -102,11 +102,13 @@ void copy_gap(const LinearResponse& known, int j, LinearResponse& out, int k) {
 
 }  // namespace
 
-NewResponse set_up_response(const Vector& ends, double prescribed, const Integers& orders,
+NewResponse set_up_response(const Vector& ends, double prescribed, const Integers& least,
                             const EdgeLaw& law, const Model& model) {
+  Integers orders = choose_orders(map_gaps(ends), model.digits);
+  raise_orders(orders, least);
   auto [field, factored] = solve_field(ends, prescribed, orders, 2, model);
   const int count = field.nodes.gap_count(), n = field.nodes.size();
-  const Vector about = gap_potentials(field, *model.rules);
+  const Vector about = gap_potentials(field);
   NewResponse made = {LinearResponse(std::move(field.nodes), std::move(field.equations),
                                      std::move(factored.tree)),
                       std::isfinite(field.pressure)};
@@ -129,14 +131,12 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
                             const Integers& least, const EdgeLaw& law, const Model& model) {
   std::vector<Gap> gaps = map_gaps(ends);
   const int count = int(gaps.size());
-  Integers orders = choose_orders(gaps, model);
+  Integers orders = choose_orders(gaps, model.digits);
   const Integers source = find_known_gaps(known, gaps, law, model);
   const auto fresh = std::count_if(source.begin(), source.end(), [](int k) { return k < 0; });
-  if (!in_order(gaps) || double(fresh) > REFERENCE_MOST_FAR * count) {
-    raise_orders(orders, least);
-    return set_up_response(ends, prescribed, orders, law, model);
-  }
-  const int most = int(model.rules->size()) - 1;
+  if (!in_order(gaps) || double(fresh) > REFERENCE_MOST_FAR * count)
+    return set_up_response(ends, prescribed, least, law, model);
+  const int most = int(gauss_rules().size()) - 1;
   for (int k = 0; k < count; ++k)  // a gap that has changed is likely to change again
     if (source[k] < 0) orders[k] = std::min(orders[k] + FURTHER_ORDERS, most);
   raise_orders(orders, least);
@@ -145,7 +145,7 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
     gaps[k] = known.nodes.gaps[source[k]];
     orders[k] = known.nodes.orders[source[k]];
   }
-  Nodes nodes(std::move(gaps), orders, *model.rules);
+  Nodes nodes(std::move(gaps), orders);
   Equations equations = allocate_equations(nodes);
   for (int k = 0; k < count; ++k) {
     if (source[k] < 0)
@@ -159,7 +159,7 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
     if (same[run] >= 0) rank[run] = known.tree.runs[same[run]].rank;
   Tree tree(nodes, halves, rank, FURTHER_CHARGES * model.digits);
   for (int k = 0; k < count; ++k) {
-    const Vector& w = (*model.rules)[nodes.orders[k]].weights;
+    const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     for (int i = 0; i < nodes.size_of(k); ++i) {
       tree.theta[nodes.offset[k] + i] = nodes.theta[nodes.offset[k] + i];
       tree.stretch[nodes.offset[k] + i] = nodes.weight[nodes.offset[k] + i] / w[i];

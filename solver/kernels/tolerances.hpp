@@ -27,6 +27,10 @@ inline constexpr double SHORT_REACH = 3.0, SHORTEST_REACH = 0.1, FAINT_SADDLE = 
 inline constexpr double SLOWEST = 0.01, RATE_GROWTH = 4.0, FURTHEST_FOLLOWING = 5.0;
 inline constexpr int MODEL_STEPS = 200, TIME_TRIES = 20;
 
+inline constexpr double PREDICTION_TRUSTED = 4.0, CUBIC_TRUSTED = 5.0, LEADING_SHARE = 0.2;
+inline constexpr double CUBIC_OF_OTHERS_TRUSTED = 1.5;
+inline constexpr int PREDICTOR_ITERATIONS = 60;
+
 inline constexpr double ENERGY_NODES = 3.0, SHAPE_NODES = 6.0;
 inline constexpr double MINIMUM_IS_LOW = 0.1, MINIMUM_DOUBT = 3.0, NO_CURVATURE = 1e-100;
 inline constexpr double COMPARABLE = 0.3, CLOSING_SAFETY = 1.5, CLEARANCE_LEFT = 0.3;

@@ -6,45 +6,29 @@ import math
 from typing import Any
 
 import numpy as np
-
-from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.core import (
-    choose_orders,
-    descend,
-    equilibrium_many,
-    map_gaps,
-    shortest_length,
-    solve_many,
-    solve_separately,
-    tangent_between,
-)
-from adhesis.solver.sharp.descent.implicit_flow import (
-    AT_REST,
-    NO_FIELD,
-    OUTGROWN,
-    VANISHED,
+from adhesis.solver._kernels import (
     Descent,
+    DescentEvent,
+    EdgeLaw,
+    Equilibrium,
+    Field,
+    FieldModel,
     Running,
+    shortest_length,
+    solve_field,
 )
+
+from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.descent.saddle import leaving_step, positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import (
-    EdgeLaw,
-    imbalance,
-    move_edges,
-    step_limits,
-)
-from adhesis.solver.sharp.equilibrium.hierarchical_newton import EquilibriumOfMany
-from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
+from adhesis.solver.sharp.equilibrium.griffith import imbalance, move_edges, step_limits
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import (
     FixedEdgeResponse,
     GapField,
     respond_at_fixed_edges,
 )
-from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import (
@@ -56,8 +40,6 @@ from adhesis.solver.sharp.tolerances import (
     RESPONSE_TRIALS,
     RESTS,
 )
-
-_ANY = np.empty(0, dtype=np.int64)  # gaps may have any order
 
 
 class EdgeMechanics(EdgeProblem):
@@ -73,15 +55,15 @@ class EdgeMechanics(EdgeProblem):
     def __init__(self, *problem: Any) -> None:
         super().__init__(*problem)
         self.responses = KeptResponses(self)
-        self._finer: tuple[Point, Solution] | None = None
+        self._finer: tuple[Point, Field] | None = None
 
-    def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Solution:
+    def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Field:
         """Solve the field of these gaps to a ``share`` of the tolerance."""
         self.count.fields += 1
-        model = self.model._replace(digits=self.model.digits - math.log(share))
-        orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-        solution: Solution = solve_many(gaps, prescribed, orders, 1, model)[0]
-        return solution
+        model = self.model
+        if share < 1:
+            model = FieldModel(model.device, model.digits - math.log(share), model.panels)
+        return solve_field(gaps, prescribed, model)
 
     def field(
         self, gaps: Array, prescribed: float, nearly: tuple[float, float] | None = None
@@ -105,7 +87,7 @@ class EdgeMechanics(EdgeProblem):
         change = finer.opening - point.field.solution.opening
         return point.fold_displacement(change, respond_at_fixed_edges(finer).opening)
 
-    def _solve_finer(self, point: Point) -> Solution:
+    def _solve_finer(self, point: Point) -> Field:
         """Solve the field of a point more accurately than that of the path."""
         if self._finer is None or self._finer[0] is not point:
             self._finer = point, self.solution(point.gaps, point.at, FINER_FIELD)
@@ -116,7 +98,7 @@ class EdgeMechanics(EdgeProblem):
         gaps: Array,
         prescribed: float,
         reach: float,
-        orders: Integers = _ANY,
+        orders: Integers | None = None,
         *,
         strict: bool = True,
     ) -> Point | None:
@@ -133,35 +115,26 @@ class EdgeMechanics(EdgeProblem):
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
                 break
-            found: EquilibriumOfMany = equilibrium_many(
-                near.response, gaps, prescribed, reach, strict, self.law, self.model
+            found = near.response.find_equilibrium(
+                gaps, prescribed, reach, strict, self.law, self.model
             )
             self.count.add_newton(found.corrections)
             if found.found:
-                near.settled = found.gaps
-                return self._point(prescribed, near.response, found)
+                point = self._point(prescribed, found)
+                near.settled = point.gaps
+                return point
             if not found.is_outgrown:
                 break
             gaps = found.gaps
             near.is_outgrown = True
         return None
 
-    def _point(
-        self, prescribed: float, response: LinearResponse, found: EquilibriumOfMany
-    ) -> Point:
+    def _point(self, prescribed: float, found: Equilibrium) -> Point:
         """Make the point of an equilibrium."""
-        # copies, as the response is changed in place
-        table, orders = response.nodes.table.copy(), response.nodes.orders.copy()
-
-        def solve() -> Solution:
-            solution: Solution = solve_separately(
-                found.gaps, table, orders, found.potential, found.pressure, prescribed, self.model
-            )
-            return solution
-
+        gaps = found.gaps
         field = GapField(
-            self.source, found.gaps, prescribed, self.tolerance, self.model.device, solve,
-            (found.pressure, found.separation),
+            self.source, gaps, prescribed, self.tolerance, self.model.device,
+            lambda: found.solve_field(prescribed, self.model), (found.pressure, found.separation),
         )  # fmt: skip
         return Point(prescribed, field, found.rate, found.slope)
 
@@ -192,20 +165,22 @@ class EdgeMechanics(EdgeProblem):
             If the last gap closes, as it may where the separation is not fixed.
         """
         law = self.law
-        left, orders, rests, raced = DESCENT_LIMIT, _ANY, 0, False
+        left, rests, raced = DESCENT_LIMIT, 0, False
+        orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
             end, orders = self._descend(gaps, prescribed, left, orders, law, equal_speeds, start)
+            if end is None or end.event == DescentEvent.NO_FIELD:
+                raise NoState("there is no field of these edges", prescribed)
             gaps, raced = end.gaps, raced or end.raced
             left -= end.steps
-            if end.event == NO_FIELD:
-                raise NoState("there is no field of these edges", prescribed)
-            if end.event == VANISHED:
+            if end.event == DescentEvent.VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest, raced
-                law = law._replace(smallest=self._smallest_of_last_gap(gaps, law.smallest))
-            if end.event == AT_REST:
+                law = EdgeLaw(law)
+                law.smallest = self._smallest_of_last_gap(gaps, law.smallest)
+            if end.event == DescentEvent.AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1
@@ -228,25 +203,27 @@ class EdgeMechanics(EdgeProblem):
         gaps: Array,
         prescribed: float,
         most: int,
-        orders: Integers,
+        orders: Integers | None,
         law: EdgeLaw,
         equal_speeds: bool,
         start: Array,
-    ) -> tuple[Descent, Integers]:
-        """Descend on a linear response; returns the orders that it came to, too."""
-        runs, reach = np.zeros(gaps.size, dtype=bool), FIRST_REACH
+    ) -> tuple[Descent | None, Integers | None]:
+        """Descend on a linear response; returns the orders that it came to, too.
+
+        None if the edges have no field.
+        """
+        running = Running(start, FIRST_REACH)
         while True:
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
-                return Descent(NO_FIELD, gaps, 0, reach, False), orders
-            end: Descent = descend(
-                near.response, gaps, prescribed, most, equal_speeds, Running(runs, start, reach),
-                law, self.model,
-            )  # fmt: skip
+                return None, orders
+            end = near.response.descend(
+                gaps, prescribed, most, equal_speeds, running, law, self.model
+            )
             self.count.add_descent(end.steps, end.steps)
-            if end.event != OUTGROWN:
-                return end, near.response.nodes.orders.copy()
-            gaps, reach = end.gaps, end.reach
+            if end.event != DescentEvent.OUTGROWN:
+                return end, near.response.orders
+            gaps = end.gaps
             near.is_outgrown = True
 
     def _leave_saddle(self, gaps: Array, prescribed: float) -> Array | None:
@@ -260,10 +237,10 @@ class EdgeMechanics(EdgeProblem):
         if near is None or self.critical == 0:
             return None
         every = np.arange(gaps.size)
-        tangent = tangent_between(near.response, gaps, every, prescribed, self.law, self.model)
+        tangent = near.response.tangent_between(gaps, every, prescribed, self.law, self.model)
         by_edge = near.response.opening[:, None] * tangent
-        limit = step_limits(map_gaps(gaps), self.law.longest_step)
-        step = leaving_step(by_edge + by_edge.T, limit, positions(gaps, self.law.origin))
+        limit = step_limits(gaps, self.law.longest_step)
+        step = leaving_step(by_edge + by_edge.T, limit, positions(gaps, self.source.highest))
         if step is None:
             return None
         while np.abs(step).max() >= self.law.rest_step:
@@ -277,9 +254,9 @@ class EdgeMechanics(EdgeProblem):
 
     def _force_along(self, gaps: Array, step: Array, prescribed: float) -> float:
         """Compute the force along a ``step`` at its end: positive where the energy falls."""
-        solution = self.solution(gaps, prescribed)
-        residual, _ = imbalance(solution, self.law, self.source.panels)
-        return -float((residual * (2 * solution.opening - residual)) @ step)
+        opening = self.solution(gaps, prescribed).opening
+        residual = imbalance(opening, gaps, self.law, self.source.panels)
+        return -float((residual * (2 * opening - residual)) @ step)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
         """Return the length below which the last gap is closed.
@@ -304,7 +281,8 @@ class EdgeMechanics(EdgeProblem):
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
         minimum: the flow stands still there. A minimum draws the edge back.
         """
-        residual, _ = imbalance(self.solution(gaps, prescribed), self.law, self.source.panels)
+        opening = self.solution(gaps, prescribed).opening
+        residual = imbalance(opening, gaps, self.law, self.source.panels)
         e = int(np.argmax(np.abs(residual)))
         length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]

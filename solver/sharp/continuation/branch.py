@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from adhesis.solver._kernels import shortest_length
 
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.sharp.continuation.across_jump import carry_previous
@@ -17,7 +18,6 @@ from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
-from adhesis.solver.sharp.core import shortest_length
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from adhesis.solver._kernels import SearchedGaps
 
 from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
@@ -15,14 +16,12 @@ from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
 from adhesis.solver.sharp.continuation.jump import Jumps, Orders
 from adhesis.solver.sharp.continuation.resolution import Resolution
-from adhesis.solver.sharp.core import map_gaps
 from adhesis.solver.sharp.descent.saddle import positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import step_limits
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
 from adhesis.solver.sharp.nucleation.location import Located, locate
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
@@ -69,7 +68,7 @@ class Follower:
 
     def recall_point(self, memory: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
-        self.nucleation.searched = NONE_SEARCHED if memory is None else memory.searched
+        self.nucleation.searched = SearchedGaps() if memory is None else memory.searched
         self.openings.healed = []
         if memory is None or memory.branch_data is None:
             return None
@@ -338,13 +337,13 @@ class Follower:
             return point.gaps
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
-        away = positions(point.gaps, self.edges.law.origin)[fastest]
+        away = positions(point.gaps, self.edges.source.highest)[fastest]
         return self._moved_on(fold, int(fastest[np.argmin(away)]), self.edges.law.rest_step)
 
     def _moved_on(self, fold: Fold, edge: int, length: float) -> Array:
         """Return the gaps before a fold, one edge moved on by a length in θ or its limit."""
         point = fold.point
-        longest = step_limits(map_gaps(point.gaps), length)
+        longest = step_limits(point.gaps, length)
         motion = np.zeros(point.gaps.size)
         motion[edge] = math.copysign(longest[edge], point.rate[edge] * (fold.at - point.at))
         moved: Array = point.gaps + (outward(point.gaps) * motion).reshape(-1, 2)

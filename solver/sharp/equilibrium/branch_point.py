@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
-from adhesis.solver.model.profile import Array
+from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.gap.quadrature import Integers
 
 ALL_EDGES = slice(None)
 

@@ -1,127 +1,29 @@
-"""Griffith's condition at the edges, compiled: imbalance, tangent, and motion of the edges."""
+"""Griffith's condition at the edges, C_e = C_c, and motions of the edges."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
+from adhesis.solver._kernels import EdgeLaw, Panels
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT
-from adhesis.solver.sharp.gap.full_contact_stress import Panels, measure_at
-from adhesis.solver.sharp.gap.quadrature import Integers
+from adhesis.solver.sharp.gap.ends import lengths_of, outward
 from adhesis.solver.sharp.tolerances import CLOSING_SHARE
 
 
-class EdgeLaw(NamedTuple):
-    """Law by which the edges move, with the tolerances of one problem; lengths in θ.
-
-    Attributes
-    ----------
-    critical : float
-        Critical opening on a flat piece.
-    newton_tolerance : float
-        A correction this small ends Newton's iteration.
-    field_error : float
-        Largest displacement of an equilibrium by the error of the field; no less than
-        ``newton_tolerance``.
-    rest_step : float
-        A descent whose steps are shorter than this is left to Newton's iteration.
-    longest_step : float
-        Longest short step of an edge in a descent.
-    smallest : float
-        Narrower patches and gaps are removed.
-    overlap_limit : float
-        An opening this far below zero is an overlap that descent cannot weigh.
-    force_error : float
-        A force C_c² - C² this small is that of rounding.
-    origin : float
-        θ of the highest crest.
-    """
-
-    critical: float
-    newton_tolerance: float
-    field_error: float
-    rest_step: float
-    longest_step: float
-    smallest: float
-    overlap_limit: float
-    force_error: float
-    origin: float
+def imbalance(opening: Array, gaps: Array, law: EdgeLaw, panels: Panels) -> Array:
+    """Compute C_e - C_c from C at every edge, positive where contact recedes, shape (2L,)."""
+    critical, _ = law.critical_openings(gaps.ravel(), panels)
+    return np.asarray(opening - critical)
 
 
-@compiled_for_both
-def shortest_length(gaps: Array) -> float:
-    """Find the length of the shortest gap or patch."""
-    count = gaps.shape[0]
-    least = 2 * np.pi
-    for k in range(count):
-        after = gaps[k + 1, 0] if k + 1 < count else gaps[0, 0] + 2 * np.pi
-        least = min(least, gaps[k, 1] - gaps[k, 0], after - gaps[k, 1])
-    return least
-
-
-@compiled
-def total_length(gaps: Array) -> float:
-    """Add up the lengths of all gaps."""
-    total = 0.0
-    for k in range(gaps.shape[0]):
-        total += gaps[k, 1] - gaps[k, 0]
-    return total
-
-
-@compiled
-def critical_opening(theta: float, law: EdgeLaw, panels: Panels) -> tuple[float, float]:
-    """Compute C_c at θ, and its derivative."""
-    measure, slope = measure_at(theta, panels)
-    root = np.sqrt(measure)
-    return law.critical * root, law.critical * slope / (2 * root)
-
-
-@compiled
-def imbalance(state: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Array]:
-    """Compute C_e - C_c at every edge, positive where contact recedes, and dC_c/dθ."""
-    opening, table = state.opening, state.nodes.table
-    edges = opening.shape[0]
-    residual = np.empty(edges)
-    drift = np.empty(edges)
-    for e in range(edges):
-        critical, drift[e] = critical_opening(table[e // 2, LEFT + e % 2], law, panels)
-        residual[e] = opening[e] - critical
-    return residual, drift
-
-
-@compiled
 def move_edges(gaps: Array, step: Array) -> Array:
     """Move the contact outwards by ``step`` at every edge."""
-    out = np.empty_like(gaps)
-    for k in range(gaps.shape[0]):
-        out[k, 0] = gaps[k, 0] + step[2 * k]
-        out[k, 1] = gaps[k, 1] - step[2 * k + 1]
-    return out
+    return np.asarray(gaps + (outward(gaps) * step).reshape(-1, 2))
 
 
-@compiled
-def raise_orders(orders: Integers, least: Integers) -> Integers:
-    """Raise orders to ``least`` (which is empty for no bound) where they are below.
-
-    While edges move towards one state, a gap must not lose modes again, or the field's error would
-    drive them to and fro.
-    """
-    if least.shape[0] == orders.shape[0]:
-        return np.maximum(orders, least)
-    return orders
-
-
-@compiled
-def step_limits(table: Array, longest: float, share: float = CLOSING_SHARE) -> Array:
+def step_limits(gaps: Array, longest: float) -> Array:
     """Limit the step of each edge: ``longest``, or a share of the gap or patch it may close."""
-    limit = np.empty(2 * table.shape[0])
-    for k in range(table.shape[0]):
-        length = table[k, RIGHT] - table[k, LEFT]
-        for side in range(2):
-            closing = share * min(length, table[k, LEFT_PATCH + side])
-            limit[2 * k + side] = min(longest, closing)
-    return limit
+    length, patch = lengths_of(gaps)
+    beside = np.stack([np.roll(patch, 1), patch], axis=1)
+    closing = CLOSING_SHARE * np.minimum(length[:, None], beside)
+    return np.minimum(longest, closing).ravel()

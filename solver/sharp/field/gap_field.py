@@ -5,9 +5,8 @@ opening) and |D| the operator with symbol |m|,
 
     S = S_full + p + |D| T,      S = 0 in the gaps,  T = 0 on the contact,  mean(T) = q0 s,
 
-p = 2p̄/E* the mean stress. In the coordinate η of each gap
-(``conformal_map``) T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part
-of |D| is diagonal in the Chebyshev polynomials U_n(η), and the rest is smooth. So a few values of f
+p = 2p̄/E* the mean stress. In the coordinate η of each gap (``kernels/gap.hpp``)
+T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part of |D| is diagonal in the Chebyshev polynomials U_n(η), and the rest is smooth. So a few values of f
 per gap are enough, at its M second-kind Gauss-Chebyshev nodes:
 
     (B + G) f = -(S~ + p X),     Xᵀ f = 2π q0 s,                                     (1)
@@ -26,7 +25,8 @@ At an edge T ≈ C sqrt(r), r the distance from the edge in θ, and
     G = K²/(2E*) = π E* C² / (16 q0).
 
 K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. (1) is assembled in
-``assembly`` and solved on a tree of the gaps in ``hierarchical_solver``.
+``kernels/equations.cpp`` and solved on a tree of the gaps (``kernels/tree.hpp``) in
+``kernels/field.cpp``.
 """
 
 from __future__ import annotations
@@ -36,15 +36,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from adhesis.solver._kernels import Field, LoadingDevice
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.core import edge_openings
-from adhesis.solver.sharp.field.solution import LoadingDevice, Solution
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES
 
 
-def check_definite(solution: Solution) -> None:
+def check_definite(solution: Field) -> None:
     """Raise FloatingPointError if there is no solution."""
     if math.isnan(solution.pressure):
         raise FloatingPointError("the matrix of the gaps is not positive definite")
@@ -68,14 +66,12 @@ class FixedEdgeResponse(NamedTuple):
     opening: Array
 
 
-def respond_at_fixed_edges(solution: Solution) -> FixedEdgeResponse:
+def respond_at_fixed_edges(solution: Field) -> FixedEdgeResponse:
     """Differentiate a solution by d, at fixed edges; FloatingPointError if there is none."""
     check_definite(solution)
-    pressure = -2 * np.pi / float(solution.mean.resistance)
-    separation = -float(solution.mean.unit_mean) * pressure / (2 * np.pi)
-    unit = np.ascontiguousarray(-pressure * solution.solved[:, 1:2])
-    opening = edge_openings(unit, solution.nodes, GAUSS_RULES)[:, 0]
-    return FixedEdgeResponse(pressure, separation, opening)
+    pressure = -2 * np.pi / solution.resistance
+    separation = -solution.unit_mean * pressure / (2 * np.pi)
+    return FixedEdgeResponse(pressure, separation, solution.openings_by_prescribed())
 
 
 class GapField:
@@ -106,16 +102,16 @@ class GapField:
         prescribed: float,
         tolerance: float,
         device: LoadingDevice,
-        solve: Callable[[], Solution],
+        solve: Callable[[], Field],
         nearly: tuple[float, float] | None = None,
     ) -> None:
         self.source, self.gaps, self.prescribed = source, gaps, prescribed
         self.tolerance, self.device = tolerance, device
-        self._solve: Callable[[], Solution] | None = solve
+        self._solve: Callable[[], Field] | None = solve
         self._nearly = nearly
 
     @property
-    def solution(self) -> Solution:
+    def solution(self) -> Field:
         """Solution of equation (1), solved at first access.
 
         Raises

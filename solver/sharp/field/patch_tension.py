@@ -48,7 +48,7 @@ class RefinedTension:
     def at(self, theta: Array) -> Array:
         """Compute the tension at some positions on the contact."""
         pull = _sum_pull(theta, self._sine, self._cosine, self._source_weight) / (4 * np.pi)
-        return np.asarray(pull - self._source.sample(theta)[:, 0] - self._pressure)
+        return np.asarray(pull - self._source.panels.stress(theta)[0] - self._pressure)
 
     def inside(self, theta: float) -> bool:
         """Return whether a position lies on the contact."""

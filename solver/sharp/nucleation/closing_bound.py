@@ -6,7 +6,6 @@ import numpy as np
 
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import total_length
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import CLOSING_BY_MOTION
 
@@ -36,8 +35,9 @@ class ClosingBound:
         if self._edges.is_fixed:
             return rate
         # d(q0 s)/dd along the branch, from d = weight q0 s - compliance p and dY/dd
-        weight, compliance = self._edges.model.device
-        mean = 1 + compliance * point.slope if weight else point.slope
+        device = self._edges.model.device
+        load = device.separation_weight == 0
+        mean = point.slope if load else 1 + device.compliance * point.slope
         return float(rate * max(1.0, abs(mean)))
 
     def rate_at_fixed_edges(self, point: Point) -> float:
@@ -45,4 +45,4 @@ class ClosingBound:
 
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """
-        return 2 * np.pi / float(total_length(point.gaps))
+        return 2 * np.pi / float(np.diff(point.gaps).sum())

@@ -28,7 +28,6 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 from adhesis.solver.sharp.gap.ends import with_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import measure_at
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
     SHORTEST_CRACK,
@@ -124,7 +123,7 @@ class Openings:
     ) -> Crack:
         """Judge one maximum of tension."""
         wave, critical = self.edges.wave, self.edges.critical
-        measure, _ = measure_at(theta, field.source.panels)
+        measure = float(field.source.panels.measure(np.array([theta]))[0][0])
         return judge_maximum(
             theta,
             tension,
@@ -142,6 +141,5 @@ class Openings:
         middle = (gaps.mean(axis=1) - theta + np.pi) % (2 * np.pi) - np.pi
         crack = int(np.argmin(np.abs(middle)))
         opening = self.edges.field(gaps, field.prescribed).opening[crack]
-        panels = field.source.panels
-        critical = [self.edges.critical**2 * measure_at(end, panels)[0] for end in gaps[crack]]
+        critical = self.edges.critical**2 * field.source.panels.measure(gaps[crack])[0]
         return float((np.maximum(opening, 0.0) ** 2 / critical).min())

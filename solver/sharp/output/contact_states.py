@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from adhesis.solver._kernels import LoadingDevice, SearchedGaps
 
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
@@ -14,10 +15,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
-from adhesis.solver.sharp.field.opening_series import work_of_gaps
-from adhesis.solver.sharp.field.solution import LoadingDevice
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED, SearchedGaps
 from adhesis.solver.values import with_values
 
 
@@ -50,7 +48,7 @@ class ContinuationData:
     gaps: Array
     clearance: float
     branch_data: BranchData | None = None
-    searched: SearchedGaps = NONE_SEARCHED
+    searched: SearchedGaps = field(default_factory=SearchedGaps)
 
 
 def loading_device(problem: Problem) -> LoadingDevice:
@@ -144,9 +142,8 @@ class States:
         mean_stress = gap_field.pressure * half
         gaps = gap_field.gaps
         patches, measure = self.source.contact_between(gaps)
-        elastic = (
-            self._full_energy + 0.5 * work_of_gaps(gap_field) - np.pi * at * gap_field.pressure
-        )
+        work = gap_field.solution.work_of_gaps()
+        elastic = self._full_energy + 0.5 * work - np.pi * at * gap_field.pressure
         return ContactState(
             separation=separation,
             edges=patches / self.q0,

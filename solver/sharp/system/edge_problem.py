@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from adhesis.solver._kernels import EdgeLaw, FieldModel, LoadingDevice
 
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
-from adhesis.solver.sharp.field.solution import (
-    FIXED_SEPARATION,
-    FieldModel,
-    LoadingDevice,
-)
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES
 from adhesis.solver.sharp.tolerances import (
     COARSE_FIELD,
     DESCENT_HANDS_OVER,
@@ -24,6 +18,8 @@ from adhesis.solver.sharp.tolerances import (
     SMALLEST_LENGTH,
     SMALLEST_OF_SEED,
 )
+
+FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
 
 
 class EdgeProblem:
@@ -82,12 +78,10 @@ class EdgeProblem:
             smallest=float(self.smallest),
             overlap_limit=float(OVERLAPPING * max(critical, roughness_opening)),
             force_error=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
-            origin=source.highest,
         )
         self.model = FieldModel(
             device=device,
             digits=float(-np.log(tolerance)),
-            rules=GAUSS_RULES,
             panels=source.panels,
         )
         self.count = Counters()
@@ -95,7 +89,7 @@ class EdgeProblem:
     @property
     def is_fixed(self) -> bool:
         """Whether the separation is prescribed."""
-        return self.model.device == FIXED_SEPARATION
+        return self.model.device.compliance == 0
 
     @property
     def is_load(self) -> bool:
