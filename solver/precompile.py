@@ -143,7 +143,6 @@ def _hierarchical() -> SharpMethod:
     """Build a method that uses its hierarchical solver from 6 gaps on, for a profile with more."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=1, h_rms=1e-6)
     method = SharpMethod(Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.004))
-    method.edges.many = 6
     return method
 
 

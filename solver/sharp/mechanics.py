@@ -1,82 +1,114 @@
-"""Mechanics of the contact edges of one problem: the choice between few and many gaps."""
+"""Mechanics of the contact edges of one problem: fields, equilibria and descents of its gaps."""
 
 from __future__ import annotations
 
-from functools import cached_property
+import math
+from typing import Any
 
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.gradient_flow import AT_REST, NO_FIELD, REJOINED, VANISHED
-from adhesis.solver.sharp.descent.track import Track
+from adhesis.solver.sharp.descent.implicit_flow import (
+    AT_REST,
+    NO_FIELD,
+    OUTGROWN,
+    VANISHED,
+    Descent,
+    Running,
+    descend,
+)
+from adhesis.solver.sharp.descent.saddle import leaving_step, positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
-from adhesis.solver.sharp.equilibrium.pinning import remember
+from adhesis.solver.sharp.equilibrium.condensed import tangent_between
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import (
+    imbalance,
+    move_edges,
+    shortest_length,
+    step_limits,
+)
+from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
+    EquilibriumOfMany,
+    equilibrium_many,
+)
+from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.errors import FullContact, NoState
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import (
+    FixedEdgeResponse,
+    GapField,
+    respond_at_fixed_edges,
+)
+from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.separate_gaps import solve_separately
+from adhesis.solver.sharp.field.solution import Solution
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
-from adhesis.solver.sharp.system.dense import DenseSystem
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
-from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
-from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
-from adhesis.solver.sharp.system.window_descent import KnownState
 from adhesis.solver.sharp.tolerances import (
     DESCENT_LIMIT,
-    HIERARCHICAL_FROM,
+    EQUAL_GAINS,
+    FINER_FIELD,
+    FIRST_REACH,
     LAST_GAP,
+    RESPONSE_TRIALS,
     RESTS,
 )
 
-_ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
+_ANY = np.empty(0, dtype=np.int64)  # gaps may have any order
 
 
 class EdgeMechanics(EdgeProblem):
     """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
+    The linear response of the gaps is kept from one state to the next.
+
     Attributes
     ----------
-    many : int
-        From so many gaps on the hierarchical system takes the place of the dense one.
+    responses : KeptResponses
     """
 
-    many = HIERARCHICAL_FROM
+    def __init__(self, *problem: Any) -> None:
+        super().__init__(*problem)
+        self.responses = KeptResponses(self)
+        self._finer: tuple[Point, Solution] | None = None
 
-    @cached_property
-    def _systems(self) -> tuple[DenseSystem, HierarchicalSystem]:
-        return DenseSystem(self), HierarchicalSystem(self)
-
-    def system(self, gaps: Array) -> EdgeSystem:
-        """Return the system of edges by which these gaps are solved."""
-        return self._systems[len(gaps) >= self.many and not self.pins]
-
-    def uses_windows(self, gaps: Array) -> bool:
-        """Whether these gaps are followed in windows."""
-        return self.system(gaps).uses_windows
-
-    def field(self, gaps: Array, prescribed: float) -> GapField:
-        """Solve the field of these gaps."""
+    def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Solution:
+        """Solve the field of these gaps to a ``share`` of the tolerance."""
         self.count.fields += 1
-        return self.solved(gaps, prescribed, self.system(gaps).solution(gaps, prescribed, 1.0, 2))
+        model = self.model._replace(digits=self.model.digits - math.log(share))
+        orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+        solution: Solution = solve_many(gaps, prescribed, orders, 1, model)[0]
+        return solution
 
-    def field_again(
-        self, gaps: Array, prescribed: float, pressure: float, separation: float
+    def field(
+        self, gaps: Array, prescribed: float, nearly: tuple[float, float] | None = None
     ) -> GapField:
-        """Return the field of gaps that were in equilibrium; of many it is solved when asked for.
+        """Return the field of these gaps, with p and q0 s where they are known."""
+        return GapField(
+            self.source, gaps, prescribed, self.tolerance, self.model.device,
+            lambda: self.solution(gaps, prescribed), nearly,
+        )  # fmt: skip
 
-        ``pressure`` (p) and ``separation`` (q0 s) are those of the equilibrium.
+    def response_before_fold(self, point: Point) -> FixedEdgeResponse:
+        """Return the response at a point next to a fold, the edges held."""
+        return respond_at_fixed_edges(self._solve_finer(point))
+
+    def fold_displacement(self, point: Point) -> float:
+        """Estimate how far in d the error of the field displaces the fold next to a point.
+
+        The error of the openings is their difference from those of a more accurate field.
         """
-        if self.uses_windows(gaps):
-            return self._systems[1].field_on_demand(gaps, prescribed, pressure, separation)
-        return self.field(gaps, prescribed)
+        finer = self._solve_finer(point)
+        change = finer.opening - point.field.solution.opening
+        return point.fold_displacement(change, respond_at_fixed_edges(finer).opening)
 
-    def stiffness(self, point: Point, edges: Integers) -> Array:
-        """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
-
-        The diagonal is not given for many gaps.
-        """
-        by_edge = self.system(point.gaps).stiffness(point, edges)
-        return np.asarray(by_edge * outward(point.gaps)[edges])
+    def _solve_finer(self, point: Point) -> Solution:
+        """Solve the field of a point more accurately than that of the path."""
+        if self._finer is None or self._finer[0] is not point:
+            self._finer = point, self.solution(point.gaps, point.at, FINER_FIELD)
+        return self._finer[1]
 
     def equilibrium(
         self,
@@ -95,49 +127,61 @@ class EdgeMechanics(EdgeProblem):
         """
         if not shortest_length(gaps) > 0:
             return None
-        try:
-            return self.system(gaps).equilibrium(
-                gaps, prescribed, max(reach, self.settled), orders, strict=strict
+        reach = max(reach, self.settled)
+        for _ in range(RESPONSE_TRIALS):
+            near = self.responses.near(gaps, prescribed, orders)
+            if near is None:
+                break
+            found: EquilibriumOfMany = equilibrium_many(
+                near.response, gaps, prescribed, reach, strict, self.law, self.model
             )
-        except np.linalg.LinAlgError:
-            return None
+            self.count.add_newton(found.corrections)
+            if found.found:
+                near.settled = found.gaps
+                return self._point(prescribed, near.response, found)
+            if not found.is_outgrown:
+                break
+            gaps = found.gaps
+            near.is_outgrown = True
+        return None
 
-    @property
-    def responses(self) -> KeptResponses:
-        """Linear responses of many gaps."""
-        return self._systems[1].responses
+    def _point(
+        self, prescribed: float, response: LinearResponse, found: EquilibriumOfMany
+    ) -> Point:
+        """Make the point of an equilibrium."""
+        # copies, as the response is changed in place
+        table, orders = response.nodes.table.copy(), response.nodes.orders.copy()
 
-    def start(self, point: Point | None) -> KnownState | None:
-        """Return ``point`` as the start of a descent in a window; None for few gaps."""
-        if point is None or not self.uses_windows(point.gaps):
-            return None
-        return self._systems[1].start(point)
+        def solve() -> Solution:
+            solution: Solution = solve_separately(
+                found.gaps, table, orders, found.potential, found.pressure, prescribed, self.model
+            )
+            return solution
+
+        field = GapField(
+            self.source, found.gaps, prescribed, self.tolerance, self.model.device, solve,
+            (found.pressure, found.separation),
+        )  # fmt: skip
+        return Point(prescribed, field, found.rate, found.slope)
 
     def forget(self) -> None:
         """Forget what results would depend on within the error of the field."""
         self.responses.forget()
 
     def relax(
-        self,
-        gaps: Array,
-        prescribed: float,
-        reach: float,
-        *,
-        equal_speeds: bool = False,
-        track: Track | None = None,
-        start: KnownState | None = None,
-    ) -> Point | Array:
+        self, gaps: Array, prescribed: float, reach: float, *, equal_speeds: bool = False
+    ) -> tuple[Point | Array, bool]:
         """Descend in energy at a prescribed value to the next minimum.
 
-        By linear kinetics, which extends the ``track``; or, to be compared with that, with
-        ``equal_speeds`` or from where the track has been left, until the track is met. From a
-        ``start`` in a window.
+        By linear kinetics, or with ``equal_speeds``, to be compared with that.
 
         Returns
         -------
         Point or array
             The minimum, or the gaps without those gaps and patches that have closed or vanished on
-            the way (an empty array when no contact is left, or the track is met).
+            the way (an empty array when no contact is left).
+        bool
+            Whether the order in which edges ran may have decided that.
 
         Raises
         ------
@@ -146,33 +190,19 @@ class EdgeMechanics(EdgeProblem):
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
-        # Without adhesion the minimum is unique, and the Hessian vanishes there: linear kinetics
-        # would not come to rest.
-        equal_speeds = equal_speeds or self.critical == 0
-        track = track or Track()
-        system, law = self.system(gaps), self.law
-        left, orders, rests = DESCENT_LIMIT, _ANY, 0
-        begun, rested = len(gaps), np.empty((0, 2))
+        law = self.law
+        left, orders, rests, raced = DESCENT_LIMIT, _ANY, 0, False
+        rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            held = self.law_of(gaps).held
-            law = law._replace(held=held)
-            end = system.descend(
-                gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds, start=start
-            )
-            gaps, orders, start = end.gaps, end.orders, None
-            left -= end.fields
-            if end.event == REJOINED:
-                track.rejoined = True
-                return np.empty((0, 2))
+            end, orders = self._descend(gaps, prescribed, left, orders, law, equal_speeds, start)
+            gaps, raced = end.gaps, raced or end.raced
+            left -= end.steps
             if end.event == NO_FIELD:
                 raise NoState("there is no field of these edges", prescribed)
             if end.event == VANISHED:
-                self.recall(remember(held, gaps, law.band) if self.pins else held)
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
-                    return rest
-                if len(gaps) != begun:
-                    return gaps
+                    return rest, raced
                 law = law._replace(smallest=self._smallest_of_last_gap(gaps, law.smallest))
             if end.event == AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
@@ -184,10 +214,71 @@ class EdgeMechanics(EdgeProblem):
                 strict = rests <= RESTS
                 point = self.equilibrium(gaps, prescribed, reach, orders, strict=strict)
                 if point is not None:
-                    return point
-                if not strict and rests <= 2 * RESTS:
+                    return point, raced
+                left_saddle = self._leave_saddle(gaps, prescribed)
+                if left_saddle is not None:
+                    gaps = left_saddle
+                elif not strict and rests <= 2 * RESTS:
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
+
+    def _descend(
+        self,
+        gaps: Array,
+        prescribed: float,
+        most: int,
+        orders: Integers,
+        law: EdgeLaw,
+        equal_speeds: bool,
+        start: Array,
+    ) -> tuple[Descent, Integers]:
+        """Descend on a linear response; returns the orders that it came to, too."""
+        runs, reach = np.zeros(gaps.size, dtype=bool), FIRST_REACH
+        while True:
+            near = self.responses.near(gaps, prescribed, orders)
+            if near is None:
+                return Descent(NO_FIELD, gaps, 0, reach, False), orders
+            end: Descent = descend(
+                near.response, gaps, prescribed, most, equal_speeds, Running(runs, start, reach),
+                law, self.model,
+            )  # fmt: skip
+            self.count.add_descent(end.steps, end.steps)
+            if end.event != OUTGROWN:
+                return end, near.response.nodes.orders.copy()
+            gaps, reach = end.gaps, end.reach
+            near.is_outgrown = True
+
+    def _leave_saddle(self, gaps: Array, prescribed: float) -> Array | None:
+        """Move edges without force off a saddle of the energy; None where they are stable.
+
+        Both directions along the softest modes are tried, and that on which energy falls more is
+        taken, of equal ones that in which the leading edge goes outwards. Where energy rises on
+        both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
+        """
+        near = self.responses.at(gaps, prescribed)
+        if near is None or self.critical == 0:
+            return None
+        every = np.arange(gaps.size)
+        tangent = tangent_between(near.response, gaps, every, prescribed, self.law, self.model)
+        by_edge = near.response.opening[:, None] * tangent
+        limit = step_limits(map_gaps(gaps), self.law.longest_step)
+        step = leaving_step(by_edge + by_edge.T, limit, positions(gaps, self.law.origin))
+        if step is None:
+            return None
+        while np.abs(step).max() >= self.law.rest_step:
+            ways: list[Array] = [move_edges(gaps, way) for way in (step, -step)]
+            onwards = self._force_along(ways[0], step, prescribed)
+            backwards = self._force_along(ways[1], -step, prescribed)
+            if max(onwards, backwards) > 0:
+                return ways[0] if onwards >= backwards * (1 - EQUAL_GAINS) else ways[1]
+            step = 0.5 * step
+        return None
+
+    def _force_along(self, gaps: Array, step: Array, prescribed: float) -> float:
+        """Compute the force along a ``step`` at its end: positive where the energy falls."""
+        solution = self.solution(gaps, prescribed)
+        residual, _ = imbalance(solution, self.law, self.source.panels)
+        return -float((residual * (2 * solution.opening - residual)) @ step)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
         """Return the length below which the last gap is closed.
@@ -212,8 +303,7 @@ class EdgeMechanics(EdgeProblem):
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
         minimum: the flow stands still there. A minimum draws the edge back.
         """
-        solution = self.field(gaps, prescribed).solution
-        residual, _ = imbalance(solution, self.law_of(gaps), self.source.panels)
+        residual, _ = imbalance(self.solution(gaps, prescribed), self.law, self.source.panels)
         e = int(np.argmax(np.abs(residual)))
         length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]

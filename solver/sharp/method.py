@@ -36,7 +36,7 @@ from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
@@ -254,7 +254,6 @@ class SharpMethod(Method):
             point = self._jump(history, before, np.empty((0, 2)), at, target, highest)
         else:
             gaps = state.internal.gaps
-            self.edges.recall(state.internal.held)
             if point is None:
                 point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
                 if point is not None:

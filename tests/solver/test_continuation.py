@@ -63,18 +63,6 @@ class Curve:
         rate = np.full(2, -self.rate(at))
         return Point(at, cast(Any, field), rate, -2 * at, clearance)
 
-    def uses_windows(self, gaps: Any) -> bool:
-        """Few gaps."""
-        return False
-
-    def system(self, gaps: Any) -> Any:
-        """The system is this object, too."""
-        return self
-
-    def closing_motion(self, before: Any, after: Any) -> float:
-        """Largest motion of an end."""
-        return float(np.abs(after - before).max())
-
     def equilibrium(self, gaps: Any, at: float, reach: float) -> Point | None:
         """Point of the curve, if it is within reach."""
         self.asked += 1

@@ -30,8 +30,8 @@ from adhesis.solver.registry import make_method
 from adhesis.solver.runtime import compiler
 from adhesis.solver.runtime import jit as compiled
 from adhesis.solver.runtime.uninterrupted import uninterrupted
-from adhesis.solver.sharp.descent.track import Stage
 from adhesis.solver.sharp.field.solution import LoadingDevice
+from adhesis.solver.sharp.field.tree_factor import Charges
 from tools.interrupted import Interrupt, interrupted
 
 KERNELS = 20  # at least so many are called from Python
@@ -45,13 +45,10 @@ def method(name: str) -> Method:
     return make_method("sharp", Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.04))
 
 
-@pytest.fixture(scope="module", params=["sharp", "sharp of many gaps", "grid"])
+@pytest.fixture(scope="module", params=["sharp", "grid"])
 def chosen(request: pytest.FixtureRequest) -> Method:
     """A method for all loops of the test, each as it comes after another one."""
-    found = method(request.param.split()[0])
-    if "many" in request.param:
-        found.edges.many = 6
-    return found
+    return method(request.param)
 
 
 @pytest.fixture
@@ -104,7 +101,7 @@ def named_tuple():
 
 def nested():
     NOW(ALARM)
-    return 1, (Stage(np.ones(2), np.ones((2, 2))), np.ones(1)), (2.0, True, None)
+    return 1, (Charges(np.ones(2), np.ones((2, 2))), np.ones(1)), (2.0, True, None)
 
 
 @pytest.mark.parametrize("function", [array, named_tuple, nested])
@@ -119,13 +116,13 @@ def test_a_signal_that_comes_in_compiled_code_is_handled_after_it_has_returned(a
 
 def test_results_are_what_numba_makes_of_them():
     """The same classes and values, and named tuples that compiled code takes as such."""
-    handed = njit(lambda stage, hold: (stage, hold, stage.way[1:] + 1))
-    stage = Stage(np.arange(3.0), np.ones((3, 3)))
-    back, hold, part = handed(stage, LoadingDevice(1.0, 2.0))
-    assert (type(back), type(hold), type(part)) == (Stage, LoadingDevice, np.ndarray)
+    handed = njit(lambda pair, hold: (pair, hold, pair.isolated[1:] + 1))
+    pair = Charges(np.arange(3.0), np.ones((3, 3)))
+    back, hold, part = handed(pair, LoadingDevice(1.0, 2.0))
+    assert (type(back), type(hold), type(part)) == (Charges, LoadingDevice, np.ndarray)
     assert (hold.separation_weight, hold.compliance, part.tolist()) == (1.0, 2.0, [2.0, 3.0])
-    assert np.array_equal(back.way, stage.way)
-    assert np.array_equal(back.taken, stage.taken)
+    assert np.array_equal(back.isolated, pair.isolated)
+    assert np.array_equal(back.potential_of_sibling, pair.potential_of_sibling)
     handed(back, hold)
     assert len(handed.signatures) == 1
 

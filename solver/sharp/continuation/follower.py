@@ -9,7 +9,6 @@ import numpy as np
 
 from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
-from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
@@ -19,7 +18,6 @@ from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.descent.saddle import positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import step_limits
-from adhesis.solver.sharp.equilibrium.pinning import into_band
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
@@ -67,22 +65,17 @@ class Follower:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
-        self._last: tuple[ContinuationData, Point] | None = None
-        self._came_on: BranchName | None = None
         self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, memory: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
         self.nucleation.searched = NONE_SEARCHED if memory is None else memory.searched
         self.openings.healed = []
-        self._came_on = None if memory is None else memory.branch
         if memory is None or memory.branch_data is None:
             return None
-        if self._last is not None and self._last[0] is memory:
-            return self._last[1]
         at, nearly, rate, slope, previous = memory.branch_data
-        field = self.edges.field_again(memory.gaps, at, *nearly)
-        return Point(at, field, rate, slope, memory.clearance, previous, memory.held)
+        field = self.edges.field(memory.gaps, at, nearly)
+        return Point(at, field, rate, slope, memory.clearance, previous)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
         """Follow a stable branch to the target or through its next jump.
@@ -92,10 +85,6 @@ class Follower:
         at, point
             d reached and the stable point there, None if no contact is left.
         """
-        if self.edges.pins and self._came_on not in (None, target.branch):
-            point = self._turned_back(point)
-            history.states.append(self.states.of_point(point))
-        self._came_on = None
         jump = self._opening_at(history, point, target)
         if jump is not None:
             history.commit(jump)
@@ -111,14 +100,8 @@ class Follower:
             if jump is not None:
                 history.commit(jump)
                 return jump.at, branch.after_jump(jump)
-        self._remember(history, branch, target.branch)
+        self._remember(history, branch)
         return target.at, branch.point
-
-    def _turned_back(self, point: Point) -> Point:
-        """Return the point at which a path turns back: all its edges are pinned there at first."""
-        self.edges.recall(into_band(point.held, point.gaps, self.edges.law.band))
-        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.settled)
-        return point.with_previous(None) if pinned is None else pinned
 
     def _imbalance(self, output: Point, point: Point) -> float:
         """Compute the change of energy between two points of a branch, less the work, in J/m²."""
@@ -126,7 +109,7 @@ class Follower:
             self._output = output, self.states.of_point(output)
         return self.states.energy_residual(self._output[1], self.states.of_point(point))
 
-    def _remember(self, history: History, branch: Branch, name: BranchName) -> None:
+    def _remember(self, history: History, branch: Branch) -> None:
         """Let the last state remember its point."""
         # What has not closed since the last search need not be searched again.
         point = branch.point.with_clearance(max(branch.trail.clearance - branch.trail.closed, 0.0))
@@ -136,14 +119,7 @@ class Follower:
             point.clearance,
             BranchData(point.at, point.field.nearly, point.rate, point.slope, point.previous),
             self.nucleation.searched,
-            point.held,
-            name,
         )
-        # A dense field does not depend on the way to it; a hierarchical one does.
-        if self.edges.uses_windows(point.field.gaps):
-            self._last = None
-        else:
-            self._last = memory, point
         history.states[-1] = with_values(history.states[-1], internal=memory)
 
     def _handle_accepted(
@@ -299,7 +275,7 @@ class Follower:
         low = self.nucleation.minimum(point.field)[0]
         way = abs(fold.at - point.at)
         if not self.edges.is_fixed:
-            response = self.edges.system(point.gaps).response_before_fold(point)
+            response = self.edges.response_before_fold(point)
             way *= max(1.0, abs(response.separation))
         if low > self.closing.rate_at_fixed_edges(point) * way:
             return None
@@ -319,8 +295,7 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             last = self.states.of_point(point)
             states = (last,)
-        system = self.edges.system(point.gaps)
-        response = system.response_before_fold(point)
+        response = self.edges.response_before_fold(point)
         before = self.states.at_fixed_edges(last, point.field, response, fold.at)
         jump = self.jumps.compute(
             before, self._start_at_fold(fold), fold.at, target.branch, known=point,
@@ -333,7 +308,7 @@ class Follower:
         if late > allowed and finest > self.resolution.finest:
             share = max(LATE_REFINEMENT * allowed / late, LEAST_REFINEMENT)
             return None, max(share * min(way, finest), self.resolution.finest)
-        displaced = self.states.work(before, after, abs(system.fold_displacement(point)))
+        displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
@@ -344,7 +319,7 @@ class Follower:
         two, point = fold.with_another, fold.point
         if two is None:
             return None
-        displaced = abs(self.edges.system(point.gaps).fold_displacement(point))
+        displaced = abs(self.edges.fold_displacement(point))
         if two.apart > max(self.resolution.order, SECOND_FOLD_DISPLACED * displaced):
             return None
         furthest = max(fold.at, two.beyond) if fold.at > point.at else min(fold.at, two.beyond)
@@ -363,7 +338,7 @@ class Follower:
             return point.gaps
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
-        away = positions(map_gaps(point.gaps), self.edges.law.origin)[fastest]
+        away = positions(point.gaps, self.edges.law.origin)[fastest]
         return self._moved_on(fold, int(fastest[np.argmin(away)]), self.edges.law.rest_step)
 
     def _moved_on(self, fold: Fold, edge: int, length: float) -> Array:

@@ -25,10 +25,10 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
-from adhesis.solver.sharp.descent.edge_forces import Forces
 from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.griffith import critical_of
+from adhesis.solver.sharp.equilibrium.griffith import critical_opening
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, half_plane_opening
+from adhesis.solver.sharp.gap.quadrature import Integers
 
 
 class EdgeModel(NamedTuple):
@@ -36,20 +36,24 @@ class EdgeModel(NamedTuple):
 
     Attributes
     ----------
-    theta, motion : array, shape (2L,)
+    edges, after : int array, shape (n,)
+        Which edges of all, rising; and the index of the edge after each, -1 if it is none of them.
+    theta, motion : array, shape (n,)
         Position in θ, and outward motion of the contact so far.
-    opening, rate : array, shape (2L,)
+    opening, rate : array, shape (n,)
         C, and ∂C_e/∂n_e.
-    half_plane : array, shape (2L,)
+    half_plane : array, shape (n,)
         R.
-    critical, critical_rate : array, shape (2L,)
+    critical, critical_rate : array, shape (n,)
         C_c, and its derivative by n.
-    own : array, shape (2L,)
+    own : array, shape (n,)
         ∂C_e/∂n_e, less that of a half-plane crack.
-    coupling : array, shape (2L, 2L)
+    coupling : array, shape (n, n)
         ∂C_e/∂n_f over C_f; zero on the diagonal.
     """
 
+    edges: Integers
+    after: Integers
     theta: Array
     motion: Array
     opening: Array
@@ -63,21 +67,28 @@ class EdgeModel(NamedTuple):
 
 @compiled
 def model_about(
-    gaps: Array, now: Forces, tangent: Array, law: EdgeLaw, panels: Panels
+    edges: Integers, gaps: Array, residual: Array, tangent: Array, law: EdgeLaw, panels: Panels
 ) -> EdgeModel:
-    """Make the model about solved edges from ``tangent`` = ∂(C_e - C_c)/∂n_f.
+    """Make the model of some edges from C_e - C_c and ``tangent`` = ∂(C_e - C_c)/∂n_f there.
 
     Of ``tangent[e, f]`` over C_f and its transpose, which are equal, that with the larger opening
-    is taken. The edges outside a window have none, and do not interact.
+    is taken.
     """
-    opening, drift = now.solution.opening, now.drift
-    edges = opening.shape[0]
-    own = np.empty(edges)
-    coupling = np.zeros((edges, edges))
-    for e in range(edges):
-        outwards = 1 - 2 * (e % 2)
-        _, slope = half_plane_opening(gaps[e // 2, e % 2], e % 2, panels)
-        own[e] = tangent[e, e] + outwards * (drift[e] - slope)
+    count = edges.shape[0]
+    opening, own, theta = np.empty(count), np.empty(count), np.empty(count)
+    after = np.full(count, -1)
+    for e in range(count):
+        outwards = 1 - 2 * (edges[e] % 2)
+        theta[e] = gaps[edges[e] // 2, edges[e] % 2]
+        critical, drift = critical_opening(theta[e], law, panels)
+        opening[e] = residual[e] + critical
+        _, slope = half_plane_opening(theta[e], edges[e] % 2, panels)
+        own[e] = tangent[e, e] + outwards * (drift - slope)
+        following = (e + 1) % count
+        if edges[following] == (edges[e] + 1) % gaps.size:
+            after[e] = following
+    coupling = np.zeros((count, count))
+    for e in range(count):
         for f in range(e):
             value = 0.0
             if abs(opening[f]) > abs(opening[e]):
@@ -87,12 +98,11 @@ def model_about(
             coupling[e, f] = value
             coupling[f, e] = value
     model = EdgeModel(
-        gaps.ravel().copy(), np.zeros(edges), np.zeros(edges), np.empty(edges), np.empty(edges),
-        np.empty(edges), np.empty(edges), own, coupling,
+        edges, after, theta, np.zeros(count), np.zeros(count), np.empty(count), np.empty(count),
+        np.empty(count), np.empty(count), own, coupling,
     )  # fmt: skip
     evaluate(model, law, panels)
     model.opening[:] = opening
-    evaluate_law(model, law, panels)
     return model
 
 
@@ -100,23 +110,15 @@ def model_about(
 def evaluate(model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
     """Evaluate R, C_c and the rates at the present edges, and add R to the openings."""
     theta, rate, half_plane, opening = model.theta, model.rate, model.half_plane, model.opening
-    own = model.own
+    critical, critical_rate, own = model.critical, model.critical_rate, model.own
     for e in range(theta.shape[0]):
-        outwards = 1 - 2 * (e % 2)
-        half_plane[e], slope = half_plane_opening(theta[e], e % 2, panels)
+        side = model.edges[e] % 2
+        outwards = 1 - 2 * side
+        half_plane[e], slope = half_plane_opening(theta[e], side, panels)
         opening[e] += half_plane[e]
         rate[e] = own[e] + outwards * slope
-    evaluate_law(model, law, panels)
-
-
-@compiled
-def evaluate_law(model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
-    """Evaluate C_c and its rates at the present edges."""
-    theta, opening = model.theta, model.opening
-    critical, critical_rate = model.critical, model.critical_rate
-    for e in range(theta.shape[0]):
-        critical[e], drift = critical_of(e, theta[e], opening[e], law, panels)
-        critical_rate[e] = (1 - 2 * (e % 2)) * drift
+        critical[e], drift = critical_opening(theta[e], law, panels)
+        critical_rate[e] = outwards * drift
 
 
 @compiled_sums
@@ -140,24 +142,26 @@ def advance(model: EdgeModel, step: Array) -> None:
 def follow_lengths(model: EdgeModel, step: Array) -> None:
     """Move the edges by ``step``; coupling and rates of neighbours follow the length between."""
     theta, opening, own, coupling = model.theta, model.opening, model.own, model.coupling
-    edges = theta.shape[0]
-    for e in range(edges):
-        f = (e + 1) % edges
-        is_patch = e % 2 == 1
-        length = theta[f] - theta[e] + (2 * np.pi if f == 0 else 0.0)
+    edges, after = model.edges, model.after
+    for e in range(theta.shape[0]):
+        f = after[e]
+        if f < 0:
+            continue
+        is_patch = edges[e] % 2 == 1
+        length = theta[f] - theta[e] + (2 * np.pi if f <= e else 0.0)
         both = step[e] + step[f]
-        after = length + (both if is_patch else -both)
+        later = length + (both if is_patch else -both)
         first = coupling[e, f]
-        last = first * length / after
+        last = first * length / later
         coupling[e, f] = last
         coupling[f, e] = last
-        by_length = (-first if is_patch else first) / after
+        by_length = (-first if is_patch else first) / later
         by_e = both if is_patch else step[e]
         by_f = both if is_patch else step[f]
         own[e] += (by_length * opening[f] + first * last * opening[e]) * by_f
         own[f] += (by_length * opening[e] + first * last * opening[f]) * by_e
-    for e in range(edges):
-        theta[e] += (1 - 2 * (e % 2)) * step[e]
+    for e in range(theta.shape[0]):
+        theta[e] += (1 - 2 * (edges[e] % 2)) * step[e]
 
 
 @compiled

@@ -14,7 +14,6 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.descent.edge_forces import norm
 from adhesis.solver.sharp.descent.edge_model import (
     EdgeModel,
     advance,
@@ -23,11 +22,12 @@ from adhesis.solver.sharp.descent.edge_model import (
     model_hessian,
 )
 from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.pinning import stop_at_band
 from adhesis.solver.sharp.field.cholesky import factor_rows, padded, solve_column
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
+    FAINT_SADDLE,
     FORCES_FELL,
+    MODEL_SHORT_STEP,
     MODEL_STEP,
     MODEL_STEPS,
     NEAR_BALANCE,
@@ -43,82 +43,73 @@ class ModelFlow(NamedTuple):
 
     Attributes
     ----------
-    motion : array, shape (2L,)
+    motion : array, shape (n,)
         Outward motion of the contact at every edge.
-    opening : array, shape (2L,)
+    opening : array, shape (n,)
         C of the model at the end.
-    points : array, shape (n, 2L)
-        Edges after each step.
-    lengths : array, shape (n,)
+    lengths : array, shape (steps,)
         Largest motion up to each step.
-    residuals : array, shape (n, 2L)
+    residuals : array, shape (steps, n)
         C - C_c of the model after each step.
-    interaction : array, shape (2L, 2L)
-        Force, as C², that the motion of each edge (columns) took from every edge (rows).
     is_at_limit : bool
         Whether an edge came to its limit.
     """
 
     motion: Array
     opening: Array
-    points: Array
     lengths: Array
     residuals: Array
-    interaction: Array
     is_at_limit: bool
 
 
 @compiled
 def no_flow() -> ModelFlow:
-    """Make a flow without points."""
+    """Make a flow without steps."""
     none, nothing = np.empty((0, 0)), np.empty(0)
-    return ModelFlow(nothing, nothing, none, nothing, none, none, False)
+    return ModelFlow(nothing, nothing, nothing, none, False)
 
 
 @compiled
 def flow_through(
-    model: EdgeModel, limit: Array, equal_speeds: bool, strongest: float, law: EdgeLaw,
-    panels: Panels,
+    model: EdgeModel, limit: Array, equal_speeds: bool, is_long: bool, strongest: float,
+    law: EdgeLaw, panels: Panels,
 ) -> ModelFlow:  # fmt: skip
-    """Follow the flow until an edge is at its limit, or near balance.
+    """Follow the flow until an edge is at its limit, or at rest; a long step, or near balance.
 
     ``model`` goes along with the edges. ``strongest`` is the largest norm of the forces on the way
     so far.
     """
     edges = model.opening.shape[0]
-    points, residuals = np.empty((MODEL_STEPS, edges)), np.empty((MODEL_STEPS, edges))
+    residuals = np.empty((MODEL_STEPS, edges))
     lengths = np.empty(MODEL_STEPS)
-    interaction, matrix = np.zeros((edges, edges)), np.empty((edges, edges))
+    matrix = np.empty((edges, edges))
     force, step = np.empty(edges), np.empty(edges)
     factor = np.empty((edges, padded(edges)))
-    longest = MODEL_STEP * law.longest_step
+    longest = (MODEL_STEP if is_long else MODEL_SHORT_STEP) * law.longest_step
     count, length, share = 0, 0.0, 1.0
     while count < MODEL_STEPS and share == 1:
         model_forces(model, force)
         total = norm(force)
         strongest = max(strongest, total)
-        if near_balance(total, strongest, law):
+        if is_long and near_balance(total, strongest, law):
             break
         model_hessian(model, matrix)
-        size = implicit_step(matrix, force, longest, equal_speeds, factor, step)
-        if not size > RUNNING_ENDS * law.longest_step:
+        size, stable = implicit_step(matrix, force, longest, equal_speeds, factor, step)
+        faint = total < FAINT_SADDLE * law.force_error
+        if not size > RUNNING_ENDS * law.longest_step and (stable or faint):
             break
-        if law.pinning > 0:
-            stop_at_band(model.theta, step, law)
         share = share_within(model.motion, step, limit)
         if share < 1:
             step *= share
-        add_forces(matrix, step, interaction)
         advance(model, step)
         evaluate(model, law, panels)
-        points[count] = model.theta
         residuals[count] = model.opening - model.critical
         length = max(length, largest(model.motion))
         lengths[count] = length
         count += 1
     return ModelFlow(
-        model.motion, model.opening, points[:count], lengths[:count], residuals[:count],
-        interaction, share < 1,
+        model.motion, model.opening, lengths[:count], residuals[:count],
+        share < 1,
     )  # fmt: skip
 
 
@@ -132,8 +123,10 @@ def near_balance(force: float, strongest: float, law: EdgeLaw) -> bool:
 @compiled
 def implicit_step(
     matrix: Array, force: Array, longest: float, equal_speeds: bool, factor: Array, step: Array
-) -> float:
+) -> tuple[float, bool]:
     """Take a linearly implicit step, (1/Δτ + H) Δn = force; returns the largest motion.
+
+    Returns also whether the edges are stable with the time of the largest force.
 
     No edge moves further than ``longest``. The time Δτ is that in which the largest force alone
     would move its edge so far; with equal speeds every edge has its own time, in which its own
@@ -143,7 +136,7 @@ def implicit_step(
     edges = force.shape[0]
     strongest = largest(force)
     growth = 1 / longest
-    size = 0.0
+    size, stable = 0.0, True
     for _ in range(TIME_TRIES):
         for e in range(edges):
             for f in range(e + 1):
@@ -151,6 +144,7 @@ def implicit_step(
             own = max(abs(force[e]), SLOWEST * strongest) if equal_speeds else strongest
             factor[e, e] += growth * own
         if not factor_rows(factor, 0.0):
+            stable = False
             growth *= RATE_GROWTH
             continue
         step[:] = force
@@ -161,7 +155,7 @@ def implicit_step(
         step *= longest / size
         growth *= min(RATE_GROWTH, 1.1 * size / longest)
         size = longest
-    return size
+    return size, stable
 
 
 @compiled
@@ -185,8 +179,9 @@ def share_within(motion: Array, step: Array, limit: Array) -> float:
 
 
 @compiled
-def add_forces(matrix: Array, step: Array, interaction: Array) -> None:
-    """Add the force that each edge's step (columns) takes from every edge (rows)."""
-    for e in range(step.shape[0]):
-        for f in range(step.shape[0]):
-            interaction[e, f] += matrix[e, f] * step[f]
+def norm(force: Array) -> float:
+    """Compute the Euclidean norm."""
+    square = 0.0
+    for e in range(force.shape[0]):
+        square += force[e] * force[e]
+    return float(np.sqrt(square))

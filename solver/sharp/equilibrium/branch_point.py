@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
-import numpy as np
-
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import Integers
 
 ALL_EDGES = slice(None)
-NO_MEMORY: Array = np.empty((0, 2))
 
 
 class PreviousPoint(NamedTuple):
@@ -42,8 +38,6 @@ class Point:
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     previous : PreviousPoint, optional
         The point before it on its branch.
-    held : array, shape (L, 2)
-        Memory of its edges, with two works of adhesion (``pinning``).
     """
 
     at: float
@@ -52,7 +46,6 @@ class Point:
     slope: float
     clearance: float = 0.0
     previous: PreviousPoint | None = None
-    held: Array = dataclasses.field(default_factory=lambda: NO_MEMORY)
 
     @property
     def gaps(self) -> Array:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from adhesis.solver.model.profile import Array
-
 
 class EdgeLaw(NamedTuple):
     """Law by which the edges move, with the tolerances of one problem; lengths in θ.
@@ -34,10 +32,6 @@ class EdgeLaw(NamedTuple):
     pinning : float
         sqrt(γ_open/γ) - 1, by which the critical opening of an edge that recedes is larger; 0 for
         one work of adhesion.
-    band : float
-        Length over which it rises where an edge is pinned.
-    held : array, shape (L, 2)
-        Memory of the edges (``pinning``); empty for one work of adhesion.
     """
 
     critical: float
@@ -50,5 +44,3 @@ class EdgeLaw(NamedTuple):
     force_error: float
     origin: float
     pinning: float
-    band: float
-    held: Array

@@ -10,11 +10,11 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
-from adhesis.solver.sharp.equilibrium.edge_interaction import end_charges
 from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.equilibrium.griffith import critical_opening
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.field.solution import FieldModel
+from adhesis.solver.sharp.field.weight_function import end_charges
 from adhesis.solver.sharp.gap.conformal_map import LEFT
 from adhesis.solver.sharp.gap.quadrature import GaussRules
 
@@ -23,18 +23,18 @@ from adhesis.solver.sharp.gap.quadrature import GaussRules
 def linearise_gap(out: LinearResponse, k: int, law: EdgeLaw, model: FieldModel) -> None:
     """Compute the response of a gap about its reference."""
     m = out.nodes.offset[k + 1] - out.nodes.offset[k]
-    space = np.empty((18, m))  # functions that make no arrays are faster
-    loads, solved, singular, by_potential = space[:5], space[5:10], space[10:12], space[12:14]
-    _load_gap(out, k, loads, singular, space[14:], model)
+    space = np.empty((16, m))  # functions that make no arrays are faster
+    loads, solved, singular = space[:5], space[5:10], space[10:12]
+    _load_gap(out, k, loads, singular, space[12:], model)
     square = slice(out.tree.response_start[k], out.tree.response_start[k + 1])
     inverse = out.inverse[square].reshape(m, m)
     _apply(inverse, loads, solved)
     out.scaled_opening[out.nodes.offset[k] : out.nodes.offset[k + 1]] = solved[0]
-    ends = np.empty((2, 10))
-    opening, strength = ends[:, :5], ends[:, 5]
-    _open_edges(out, k, solved, opening, by_potential, strength, model)
-    _move_gap(out, k, opening, by_potential, strength, ends[:, 6:], law, model)
-    _charge_gap(out, k, solved, singular, strength, space[14:16], model.rules)
+    ends = np.empty((2, 6))
+    _open_edges(out, k, solved, ends, model)
+    _differentiate_edges(out, k, ends, law, model)
+    _charge_edges(out, k, solved, singular, ends[:, 5], model.rules)
+    condense_gap(out, k, model.rules)
 
 
 @compiled_sums
@@ -114,137 +114,136 @@ def _by_eta(eta: Array, w: Array, potential: Array, i: int) -> float:
 
 
 @compiled_sums
-def _open_edges(
-    out: LinearResponse,
-    k: int,
-    solved: Array,
-    opening: Array,
-    by_potential: Array,
-    strength: Array,
-    model: FieldModel,
-) -> None:
-    """Compute C at both edges of a gap by its loads and by potentials, and their ``strength``."""
+def _open_edges(out: LinearResponse, k: int, solved: Array, ends: Array, model: FieldModel) -> None:
+    """Compute C at both edges of a gap by its loads and by potentials, and the edges' strength.
+
+    ``ends`` has a row for each edge: C by each load, and the strength of its singular opening.
+    """
     nodes, rules = out.nodes, model.rules
-    m = solved.shape[1]
+    first, m = nodes.offset[k], solved.shape[1]
     start = rules.vector_start[nodes.orders[k]]
     square = slice(out.tree.response_start[k], out.tree.response_start[k + 1])
     inverse, end_terms = out.inverse[square].reshape(m, m), out.equations.end_terms
+    by_potential = out.opening_by_potential
     for side in range(2):
         scale = np.sqrt(2 * nodes.slope[k, side])
         for c in range(5):
             total = 0.0
             for i in range(m):
                 total += rules.end_values[side, start + i] * solved[c, i]
-            opening[side, c] = scale * total
-        opening[side, 0] -= scale * end_terms[k, side, 0]
-        opening[side, 2] -= scale * end_terms[k, side, 1]
-        strength[side] = -opening[side, 0] * np.sqrt(nodes.slope[k, side] / 8)
-        follows = by_potential[side]
-        follows[:] = 0.0
+            ends[side, c] = scale * total
+        ends[side, 0] -= scale * end_terms[k, side, 0]
+        ends[side, 2] -= scale * end_terms[k, side, 1]
+        ends[side, 5] = -ends[side, 0] * np.sqrt(nodes.slope[k, side] / 8)
+        for j in range(m):
+            by_potential[first + j, side] = 0.0
         for i in range(m):
             value, row = scale * rules.end_values[side, start + i], inverse[i]
             for j in range(m):
-                follows[j] += value * row[j]
+                by_potential[first + j, side] += value * row[j]
         for j in range(m):
-            follows[j] *= rules.weights[start + j]
+            by_potential[first + j, side] *= rules.weights[start + j]
 
 
 @compiled
-def _move_gap(
-    out: LinearResponse,
-    k: int,
-    opening: Array,
-    by_potential: Array,
-    strength: Array,
-    space: Array,
-    law: EdgeLaw,
-    model: FieldModel,
+def _differentiate_edges(
+    out: LinearResponse, k: int, ends: Array, law: EdgeLaw, model: FieldModel
 ) -> None:
-    """Compute how the edges of a gap follow potentials and p, from their tangent."""
+    """Compute ∂(C_e - C_c)/∂n_f between both edges of a gap in the potential of the others."""
     nodes = out.nodes
-    own = slice(nodes.offset[k], nodes.offset[k + 1])
-    potential, pressure = out.about[own], out.about_pressure[k]
-    residual = out.residual[2 * k : 2 * k + 2]
-    # ∂(C_e - C_c)/∂n_f in the potential of the others, and its inverse
-    tangent, compliance = space[:, :2], space[:, 2:]
     for side in range(2):
-        place = nodes.table[k, LEFT + side]
-        critical, drift = critical_opening(place, law, model.panels)
-        residual[side] = opening[side, 0] - critical
-        far = opening[side, 4 - side] + np.sqrt(nodes.slope[k, side] / 2)
-        tangent[side, 1 - side] = far * strength[1 - side]
+        e = 2 * k + side
+        critical, drift = critical_opening(nodes.table[k, LEFT + side], law, model.panels)
+        out.opening[e], out.opening_by_pressure[e] = ends[side, 0], ends[side, 1]
+        out.residual[e] = ends[side, 0] - critical
+        far = ends[side, 4 - side] + np.sqrt(nodes.slope[k, side] / 2)
+        out.tangent[e, 1 - side] = far * ends[1 - side, 5]
         # the sum over both edges is the motion of the gap
         sign = 1 - 2 * side
-        tangent[side, side] = sign * (opening[side, 2] - drift) + tangent[side, 1 - side]
-    out.factor.negative[k] = _invert_tangent(tangent, compliance)
-    if out.held[k]:
-        compliance[:] = 0.0
-        out.factor.negative[k] = 0
-    motion, follows = out.motion[2 * k : 2 * k + 2], out.motion_by_potential[own]
-    for side in range(2):
-        a, b = compliance[side, 0], compliance[side, 1]
-        out.isolated_correction[2 * k + side] = -(a * residual[0] + b * residual[1])
-        motion[side, 1] = a * opening[0, 1] + b * opening[1, 1]
-        motion[side, 0] = out.isolated_correction[2 * k + side] - motion[side, 1] * pressure
-        for j in range(potential.shape[0]):
-            follows[j, side] = a * by_potential[0, j] + b * by_potential[1, j]
-            motion[side, 0] -= follows[j, side] * potential[j]
-
-
-@compiled
-def _invert_tangent(tangent: Array, inverse: Array) -> int:
-    """Invert a 2×2 matrix, and count its negative eigenvalues."""
-    det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
-    inverse[0, 0] = tangent[1, 1] / det
-    inverse[1, 1] = tangent[0, 0] / det
-    inverse[0, 1] = -tangent[0, 1] / det
-    inverse[1, 0] = -tangent[1, 0] / det
-    if det < 0:
-        return 1
-    return 2 if tangent[0, 0] + tangent[1, 1] < 0 else 0
+        out.tangent[e, side] = sign * (ends[side, 2] - drift) + out.tangent[e, 1 - side]
 
 
 @compiled_sums
-def _charge_gap(
-    out: LinearResponse,
-    k: int,
-    solved: Array,
-    singular: Array,
-    strength: Array,
-    moving: Array,
-    rules: GaussRules,
+def _charge_edges(
+    out: LinearResponse, k: int, solved: Array, singular: Array, strength: Array, rules: GaussRules
 ) -> None:
-    """Compute the charges of a gap, and their response, from its edges' motions."""
+    """Compute the charges of a gap at held edges, by a unit of p, and by each edge's motion."""
     first, m = out.nodes.offset[k], solved.shape[1]
-    own = slice(first, first + m)
-    potential, pressure = out.about[own], out.about_pressure[k]
+    start = rules.vector_start[out.nodes.orders[k]]
+    w = rules.weights[start : start + m]
+    for i in range(m):
+        out.held_charge[first + i, 0] = w[i] * solved[0, i]
+        out.held_charge[first + i, 1] = -w[i] * solved[1, i]
+        for side in range(2):
+            part = strength[side] * (w[i] * solved[3 + side, i] + singular[side, i])
+            out.charge_by_edge[first + i, side] = part
+
+
+@compiled_sums
+def condense_gap(out: LinearResponse, k: int, rules: GaussRules) -> None:
+    """Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
+
+    Edges that are held stay where they are.
+    """
+    first, behind = out.nodes.offset[k], out.nodes.offset[k + 1]
+    m = behind - first
+    compliance, motion = out.compliance[2 * k : 2 * k + 2], out.motion[2 * k : 2 * k + 2]
+    tangent, pressure = out.tangent[2 * k : 2 * k + 2], out.about_pressure[k]
+    held, here = out.held[2 * k : 2 * k + 2], out.here[2 * k : 2 * k + 2]
+    compliance[:] = 0.0
+    negative = 0
+    if not (held[0] or held[1]):
+        a, b = tangent[0, 0], tangent[0, 1]
+        c, d = tangent[1, 0], tangent[1, 1]
+        det = a * d - b * c
+        compliance[0, 0], compliance[0, 1] = d / det, -b / det
+        compliance[1, 0], compliance[1, 1] = -c / det, a / det
+        negative = 1
+        if not det < 0:
+            negative = 2 if a + d < 0 else 0
+    else:
+        for side in range(2):
+            if not held[side]:
+                compliance[side, side] = 1 / tangent[side, side]
+                negative = 1 if tangent[side, side] < 0 else 0
+    out.factor.negative[k] = negative
+    pull0 = -out.residual[2 * k] - tangent[0, 0] * here[0] - tangent[0, 1] * here[1]
+    pull1 = -out.residual[2 * k + 1] - tangent[1, 0] * here[0] - tangent[1, 1] * here[1]
+    by_pressure, by_potential = out.opening_by_pressure, out.opening_by_potential
+    potential, follows = out.about[first:behind], out.motion_by_potential[first:behind]
+    for side in range(2):
+        x, y = compliance[side, 0], compliance[side, 1]
+        alone = here[side] + x * pull0 + y * pull1
+        out.isolated_correction[2 * k + side] = alone
+        motion[side, 1] = x * by_pressure[2 * k] + y * by_pressure[2 * k + 1]
+        motion[side, 0] = alone - motion[side, 1] * pressure
+        for j in range(m):
+            value = x * by_potential[first + j, 0] + y * by_potential[first + j, 1]
+            follows[j, side] = value
+            motion[side, 0] -= value * potential[j]
     start = rules.vector_start[out.nodes.orders[k]]
     w = rules.weights[start : start + m]
     square = slice(out.tree.response_start[k], out.tree.response_start[k + 1])
     inverse, response = out.inverse[square], out.factor.response[square]
-    charge, motion, follows = out.charges.isolated, out.motion, out.motion_by_potential[own]
+    charge, by_edge = out.charges.isolated, out.charge_by_edge[first:behind]
+    stretch = out.tree.stretch[first:behind]
     for i in range(m):
-        charge[1, first + i] = -w[i] * solved[1, i]
-        charge[0, first + i] = w[i] * solved[0, i]
-        for side in range(2):
-            part = strength[side] * (w[i] * solved[3 + side, i] + singular[side, i])
-            moving[side, i] = part
-            charge[1, first + i] += part * motion[2 * k + side, 1]
-            charge[0, first + i] += part * out.isolated_correction[2 * k + side]
-        charge[0, first + i] -= pressure * charge[1, first + i]
-    left, right = moving[0], moving[1]
-    stretch = out.tree.stretch[own]
-    for i in range(m):
-        row, solved_row = response[i * m : (i + 1) * m], inverse[i * m : (i + 1) * m]
+        row, inverse_row = response[i * m : (i + 1) * m], inverse[i * m : (i + 1) * m]
+        of_left, of_right = by_edge[i, 0], by_edge[i, 1]
+        by_left, by_right, weight = follows[i, 0], follows[i, 1], w[i]
         total = 0.0
         mean = 0.0
         for j in range(m):
-            value = w[i] * solved_row[j] * w[j]
-            value -= 0.5 * (left[i] * follows[j, 0] + left[j] * follows[i, 0])
-            value -= 0.5 * (right[i] * follows[j, 1] + right[j] * follows[i, 1])
+            value = weight * inverse_row[j] * w[j]
+            value -= 0.5 * (of_left * follows[j, 0] + by_edge[j, 0] * by_left)
+            value -= 0.5 * (of_right * follows[j, 1] + by_edge[j, 1] * by_right)
             row[j] = value
         for j in range(m):
             total += row[j] * potential[j]
             mean += row[j] * stretch[j]
-        charge[0, first + i] += total
         out.mean_by_potential[first + i] = mean
+        by_p = out.held_charge[first + i, 1] + of_left * motion[0, 1] + of_right * motion[1, 1]
+        alone = of_left * out.isolated_correction[2 * k]
+        alone += of_right * out.isolated_correction[2 * k + 1]
+        charge[1, first + i] = by_p
+        charge[0, first + i] = out.held_charge[first + i, 0] + alone - pressure * by_p + total

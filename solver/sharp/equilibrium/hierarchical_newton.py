@@ -20,7 +20,6 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
 from adhesis.solver.sharp.equilibrium.renewal import (
     move_references,
     outdated_references,
-    renew_held,
 )
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
@@ -85,14 +84,14 @@ def equilibrium_many(
     is_outgrown = False
     steps = 0
     pressure = pressure_at(response, prescribed, model.device)
-    renew_held(response, np.zeros(gaps.shape[0], dtype=np.bool_), law, model)
+    none_held = np.zeros(gaps.size, dtype=np.bool_)
     now = no_motion(gaps.shape[0])
     while True:
         steps += 1
-        if not move_references(response, gaps, pressure, prescribed, law, model):
+        if not move_references(response, gaps, none_held, pressure, prescribed, law, model):
             is_outgrown = True
             break
-        now = solve_response(response, prescribed, model.device)
+        now = solve_response(response, prescribed, law, model.device)
         pressure = now.pressure
         step = now.motion - motion_to(response, gaps)
         size = np.abs(step).max()

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.field.cluster_tree import Tree
 from adhesis.solver.sharp.field.solution import Equations, LoadingDevice, Nodes
 from adhesis.solver.sharp.field.tree_factor import (
@@ -29,7 +30,7 @@ from adhesis.solver.sharp.field.tree_factor import (
     whole_tree,
 )
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT
-from adhesis.solver.sharp.tolerances import SOFT_RATE
+from adhesis.solver.sharp.tolerances import SOFT_EDGE
 
 Flags = NDArray[np.bool_]
 
@@ -49,14 +50,25 @@ class LinearResponse(NamedTuple):
     factor : TreeFactor
     charges : Charges
         Without potentials and p, and by a unit of p (two rows).
-    held : bool array, shape (L,)
-        Gaps whose edges are held.
+    held, here : bool array and array, shape (2L,)
+        Edges that are held, and their motion from the reference to where they are; 0 for others.
     about, about_pressure : array, shape (N,) and (L,)
         Potentials and p of the references.
     scaled_opening : array, shape (N,)
         f there.
-    residual, isolated_correction : array, shape (2L,)
-        C_e - C_c in the reference, and the motion that would balance its gap by itself.
+    opening, residual, opening_by_pressure : array, shape (2L,)
+        C_e and C_e - C_c in the reference, and ∂C_e/∂p between held edges.
+    tangent : array, shape (2L, 2)
+        ∂(C_e - C_c)/∂n_f between both edges of a gap, in the potential of the others.
+    opening_by_potential, charge_by_edge : array, shape (N, 2)
+        ∂C_e/∂g of both edges of a gap by the potential at its nodes, with the other sign; and the
+        charges by the motion of each edge.
+    held_charge : array, shape (N, 2)
+        Charges between held edges in the reference, and by a unit of p.
+    compliance : array, shape (2L, 2)
+        Inverse of the tangent of the edges that are not held.
+    isolated_correction : array, shape (2L,)
+        Motion that would balance a gap by itself.
     motion : array, shape (2L, 2)
         Motions of its edges without potentials and p, and by a unit of p.
     motion_by_potential : array, shape (N, 2)
@@ -68,7 +80,7 @@ class LinearResponse(NamedTuple):
     mean : array, shape (2,)
         Its mean opening, times 2π, likewise.
     softness : array, shape (L,)
-        Rate dn/dd of each gap's edges, or their neighbours', over that from which on gaps are soft.
+        Compliance of each gap's edges, or their neighbours', over that from which on gaps are soft.
     """
 
     nodes: Nodes
@@ -78,10 +90,18 @@ class LinearResponse(NamedTuple):
     factor: TreeFactor
     charges: Charges
     held: Flags
+    here: Array
     about: Array
     about_pressure: Array
     scaled_opening: Array
+    opening: Array
     residual: Array
+    opening_by_pressure: Array
+    tangent: Array
+    opening_by_potential: Array
+    charge_by_edge: Array
+    held_charge: Array
+    compliance: Array
     isolated_correction: Array
     motion: Array
     motion_by_potential: Array
@@ -98,6 +118,8 @@ class ResponseSolution(NamedTuple):
     ----------
     motion, rate : array, shape (2L,)
         Outward motion n from the reference, and dn/dd along the branch.
+    by_pressure : array, shape (2L,)
+        ∂n/∂p.
     pressure, separation : float
         p and q0 s.
     slope : float
@@ -108,6 +130,7 @@ class ResponseSolution(NamedTuple):
 
     motion: Array
     rate: Array
+    by_pressure: Array
     pressure: float
     separation: float
     slope: float
@@ -118,7 +141,7 @@ class ResponseSolution(NamedTuple):
 def no_motion(gaps: int) -> ResponseSolution:
     """Make a solution in which no edge moves."""
     none = np.zeros(2 * gaps)
-    return ResponseSolution(none, none, np.nan, np.nan, np.nan, False)
+    return ResponseSolution(none, none, none, np.nan, np.nan, np.nan, False)
 
 
 @compiled
@@ -135,11 +158,19 @@ def allocate_response(
         tree=tree,
         factor=factor,
         charges=Charges(np.zeros((2, size)), np.zeros((2, size))),
-        held=np.zeros(count, dtype=np.bool_),
+        held=np.zeros(2 * count, dtype=np.bool_),
+        here=np.zeros(2 * count),
         about=np.zeros(n),
         about_pressure=np.zeros(count),
         scaled_opening=np.zeros(n),
+        opening=np.zeros(2 * count),
         residual=np.zeros(2 * count),
+        opening_by_pressure=np.zeros(2 * count),
+        tangent=np.zeros((2 * count, 2)),
+        opening_by_potential=np.zeros((n, 2)),
+        charge_by_edge=np.zeros((n, 2)),
+        held_charge=np.zeros((n, 2)),
+        compliance=np.zeros((2 * count, 2)),
         isolated_correction=np.zeros(2 * count),
         motion=np.zeros((2 * count, 2)),
         motion_by_potential=np.zeros((n, 2)),
@@ -152,7 +183,7 @@ def allocate_response(
 
 @compiled
 def solve_response(
-    response: LinearResponse, prescribed: float, device: LoadingDevice
+    response: LinearResponse, prescribed: float, law: EdgeLaw, device: LoadingDevice
 ) -> ResponseSolution:
     """Solve for all edges, with d prescribed."""
     tree, nodes = response.tree, response.nodes
@@ -175,11 +206,11 @@ def solve_response(
     if device.compliance != 0:
         separation = (mean[0] + pressure * mean[1]) / (2 * np.pi)
     negative = response.factor.negative[-1]
-    rates = motion[:, 1] * rate
-    _update_softness(response.softness, rates)
+    _update_softness(response, motion, by_pressure, law, device)
     return ResponseSolution(
         motion=motion[:, 0] + pressure * motion[:, 1],
-        rate=rates,
+        rate=motion[:, 1] * rate,
+        by_pressure=motion[:, 1].copy(),
         pressure=pressure,
         separation=separation,
         slope=rate if weight != 0 else rate * mean[1] / (2 * np.pi),
@@ -188,16 +219,30 @@ def solve_response(
 
 
 @compiled
-def _update_softness(softness: Array, rate: Array) -> None:
-    """Compute how soft each gap is by its largest rate, or its neighbours'."""
-    count = softness.shape[0]
-    mean = np.abs(rate).mean()
+def _update_softness(
+    response: LinearResponse, motion: Array, by_pressure: float, law: EdgeLaw, device: LoadingDevice
+) -> None:
+    """Compute how soft each gap is by its softest edge, or its neighbours'.
+
+    That is the compliance with which edges follow their openings, over that of their gap by itself
+    or by roughness of the shortest wave, at the prescribed d: edges by p, times how much more p
+    changes than with all edges held (and without the potentials of other gaps).
+    """
+    count, softness = response.softness.shape[0], response.softness
+    held = 0.0
+    for i in range(response.held_charge.shape[0]):
+        held += response.tree.stretch[i] * response.held_charge[i, 1]
+    held = device.separation_weight * held - 2 * np.pi * device.compliance
+    more = abs(held / by_pressure) / SOFT_EDGE
+    rough, tangent = 0.5 * law.overlap_limit / law.longest_step, response.tangent
     for k in range(count):
-        largest = 0.0
+        softness[k] = 1.0
+    for e in range(2 * count):
+        stiff = max(rough, abs(tangent[e, 0]) + abs(tangent[e, 1]))
+        soft = more * stiff * abs(motion[e, 1] / response.opening_by_pressure[e])
         for beside in range(-1, 2):
-            j = (k + beside) % count
-            largest = max(largest, abs(rate[2 * j]), abs(rate[2 * j + 1]))
-        softness[k] = max(largest / (SOFT_RATE * mean), 1.0)
+            k = (e // 2 + beside) % count
+            softness[k] = max(softness[k], soft)
 
 
 @compiled

@@ -13,10 +13,11 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.gap_response import linearise_gap
+from adhesis.solver.sharp.equilibrium.gap_response import condense_gap, linearise_gap
 from adhesis.solver.sharp.equilibrium.linear_response import (
     Flags,
     LinearResponse,
+    motion_to,
     pressure_at,
     solve_response,
 )
@@ -33,7 +34,9 @@ from adhesis.solver.sharp.gap.conformal_map import (
     convergence_rate,
     map_gaps,
 )
+from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
+    FEW_REFERENCES,
     REFERENCE_BALANCE,
     REFERENCE_FAR,
     REFERENCE_MOST_FAR,
@@ -46,7 +49,7 @@ from adhesis.solver.sharp.tolerances import (
 @compiled
 def factor_runs(response: LinearResponse, changed: Flags) -> None:
     """Compute the responses and charges of runs that have changed, or hold gaps that have."""
-    tree, count = response.tree, response.held.shape[0]
+    tree, count = response.tree, response.softness.shape[0]
     renewed = np.zeros(tree.rank.shape[0], dtype=np.bool_)
     renewed[: changed.shape[0]] = changed
     work = np.empty((3, tree.rank.max()))
@@ -63,7 +66,6 @@ def linearise_in_current_potential(
 ) -> None:
     """Take a gap's potential in the last solution as its reference, and let its edges follow."""
     offset, potential = response.nodes.offset, response.potential
-    response.held[k] = False
     response.about_pressure[k] = pressure
     for i in range(offset[k], offset[k + 1]):
         response.about[i] = potential[0, i] + pressure * potential[1, i]
@@ -124,6 +126,7 @@ def outdated_references(
 def move_references(
     response: LinearResponse,
     gaps: Array,
+    held: Flags,
     pressure: float,
     prescribed: float,
     law: EdgeLaw,
@@ -131,17 +134,15 @@ def move_references(
 ) -> bool:
     """Move the references of gaps to these edges where they have departed from them.
 
-    ``pressure`` is p, with which the last solution gives the potentials. Returns False where a gap
-    or run needs more nodes than it has, or many gaps are far from their references: then another
-    response is to be set up.
+    ``held`` marks the edges that are held from now on. ``pressure`` is p, with which the last
+    solution gives the potentials. Returns False where a gap or run needs more nodes than it has,
+    or many gaps are far from their references: then another response is to be set up.
     """
     table = map_gaps(gaps)
     nodes, counts = response.nodes, model.rules.counts
     changed, far = outdated_references(response, table, law)
     indices = np.flatnonzero(changed)
-    if indices.shape[0] == 0:
-        return True
-    if far.sum() > REFERENCE_MOST_FAR * changed.shape[0]:
+    if far.sum() > REFERENCE_MOST_FAR * max(changed.shape[0], FEW_REFERENCES):
         return False
     for gap in indices:
         order = nodes.orders[gap]
@@ -151,25 +152,58 @@ def move_references(
     before = nodes.table.copy()
     for gap in indices:
         nodes.table[gap] = table[gap]
-        response.held[gap] = far[gap]
-    column = np.zeros(changed.shape[0], dtype=np.int64)
-    fill_gaps(indices, nodes, response.equations, column, model)
+    both = held.copy()
+    for e in range(held.shape[0]):
+        if far[e // 2]:
+            both[e] = True
+    others = hold_edges(response, gaps, both)
+    if indices.shape[0] == 0:
+        condense_gaps(response, others, model)
+        return True
+    fill_gaps(indices, nodes, response.equations, model)
     renewed = True
     for k in range(changed.shape[0]):
         if changed[k] and renewed:
             renewed = _renew_gap(response, k, before[k], pressure, law, model)
-    if not (renewed and _replace_runs(response, changed, model)):
-        nodes.table[changed] = np.nan  # they serve for no other response
+        elif others[k]:
+            condense_gap(response, k, model.rules)
+            changed[k] = True
+    if not (renewed and _replace_runs(response, indices, model)):
+        nodes.table[indices] = np.nan  # they serve for no other response
         return False
     factor_runs(response, changed)
     if far.any():
         # their potentials are not those of the old edges: solved with these held
-        pressure = solve_response(response, prescribed, model.device).pressure
+        pressure = solve_response(response, prescribed, law, model.device).pressure
+        hold_edges(response, gaps, held)
         for k in range(far.shape[0]):
             if far[k]:
                 linearise_in_current_potential(response, k, pressure, law, model)
         factor_runs(response, far)
     return True
+
+
+@compiled
+def hold_edges(response: LinearResponse, gaps: Array, held: Flags) -> Flags:
+    """Hold some edges where they are, and no others; marks the gaps that are to be condensed."""
+    motion = motion_to(response, gaps)
+    changed = np.zeros(gaps.shape[0], dtype=np.bool_)
+    for e in range(held.shape[0]):
+        here = motion[e] if held[e] else 0.0
+        if held[e] != response.held[e] or here != response.here[e]:
+            changed[e // 2] = True
+        response.held[e], response.here[e] = held[e], here
+    return changed
+
+
+@compiled
+def condense_gaps(response: LinearResponse, some: Flags, model: FieldModel) -> None:
+    """Eliminate the edges of some gaps anew, and factor the runs that hold them."""
+    for k in range(some.shape[0]):
+        if some[k]:
+            condense_gap(response, k, model.rules)
+    if some.any():
+        factor_runs(response, some)
 
 
 @compiled
@@ -203,15 +237,15 @@ def _renew_gap(
 
 
 @compiled
-def _replace_runs(response: LinearResponse, changed: Flags, model: FieldModel) -> bool:
+def _replace_runs(response: LinearResponse, changed: Integers, model: FieldModel) -> bool:
     """Place the runs anew that hold gaps that have changed.
 
     Returns whether they have enough charges.
     """
-    tree = response.tree
+    tree, count = response.tree, response.softness.shape[0]
     renewed = np.zeros(tree.rank.shape[0], dtype=np.bool_)
-    renewed[: changed.shape[0]] = changed
-    for run in range(changed.shape[0], renewed.shape[0]):
+    renewed[changed] = True
+    for run in range(count, renewed.shape[0]):
         if renewed[tree.children[run, 0]] or renewed[tree.children[run, 1]]:
             renewed[run] = True
             if not replace_run(tree, run, response.nodes.table, model.digits):
@@ -219,27 +253,14 @@ def _replace_runs(response: LinearResponse, changed: Flags, model: FieldModel) -
     return True
 
 
-@compiled
-def renew_held(response: LinearResponse, held: Flags, law: EdgeLaw, model: FieldModel) -> None:
-    """Hold the edges of some gaps, and let those of all others follow."""
-    changed = held != response.held
-    if not changed.any():
-        return
-    for k in range(held.shape[0]):
-        if changed[k]:
-            response.held[k] = held[k]
-            linearise_gap(response, k, law, model)
-    factor_runs(response, changed)
-
-
 @compiled_for_both
 def settle_response(
     response: LinearResponse, gaps: Array, prescribed: float, law: EdgeLaw, model: FieldModel
 ) -> bool:
     """Renew the response for a known equilibrium; returns False as :func:`move_references` does."""
-    renew_held(response, np.zeros(gaps.shape[0], dtype=np.bool_), law, model)
+    none = np.zeros(gaps.size, dtype=np.bool_)
     pressure = pressure_at(response, prescribed, model.device)
-    if not move_references(response, gaps, pressure, prescribed, law, model):
+    if not move_references(response, gaps, none, pressure, prescribed, law, model):
         return False
-    solve_response(response, prescribed, model.device)
+    solve_response(response, prescribed, law, model.device)
     return True

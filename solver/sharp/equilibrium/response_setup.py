@@ -40,7 +40,7 @@ from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.field.tree_factor import empty_factor
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT, convergence_rate, in_order, map_gaps
 from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
-from adhesis.solver.sharp.tolerances import FURTHER_ORDERS, REFERENCE_MOST_FAR
+from adhesis.solver.sharp.tolerances import FURTHER_CHARGES, FURTHER_ORDERS, REFERENCE_MOST_FAR
 
 
 @compiled_for_both
@@ -102,9 +102,10 @@ def update_response(
     for run in range(same.shape[0]):
         if same[run] >= 0:
             rank[run] = known.tree.rank[same[run]]
-    tree = empty_tree(table, offset, children, rank, model.digits, True)
+    tree = empty_tree(table, offset, children, rank, FURTHER_CHARGES * model.digits, True)
     out = allocate_response(nodes, equations, tree, empty_factor(tree))
-    out.held[:] = fresh
+    for k in range(fresh.shape[0]):
+        out.held[2 * k : 2 * k + 2] = fresh[k]
     tree.theta[: offset[-1]] = nodes.theta
     tree.stretch[: offset[-1]] = nodes.weight / quadrature_weights(nodes, model.rules)
     for run in range(same.shape[0]):
@@ -122,11 +123,12 @@ def update_response(
         else:
             _copy_gap(known, source[k], out, k)
     factor_runs(out, same < 0)
-    pressure = solve_response(out, prescribed, model.device).pressure
+    pressure = solve_response(out, prescribed, law, model.device).pressure
     if not np.isfinite(pressure):
         return out, False
     for k in range(fresh.shape[0]):
         if fresh[k]:
+            out.held[2 * k : 2 * k + 2] = False
             linearise_in_current_potential(out, k, pressure, law, model)
     factor_runs(out, fresh)
     return out, True
@@ -203,21 +205,31 @@ def _copy_gap(known: LinearResponse, j: int, out: LinearResponse, k: int) -> Non
     """Copy how the edges of a gap set_up_response, and its reference."""
     square, here = run_span(known.tree.response_start, j), run_span(out.tree.response_start, k)
     _copy(known.inverse, square, out.inverse, here)
-    out.held[k] = known.held[j]
     out.about_pressure[k] = known.about_pressure[j]
     theirs, own = run_span(known.nodes.offset, j), run_span(out.nodes.offset, k)
     _copy(known.about, theirs, out.about, own)
     _copy(known.scaled_opening, theirs, out.scaled_opening, own)
     _copy(known.mean_by_potential, theirs, out.mean_by_potential, own)
+    _copy_edges(known, j, out, k)
+    for node in range(own.stop - own.start):
+        i, there = own.start + node, theirs.start + node
+        for side in range(2):
+            out.motion_by_potential[i, side] = known.motion_by_potential[there, side]
+            out.opening_by_potential[i, side] = known.opening_by_potential[there, side]
+            out.charge_by_edge[i, side] = known.charge_by_edge[there, side]
+            out.held_charge[i, side] = known.held_charge[there, side]
+
+
+@compiled
+def _copy_edges(known: LinearResponse, j: int, out: LinearResponse, k: int) -> None:
+    """Copy what is known of both edges of a gap."""
     for side in range(2):
         e, f = 2 * j + side, 2 * k + side
-        out.residual[f], out.isolated_correction[f] = (
-            known.residual[e],
-            known.isolated_correction[e],
-        )
+        out.opening[f], out.residual[f] = known.opening[e], known.residual[e]
+        out.opening_by_pressure[f] = known.opening_by_pressure[e]
+        out.held[f], out.here[f] = known.held[e], known.here[e]
+        out.isolated_correction[f] = known.isolated_correction[e]
         for column in range(2):
+            out.tangent[f, column] = known.tangent[e, column]
+            out.compliance[f, column] = known.compliance[e, column]
             out.motion[f, column] = known.motion[e, column]
-    for i in range(own.stop - own.start):
-        for side in range(2):
-            follows = known.motion_by_potential[theirs.start + i, side]
-            out.motion_by_potential[own.start + i, side] = follows

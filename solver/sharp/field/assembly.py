@@ -1,7 +1,7 @@
-"""Assemble equation (1) of ``dense_solver``: nodes, matrix and loads of given gaps.
+"""Assemble equation (1) of ``gap_field``: nodes, matrix and loads of given gaps.
 
-A gap's own part, its diagonal block and its loads, depends on its row of the table of gaps alone;
-the blocks between gaps are the half-space kernel at their nodes.
+A gap's own part, its diagonal block and its loads, depends on its row of the table of gaps alone.
+Between gaps acts the half-space kernel at their nodes (``cluster_tree``).
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled, compiled_sums
-from adhesis.solver.sharp.field.exterior import Exterior, is_present
-from adhesis.solver.sharp.field.solution import Equations, FieldModel, Nodes, Solution
+from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.field.solution import Equations, FieldModel, Nodes
 from adhesis.solver.sharp.gap.chebyshev_moments import gap_moments
 from adhesis.solver.sharp.gap.conformal_map import ALPHA, LEFT, RIGHT, theta_at
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
@@ -31,55 +30,6 @@ def node_offsets(orders: Integers, rules: GaussRules) -> Integers:
 
 
 @compiled
-def assemble_dense(
-    table: Array, orders: Integers, fields: int, model: FieldModel, exterior: Exterior
-) -> tuple[Nodes, Equations]:
-    """Assemble (1) with the source S (``fields`` 1), or S and S' (2), without the exterior."""
-    offset = node_offsets(orders, model.rules)
-    if is_present(exterior):  # the last gap, without nodes
-        offset[-1] = offset[-2]
-    nodes, equations = _allocate(table, orders, offset, offset[-1], fields)
-    count = table.shape[0]
-    if is_present(exterior):
-        count -= 1
-        nodes.slope[count] = 1.0
-        equations.end_terms[count] = 0.0
-    fill_gaps(np.arange(count), nodes, equations, offset, model)
-    for k in range(count):
-        _fill_rows(k, nodes, equations.matrix)
-    return nodes, equations
-
-
-@compiled
-def assemble_changed(table: Array, before: Solution, model: FieldModel) -> tuple[Nodes, Equations]:
-    """Assemble as :func:`assemble_dense`, copying the parts of unchanged gaps."""
-    old, known = before.nodes, before.equations
-    offset = old.offset
-    nodes = Nodes(
-        table, old.orders, offset, old.theta.copy(), old.weight.copy(), old.sine.copy(),
-        old.cosine.copy(), old.slope.copy(),
-    )  # fmt: skip
-    equations = Equations(known.matrix.copy(), known.load.copy(), known.end_terms.copy())
-    known_table = old.table
-    differs = np.zeros(table.shape[0], dtype=np.bool_)
-    for k in range(table.shape[0]):
-        for column in range(table.shape[1]):
-            if table[k, column] != known_table[k, column]:
-                differs[k] = True
-    changed: Integers = np.flatnonzero(differs)
-    fill_gaps(changed, nodes, equations, offset, model)
-    matrix = equations.matrix
-    for gap in changed:
-        _fill_rows(gap, nodes, matrix)
-        for i in range(offset[gap], offset[gap + 1]):
-            for j in range(offset[gap]):
-                matrix[j, i] = matrix[i, j]
-            for j in range(offset[gap + 1], matrix.shape[0]):
-                matrix[j, i] = matrix[i, j]
-    return nodes, equations
-
-
-@compiled
 def assemble_blocks(
     table: Array, orders: Integers, fields: int, model: FieldModel
 ) -> tuple[Nodes, Equations]:
@@ -89,7 +39,7 @@ def assemble_blocks(
     """
     count = table.shape[0]
     nodes, equations = _allocate_blocks(table, orders, fields, model.rules)
-    fill_gaps(np.arange(count), nodes, equations, np.zeros(count, dtype=np.int64), model)
+    fill_gaps(np.arange(count), nodes, equations, model)
     return nodes, equations
 
 
@@ -122,8 +72,7 @@ def assemble_some(
             equations.matrix[own, :m] = before.matrix[theirs, :m]
             equations.load[own] = before.load[theirs]
             equations.end_terms[k] = before.end_terms[j]
-    column = np.zeros(orders.shape[0], dtype=np.int64)
-    fill_gaps(np.flatnonzero(source < 0), nodes, equations, column, model)
+    fill_gaps(np.flatnonzero(source < 0), nodes, equations, model)
     return nodes, equations
 
 
@@ -159,10 +108,8 @@ def _allocate_blocks(
 
 
 @compiled
-def fill_gaps(
-    indices: Integers, nodes: Nodes, equations: Equations, column: Integers, model: FieldModel
-) -> None:
-    """Fill in the own parts of some gaps; their blocks begin in these columns of the matrix."""
+def fill_gaps(indices: Integers, nodes: Nodes, equations: Equations, model: FieldModel) -> None:
+    """Fill in the own parts of some gaps."""
     rules, panels = model.rules, model.panels
     counts, orders, offset, table = rules.counts, nodes.orders, nodes.offset, nodes.table
     matrix, load, end_terms = equations.matrix, equations.load, equations.end_terms
@@ -175,7 +122,7 @@ def fill_gaps(
         _fill_end_terms(s, ends, end_terms[k])
         own = slice(offset[k], offset[k + 1])
         _fill_nodes(k, s, nodes, load[own], rules)
-        block = matrix[own, column[k] : column[k] + m]
+        block = matrix[own, :m]
         _fill_block(k, nodes, block, rules)
 
 
@@ -281,28 +228,3 @@ def mapped_kernel(alpha: float, x: float) -> float:
     twice = grown - 1 / grown  # twice the hyperbolic sine
     images: float = 4 * (4 * alpha * alpha / (twice * twice) - 1 / (x * x))
     return images
-
-
-@compiled
-def _fill_rows(k: int, nodes: Nodes, matrix: Array) -> None:
-    """Fill in the rows of gap k outside its diagonal block."""
-    first, behind, weight = nodes.offset[k], nodes.offset[k + 1], nodes.weight
-    sine, cosine = nodes.sine, nodes.cosine
-    for i in range(first, behind):
-        _row_of_others(i, first, behind, sine, cosine, weight, matrix[i])
-
-
-@compiled_sums
-def _row_of_others(
-    i: int, first: int, behind: int, sine: Array, cosine: Array, weight: Array, row: Array
-) -> None:
-    """Fill the ``row`` of node i, of a gap from node ``first`` to ``behind``, for other gaps."""
-    scale = -weight[i] / (4 * np.pi)
-    si = sine[i]
-    ci = cosine[i]
-    for j in range(first):
-        half = si * cosine[j] - ci * sine[j]
-        row[j] = scale * weight[j] / (half * half)
-    for j in range(behind, row.shape[0]):
-        half = si * cosine[j] - ci * sine[j]
-        row[j] = scale * weight[j] / (half * half)

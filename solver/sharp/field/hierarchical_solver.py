@@ -1,4 +1,4 @@
-"""Solve the field of many gaps: equation (1) of ``dense_solver`` on a tree of gaps.
+"""Solve the field of many gaps: equation (1) of ``gap_field`` on a tree of gaps.
 
 Equation and nodes are those of the dense solver; the gaps interact through ``cluster_tree``. The
 work grows as the number of gaps.
@@ -22,7 +22,6 @@ from adhesis.solver.sharp.field.solution import (
     balance_means,
     combine_openings,
     mean_openings,
-    no_exterior_terms,
 )
 from adhesis.solver.sharp.field.tree_factor import (
     TreeFactor,
@@ -131,7 +130,7 @@ def apply_inverse(offset: Integers, inverse: Array, x: Array) -> Array:
 def solve_many(
     gaps: Array, prescribed: float, orders: Integers, fields: int, model: FieldModel
 ) -> tuple[Solution, FactoredGaps]:
-    """Solve the field of many gaps, otherwise as ``dense_solver.solve``.
+    """Solve the field of many gaps, otherwise as one gap after the other.
 
     Of S' only the load is computed, no solution.
     """
@@ -156,14 +155,12 @@ def solve_many(
     solution = Solution(
         nodes=nodes,
         equations=equations,
-        factor=np.empty((0, 0)),
         solved=solved,
         mean=mean,
         separation=separation,
         pressure=pressure,
         scaled_opening=f,
         opening=opening,
-        exterior=no_exterior_terms(),
     )
     return solution, factored
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.conformal_map import (
     eta_at,

@@ -23,7 +23,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.peaks import parabola_vertex
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.opening_series import GapOpening, fine_opening
 
 _COARSE = 4.0  # sine nodes per shortest wave of the openings at nodes; the verification has more

@@ -13,7 +13,6 @@ from adhesis.solver.sharp.field.solution import (
     MeanResponse,
     Solution,
     edge_openings,
-    no_exterior_terms,
     subtract_end_terms,
 )
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT, eta_at, map_gaps
@@ -105,12 +104,10 @@ def solve_separately(
     return Solution(
         nodes=nodes,
         equations=equations,
-        factor=np.empty((0, 0)),
         solved=np.empty((0, 0)),
         mean=MeanResponse(model.device.separation_weight, np.nan, np.nan),
         separation=separation,
         pressure=pressure,
         scaled_opening=f[:, 0].copy(),
         opening=opening,
-        exterior=no_exterior_terms(),
     )

@@ -1,4 +1,4 @@
-"""Prescribed value, model and solution of (1) in ``dense_solver`` for given gaps."""
+"""Prescribed value, model and solution of (1) in ``gap_field`` for given gaps."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Equations(NamedTuple):
     Attributes
     ----------
     matrix : array
-        B + G, shape (N, N), or its diagonal blocks alone, one below the other.
+        Diagonal blocks of B + G, one below the other.
     load : array, shape (N, 2 or 3)
         S~, X and, if asked for, S~'.
     end_terms : array, shape (L, 2, 1 or 2)
@@ -88,27 +88,6 @@ class Equations(NamedTuple):
     matrix: Array
     load: Array
     end_terms: Array
-
-
-class ExteriorTerms(NamedTuple):
-    """Terms that the exterior of a window adds to the derivatives of its field.
-
-    Attributes
-    ----------
-    present : bool
-        Whether the gaps are a window.
-    load : array, shape (N, 2L)
-        Added to the loads of the singular openings.
-    area : array, shape (2L,)
-        Added to their areas.
-    shift : float
-        Added to the mean opening when all edges of the window move together.
-    """
-
-    present: bool
-    load: Array
-    area: Array
-    shift: float
 
 
 class MeanResponse(NamedTuple):
@@ -136,8 +115,6 @@ class Solution(NamedTuple):
     ----------
     nodes : Nodes
     equations : Equations
-    factor : array, shape (N, ·)
-        Of the matrix (``cholesky.cholesky``); empty where the gaps are solved on a tree.
     solved : array, shape (N, 2 or 3)
         (B + G)⁻¹ of the loads.
     mean : MeanResponse
@@ -147,45 +124,16 @@ class Solution(NamedTuple):
         f: the openings over sqrt(1-η²).
     opening : array, shape (2L,)
         C at each gap end.
-    exterior : ExteriorTerms
     """
 
     nodes: Nodes
     equations: Equations
-    factor: Array
     solved: Array
     mean: MeanResponse
     separation: float
     pressure: float
     scaled_opening: Array
     opening: Array
-    exterior: ExteriorTerms
-
-
-@compiled
-def no_exterior_terms() -> ExteriorTerms:
-    """Make the terms of gaps that are all gaps of the period."""
-    return ExteriorTerms(present=False, load=np.empty((0, 0)), area=np.empty(0), shift=0.0)
-
-
-@compiled
-def no_solution(table: Array, orders: Integers, device: LoadingDevice) -> Solution:
-    """Make the solution for edges that are NaN or cross."""
-    count = table.shape[0]
-    empty, none = np.empty(0), np.empty((0, 0))
-    offset = np.zeros(count + 1, dtype=np.int64)
-    return Solution(
-        nodes=Nodes(table, orders, offset, empty, empty, empty, empty, np.empty((count, 2))),
-        equations=Equations(none, none, np.empty((0, 0, 0))),
-        factor=none,
-        solved=none,
-        mean=MeanResponse(device.separation_weight, np.nan, np.nan),
-        separation=np.nan,
-        pressure=np.nan,
-        scaled_opening=empty,
-        opening=np.full(2 * count, np.nan),
-        exterior=no_exterior_terms(),
-    )
 
 
 @compiled_for_both

@@ -60,7 +60,7 @@ class Charges(NamedTuple):
 
 
 @compiled_sums
-def _eliminate(a: Array, x: Array) -> bool:
+def eliminate(a: Array, x: Array) -> bool:
     """Solve a y = x for the columns of x, both overwritten; returns whether det a is negative."""
     n = a.shape[0]
     columns = x.shape[1]
@@ -149,7 +149,7 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
             matrix[i, j] = -matrix[i, j]
         inverse[i, i] = 1.0
         matrix[i, i] += 1.0
-    odd = _eliminate(matrix, inverse)
+    odd = eliminate(matrix, inverse)
     count = max(negative[one], negative[two])
     if (negative[one] + negative[two] + count + (1 if odd else 0)) % 2 == 1:
         count += 1
@@ -268,37 +268,34 @@ def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Charges:
 def downward_pass(
     tree: Tree,
     factor: TreeFactor,
-    below: NDArray[np.bool_],
+    wanted: NDArray[np.bool_],
     charges: Charges,
     potential: Array,
 ) -> None:
-    """Compute the potentials of all runs, shape (columns, nodes of all runs), in place.
+    """Compute the potentials of wanted runs, shape (columns, nodes of all runs), in place.
 
-    ``below`` marks the runs at whose nodes the potentials are given; those inside them are marked,
-    too, and the others left as they are.
+    The runs that hold a wanted one must be wanted, too. There is no potential outside the whole.
     """
     runs = tree.rank.shape[0]
     count = (runs + 1) // 2
     for run in range(runs - 1, count - 1, -1):
-        if not below[run]:
+        if not wanted[run]:
             continue
         inward = factor.inner_potential[run_span(tree.interpolation_start, run)]
         at = 0
         for half in range(2):
             child = tree.children[run, half]
-            below[child] = True
-            own = run_span(tree.node_start, child)
             size = tree.rank[child] * tree.rank[run]
-            for column in range(potential.shape[0]):
-                potential[column, own] = charges.potential_of_sibling[column, own]
-                outer = potential[column][run_span(tree.node_start, run)]
-                _add_apply(inward[at : at + size], outer, potential[column][own])
+            if wanted[child]:
+                own = run_span(tree.node_start, child)
+                for column in range(potential.shape[0]):
+                    potential[column, own] = charges.potential_of_sibling[column, own]
+                    outer = potential[column][run_span(tree.node_start, run)]
+                    _add_apply(inward[at : at + size], outer, potential[column][own])
             at += size
 
 
 @compiled
 def whole_tree(tree: Tree) -> NDArray[np.bool_]:
-    """Mark the whole of a tree, for :func:`downward_pass`."""
-    below = np.zeros(tree.rank.shape[0], dtype=np.bool_)
-    below[-1] = True
-    return below
+    """Mark all runs of a tree, for :func:`downward_pass`."""
+    return np.ones(tree.rank.shape[0], dtype=np.bool_)

@@ -8,6 +8,7 @@ from adhesis.solver.model.jump import Branch
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import total_length
 from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.tolerances import CLOSING_BY_MOTION
 
 
 class ClosingBound:
@@ -26,7 +27,7 @@ class ClosingBound:
         if branch == "loading":
             return abs(reached.at - point.at) * self._rate(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
-        motion = self._edges.system(point.gaps).closing_motion(point.gaps, reached.gaps)
+        motion = CLOSING_BY_MOTION * np.abs(reached.gaps - point.gaps).sum(axis=1).max()
         return float(self._edges.largest_opening / np.sqrt(self._edges.wave) * motion)
 
     def _rate(self, point: Point) -> float:
@@ -44,5 +45,4 @@ class ClosingBound:
 
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """
-        factor = self._edges.system(point.gaps).closing_factor
-        return factor * 2 * np.pi / float(total_length(point.gaps))
+        return 2 * np.pi / float(total_length(point.gaps))

@@ -13,7 +13,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
 from adhesis.solver.sharp.tolerances import (
@@ -111,7 +111,7 @@ def locate(
     clear = last.at
     # Of many gaps each trial is expensive: those at both ends show where to begin, and the least
     # value below zero is enough.
-    many = edges.uses_windows(last.gaps)
+    many = True
     if many and low == 0 and clearance > 0:
         clear_value = clearance
     tracked = criterion.track_between(last, hit) if many else None
@@ -129,7 +129,6 @@ def locate(
         if trial in (clear, hit.at):  # there its value differs by the error of the field
             return Located(last, criterion.choose_seeds(hit_candidates), 0.0), 0.0
         point = None
-        edges.recall(last.held)
         reach = CORRECTED * edges.wave
         if many:
             point = edges.equilibrium(last.interpolate(hit, trial), trial, reach)

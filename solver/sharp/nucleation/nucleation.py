@@ -20,7 +20,7 @@ from adhesis.solver.model.profile import EQUAL_CRESTS, Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
@@ -272,7 +272,7 @@ class Nucleation:
                 clear, low = trial, value
             else:
                 hit, high, field, minima = trial, value, tried, there
-        touching = Point(hit, field, point.rate, float("nan"), held=point.held)
+        touching = Point(hit, field, point.rate, float("nan"))
         return Located(touching, self.choose_seeds(minima), abs(end - point.at))
 
     def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:

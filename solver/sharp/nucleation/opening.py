@@ -25,7 +25,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 from adhesis.solver.sharp.gap.ends import with_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import measure_at

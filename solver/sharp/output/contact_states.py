@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +12,8 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.branch_point import NO_MEMORY, Point, PreviousPoint
-from adhesis.solver.sharp.field.dense_solver import FixedEdgeResponse, GapField
+from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
+from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
 from adhesis.solver.sharp.gap.ends import union_of
@@ -46,18 +46,12 @@ class ContinuationData:
         If a path stopped at the state.
     searched : SearchedGaps
         The gaps as they were when they were last searched for touches.
-    held : array, shape (L, 2)
-        Memory of their edges, with two works of adhesion.
-    branch : {"loading", "unloading"}, optional
-        Branch on which the path stopped.
     """
 
     gaps: Array
     clearance: float
     branch_data: BranchData | None = None
     searched: SearchedGaps = NONE_SEARCHED
-    held: Array = field(default_factory=lambda: NO_MEMORY)
-    branch: Branch | None = None
 
 
 def loading_device(problem: Problem) -> LoadingDevice:
@@ -133,7 +127,7 @@ class States:
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation, point.clearance, held=point.held)
+        return self.of_field(point.field, point.slope, separation, point.clearance)
 
     def of_field(
         self,
@@ -141,7 +135,6 @@ class States:
         slope: float = float("nan"),
         separation: float | None = None,
         clearance: float = 0.0,
-        held: Array = NO_MEMORY,
     ) -> ContactState:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
@@ -164,7 +157,7 @@ class States:
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             stiffness=slope * self._stiffness_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gaps, clearance, held=held),
+            internal=ContinuationData(gaps, clearance),
         )
 
     def at_fixed_edges(

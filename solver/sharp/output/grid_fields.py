@@ -10,7 +10,7 @@ import numpy as np
 
 from adhesis.solver.method import Fields, Opening
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.opening_series import fine_opening, refine_opening, sum_modes
 from adhesis.solver.sharp.field.patch_tension import RefinedTension
 

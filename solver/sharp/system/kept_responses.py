@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.equilibrium.griffith import shortest_length
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.equilibrium.renewal import settle_response
 from adhesis.solver.sharp.equilibrium.response_setup import (
@@ -64,6 +65,8 @@ class KeptResponses:
 
         ``least`` are the least orders of the gaps, or empty. None if these have no field.
         """
+        if not (np.isfinite(gaps).all() and shortest_length(gaps) > 0):
+            return None
         kept = self._kept
         known = self._of_as_many(gaps)
         if known is not None:
