@@ -215,7 +215,8 @@ class Branch:
         if apart < resolution:
             way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
             edges = predictor.leading_edge, other.edge
-            self._two_folds = TwoFolds(edges, predictor.point.at + way, apart)
+            ways = tuple(float(np.sign(predictor.point.rate[e] * way)) for e in edges)
+            self._two_folds = TwoFolds(edges, ways, predictor.point.at + way, apart)
 
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed."""
