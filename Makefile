@@ -27,9 +27,10 @@ setup-slurm:
 run: setup  ## the example campaign on all cores, then its report (CAMPAIGN=file.toml for another)
 	@jobs/local.sh $(CAMPAIGN)
 
-lint: setup-test  ## ruff and mypy
+lint: setup-test  ## ruff, mypy and the contracts of imports
 	$(bin)/ruff check .
 	$(bin)/mypy
+	$(bin)/lint-imports --no-cache --no-logo
 
 test: setup-slurm  ## the whole test suite, MPI and (where it can be installed) Slurm included
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \

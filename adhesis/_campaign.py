@@ -215,6 +215,7 @@ class Campaign:
         stream = None if progress else io.StringIO()  # stderr is that of all threads
         options = Options(processes=processes)
         summary = run_campaign(self.tables, path, options=options, say=say, stream=stream)
+        say(f"{path}: {summary}")
         if summary.stopped:
             raise RuntimeError(
                 f"the campaign stopped early: {summary.stopped}; {summary.pending} of "

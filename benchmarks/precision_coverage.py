@@ -143,7 +143,7 @@ def of_the_study(
         count = enough(drawn[:, steered], at, wanted)
         assert count is not None
         known = precision(drawn[:count, 0], wanted)
-        held += known.low <= 1 <= known.high
+        held += known.estimate.low <= 1 <= known.estimate.high
         counts.append(count)
         reach.append(known.relative_error)
     return held / campaigns, float(np.median(reach)), float(np.median(counts))

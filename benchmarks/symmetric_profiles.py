@@ -3,6 +3,7 @@
 The page docs/methods.md, "Symmetry", states what comes out. Run from the repository:
 
     python benchmarks/symmetric_profiles.py --profiles 40
+    python benchmarks/symmetric_profiles.py --profiles 4 --crests 16
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ class Scene(NamedTuple):
     load_steps: int
 
 
-def scene(number: int) -> Scene:
-    """Draw a scene of 2 to 24 waves."""
+def scene(number: int, crests: int = 0, shift: float = SHIFT) -> Scene:
+    """Draw a scene of 2 to 24 waves; of ``crests`` or more crests, with 24 waves and little γ."""
     rng = np.random.default_rng([SEED, number])
-    waves = int(np.round(2 * 12 ** rng.uniform()))
-    lowest = int(rng.integers(1, 4))
+    waves = 24 if crests else int(np.round(2 * 12 ** rng.uniform()))
+    lowest = crests or int(rng.integers(1, 4))
     highest = lowest + int(np.ceil((waves - 1) * rng.choice([1, 1, 2])))
     others = rng.choice(np.arange(lowest + 1, highest + 1), waves - 1, replace=False)
     harmonics = np.sort(np.append(lowest, others))
@@ -45,10 +46,10 @@ def scene(number: int) -> Scene:
         a[harmonics] *= rng.rayleigh(size=waves)
     a *= H_RMS / np.sqrt(2 * np.sum(np.abs(a) ** 2))
     unit = SOFT.modulus * H_RMS**2 * 2 * np.pi / PERIOD * lowest
-    gamma = float(10 ** rng.uniform(-2.5, 0.3) * unit)
+    gamma = float(10 ** rng.uniform(-2.5, -1.5 if crests else 0.3) * unit)
     depth, steps = float(rng.uniform(0.2, 0.98)), int(rng.choice([5, 10, 20, 40]))
     shifted = a.copy()
-    shifted[rng.choice(harmonics[1:])] *= np.exp(1j * SHIFT)
+    shifted[rng.choice(harmonics[1:])] *= np.exp(1j * shift)
     return Scene(Profile(PERIOD, a), Profile(PERIOD, shifted), gamma, depth, steps)
 
 
@@ -66,12 +67,16 @@ def main() -> None:
         description=__doc__.splitlines()[0] if __doc__ else None, allow_abbrev=False
     )
     parser.add_argument("--profiles", type=int, default=40)
-    profiles = parser.parse_args().profiles
+    parser.add_argument("--crests", type=int, default=0, help="lowest wave number (drawn: 1 to 3)")
+    parser.add_argument("--shift", type=float, default=SHIFT, help="of one phase, in rad")
+    args = parser.parse_args()
     run(scene(0), scene(0).even, 1e-2)  # compile
     beyond = slow = count = 0
-    print("| profile | accuracy | loss (J/m²) | difference/loss_error | time/time | races |")
-    for number in range(profiles):
-        drawn = scene(number)
+    print(
+        "| profile | accuracy | loss (J/m²) | difference/loss_error | time/time | patches | races |"
+    )
+    for number in range(args.profiles):
+        drawn = scene(number, args.crests, args.shift)
         for accuracy in (1e-2, 1e-3, 1e-4):
             (even, one), (shifted, other) = (
                 run(drawn, profile, accuracy) for profile in (drawn.even, drawn.shifted)
@@ -80,7 +85,7 @@ def main() -> None:
             beyond, slow, count = beyond + (ratio > 1), slow + (one > 2 * other + 0.02), count + 1
             print(
                 f"| {number} | {accuracy:g} | {even.loss:.6g} | {ratio:.2g} | "
-                f"{one / other:.2g} | {even.races}, {shifted.races} |",
+                f"{one / other:.2g} | {even.patches.max()} | {even.races}, {shifted.races} |",
                 flush=True,
             )
     print(

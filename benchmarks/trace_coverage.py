@@ -135,7 +135,7 @@ def judged(measured: Case, folder: Path, processes: int = 0) -> dict[str, Any]:
         "hurst": measured.hurst,
         "degree": prepared.degree,
         "cut_off": prepared.cut_off,
-        "outliers": prepared.outliers,
+        "outliers": sum(s.numbers["points"] for s in prepared.steps if s.name == "outliers"),
         "seconds": answer.seconds,
         "losses": {
             run.name: found["loss"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+import resource
 from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -73,13 +74,30 @@ def lack(error: BaseException) -> str:
         worded = isinstance(cause, (OSError, RuntimeError, ImportError))
         found = [words for words in _WORDS if words in text]
         if isinstance(cause, MemoryError) or numbered or (worded and found):
-            what = found[0] if found else "Cannot allocate memory"
+            what = found[0] if found else text or "Cannot allocate memory"
             return (
                 f"the system gave too few resources ({what}): raise the limit of memory, processes "
                 "or open files (ulimit -a lists them)"
             )
         cause = cause.__cause__ or cause.__context__
     return ""
+
+
+# Below a limit of about 700 MB, the libraries of a loop hang, end the process, or take the lack for
+# a damaged file. They map far more than they use.
+_LEAST_MEMORY = 1e9  # bytes
+
+
+def check_memory() -> None:
+    """Refuse a limit of memory under which the libraries of numerics cannot be relied on.
+
+    Raises
+    ------
+    MemoryError
+    """
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < _LEAST_MEMORY:
+        raise MemoryError(f"ulimit -v is {limit / 1e6:.0f} MB, not {_LEAST_MEMORY / 1e9:g} GB")
 
 
 _of_a_command: ContextVar[bool] = ContextVar("of_a_command", default=False)

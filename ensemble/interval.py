@@ -70,17 +70,6 @@ def interval(values: ArrayLike) -> tuple[Array, Array]:
     return np.minimum(low, mean - std * above), np.maximum(high, mean - std * below)
 
 
-def relative_error(mean: float, low: float, high: float) -> float:
-    """Return how far an interval reaches from its mean on the further side, over the mean.
-
-    Infinite where there is no interval.
-    """
-    furthest = max(mean - low, high - mean)
-    if furthest == 0:
-        return 0.0
-    return furthest / abs(mean) if mean and not np.isnan(furthest) else float("inf")
-
-
 def untransformed(x: float, skewness: Array, n: int) -> Array:
     """Return (mean - true mean)/std where Hall's cubic of it is ``x``.
 
@@ -118,7 +107,11 @@ class Estimate:
     @property
     def relative_error(self) -> float:
         """Distance of the further end of the interval over the mean; infinite without one."""
-        return relative_error(self.mean, self.low, self.high)
+        furthest = max(self.mean - self.low, self.high - self.mean)
+        if furthest == 0:
+            return 0.0
+        known = bool(self.mean) and not np.isnan(furthest)
+        return furthest / abs(self.mean) if known else float("inf")
 
 
 def estimates(values: Array, with_interval: bool = True) -> list[Estimate]:

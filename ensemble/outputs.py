@@ -12,7 +12,6 @@ import errno
 import json
 import os
 import re
-import shutil
 import stat
 import sys
 import tempfile
@@ -96,7 +95,7 @@ def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> No
                         "overwritten, so give another file"
                     )
             for name, other in seen.items():
-                if _same_file(path, other) and not _is_null(path):
+                if _same_file(path, other) and os.path.realpath(path) != os.devnull:
                     raise InputError(
                         f"{name} and {option} are both {path}: each output needs a file of its own"
                     )
@@ -193,10 +192,6 @@ def _same_file(one: Path, other: Path) -> bool:
         if os.path.samefile(one, other):
             return True
     return os.path.realpath(one) == os.path.realpath(other)
-
-
-def _is_null(path: Path) -> bool:
-    return os.path.realpath(path) == os.devnull
 
 
 # ---------------------------------------------------------------------- writing
@@ -308,6 +303,7 @@ def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(dir=folder, prefix=".writing-"))
+    spare = os.open(staging, os.O_RDONLY)  # to empty it by, where no more files may be opened
     try:
         yield staging
         written = sorted(staging.iterdir())
@@ -316,7 +312,11 @@ def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
         for name in set(names) - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        os.close(spare)
+        with suppress(OSError):  # shutil.rmtree opens several files
+            for path in staging.iterdir():
+                path.unlink()
+            staging.rmdir()
 
 
 def _umask() -> int:

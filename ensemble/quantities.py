@@ -24,6 +24,18 @@ _WORD = r"[^\W\d_]+"
 _QUOTIENT = rf"{_WORD}\s*/\s*{_WORD}(?:\^?2)?"
 
 
+class Written(float):
+    """A number in its SI unit, with the unit in which it was written, for labels."""
+
+    unit: str
+
+    def __new__(cls, value: float, unit: str = "") -> Written:
+        """Return the number; ``unit`` is one of its quantity's."""
+        made = super().__new__(cls, value)
+        made.unit = unit
+        return made
+
+
 @dataclass(frozen=True, eq=False)
 class Quantity:
     """A quantity, given as a number in its SI unit or as a number with a unit.
@@ -109,7 +121,7 @@ class Quantity:
         self.check(number)
         return number
 
-    def read_with_unit(self, text: str) -> float:
+    def read_with_unit(self, text: str) -> Written:
         """Read a number and its unit, as in "2 mm".
 
         Raises
@@ -127,7 +139,7 @@ class Quantity:
         if unit is None:
             raise UnitError(f"is {quoted(text)}: its unit must be one of {', '.join(self.units)}")
         # Decimal numbers, so that 7um is the same number as 7e-6.
-        return float(Decimal(found[1]) * Decimal(repr(self.units[unit])))
+        return Written(float(Decimal(found[1]) * Decimal(repr(self.units[unit]))), unit)
 
     def option(self, text: str) -> float:
         """Read an option; to be given to argparse."""
@@ -137,7 +149,9 @@ class Quantity:
             raise argparse.ArgumentTypeError(str(error)) from None
 
     def unit_for(self, value: float) -> str:
-        """Return the largest shown unit that is not larger than a value, or the smallest."""
+        """Return the unit of a value as written, or the largest shown one that is not larger."""
+        if isinstance(value, Written):
+            return value.unit
         return next((u for u in self.shown if abs(value) >= self.units[u]), self.shown[-1])
 
     def text(self, value: float, digits: int = 3) -> str:
@@ -267,7 +281,7 @@ _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range touch_range position "
     "step length height_range adhesion_range tip_radius cut_off noise longest highest rise "
     "form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip "
-    "coefficient_real coefficient_imag narrowest_length",
+    "coefficient_real coefficient_imag narrowest_length receded",
     "m²": "m0",
     "1/m²": "m4",
     "m³": "power floor",
@@ -276,9 +290,9 @@ _NAMES = {
     "tension largest_interior_tension turning_stress",
     "Pa/m": "stiffness",
     "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
-    "J/m²": "work_of_adhesion loss loss_from_drops loss_error energy_drop at_stake energy_at_stake "
-    "barrier energy_change work work_gained work_spent effective_work_of_approach "
-    "effective_work_of_separation full_contact_energy",
+    "J/m²": "work_of_adhesion work_of_adhesion_open friction loss loss_from_drops loss_error "
+    "energy_drop at_stake energy_at_stake barrier energy_change work work_gained work_spent "
+    "effective_work_of_approach effective_work_of_separation full_contact_energy",
     "s": "seconds expected_seconds wall",
 }
 UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
@@ -287,7 +301,7 @@ UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 _TWO_DIGITS = 2.95  # an error below has two significant digits
 _MOST_PLACES = 9
 
-AXIS_UNITS = {"m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
+AXIS_UNITS = {"m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m", "J m-2": "J/m²"}
 """Units of the axes of a campaign for people, by their spelling in results files."""
 
 
@@ -298,7 +312,9 @@ def with_units(table: Any) -> Any:
 
 
 def shown_unit(name: str, largest: float) -> tuple[str, float]:
-    """Return a unit of its size for a quantity, and that in the SI unit; ("", 1) for a number.
+    """Return a unit for a quantity, and that in the SI unit; ("", 1) for a number.
+
+    It is the one in which the value was written, or one of its size.
 
     Parameters
     ----------
@@ -319,6 +335,22 @@ def with_unit(name: str, value: float) -> str:
     """Return a value and its unit: "20 kPa"; a number alone where there is none."""
     unit, size = shown_unit(name, value)
     return f"{value / size:g} {unit}".rstrip()
+
+
+def common_unit(name: str, values: Sequence[float]) -> tuple[str, float]:
+    """Return :func:`shown_unit` of several values: as one was written, or of the largest."""
+    return shown_unit(name, next((v for v in values if isinstance(v, Written)), max(values)))
+
+
+def in_one_unit(name: str, values: Sequence[float], between: str = ", ") -> str:
+    """Return values, ascending, in their common unit: "0.2, 0.4 kPa"."""
+    unit, size = common_unit(name, values)
+    return f"{between.join(f'{value / size:g}' for value in sorted(values))} {unit}".rstrip()
+
+
+def gamma_text(work_of_adhesion: float) -> str:
+    """Return a work of adhesion γ and its unit: "0.02 J/m²", or "20 mJ/m²" if written so."""
+    return with_unit("work_of_adhesion", work_of_adhesion)
 
 
 # Of the turning points: in Pa under a load, else dimensionless.

@@ -31,24 +31,6 @@ def irregular(mode: int) -> str | None:
     return next((kind for holds, kind in _KINDS if holds(mode)), "no ordinary file")
 
 
-def check_regular(path: Path | str) -> os.stat_result:
-    """Return the state of a regular file; links are followed.
-
-    Raises
-    ------
-    InputError
-        If it is a directory, pipe, socket or device, or no file can have this name.
-    OSError
-        If it is missing or cannot be reached.
-    """
-    try:
-        found = os.stat(path)
-    except ValueError:  # a NUL, or characters that no name has
-        raise InputError(f"{quoted(str(path))} is not the name of a file") from None
-    _refuse(path, found.st_mode)
-    return found
-
-
 def open_regular(path: Path | str) -> BufferedReader:
     """Open a regular file to read its bytes; links are followed.
 
@@ -59,7 +41,11 @@ def open_regular(path: Path | str) -> BufferedReader:
     OSError
         If it is missing or cannot be read.
     """
-    check_regular(path)  # before it is opened, which some devices take for a command
+    try:
+        mode = os.stat(path).st_mode
+    except ValueError:  # a NUL, or characters that no name has
+        raise InputError(f"{quoted(str(path))} is not the name of a file") from None
+    _refuse(path, mode)  # before it is opened, which some devices take for a command
     descriptor = os.open(path, os.O_RDONLY | _WITHOUT_WAITING)
     try:
         _refuse(path, os.fstat(descriptor).st_mode)

@@ -8,10 +8,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol, TextIO
+from typing import Protocol, TextIO
+
+from adhesis.ensemble.quantities import duration
 
 _EVERY = 10.0  # s
 _LIVE = 0.1  # s between two states of a line on a terminal
+_CELLS = 24  # of a full bar
 _REWRITE = "\r\x1b[K"
 
 
@@ -22,7 +25,7 @@ def log(text: str) -> None:
 
 @contextmanager
 def ticking(
-    task: Callable[[], str] | str, write: Callable[[str], None] = log, every: float = _EVERY
+    task: Callable[[], str], write: Callable[[str], None] = log, every: float = _EVERY
 ) -> Iterator[None]:
     """Log at intervals which task is under way, and for how long.
 
@@ -30,8 +33,8 @@ def ticking(
 
     Parameters
     ----------
-    task : str or callable
-        Description of the task, or a callable that returns it; it is called by another thread.
+    task : callable
+        Returns the description of the task; it is called by another thread.
     write : callable
         Takes a line.
     every : float
@@ -42,8 +45,7 @@ def ticking(
 
     def lines() -> None:
         while not over.wait(every):
-            text = task if isinstance(task, str) else task()
-            write(f"{text} ({time.monotonic() - started:.0f} s)")
+            write(f"{task()} ({time.monotonic() - started:.0f} s)")
 
     thread = threading.Thread(target=lines, daemon=True)
     thread.start()
@@ -126,7 +128,7 @@ class Bar(Protocol):
 
 @contextmanager
 def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
-    """Show a bar on stderr, or in the notebook.
+    """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals and a last one.
 
     Parameters
     ----------
@@ -135,22 +137,45 @@ def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
     remaining : bool
         Whether the time that is left is estimated, from the pace so far.
     """
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    line = StatusLine(_EVERY)
+    shown = what
 
-    columns = [TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
-    if remaining:
-        columns += [TextColumn("left:"), TimeRemainingColumn()]
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        task: Any = progress.add_task(what, total=1.0)
+    def show(done: float | None, total: float | None, text: str = "") -> None:
+        nonlocal shown
+        parts = [text or what]
+        share = done / total if done is not None and total else None
+        if share is not None:
+            parts.append(f"[{'#' * round(_CELLS * share):.<{_CELLS}}]")
+        parts.append(duration(line.seconds))
+        if remaining and share and share < 1:
+            parts.append(f"about {duration(line.seconds * (1 / share - 1))} left")
+        shown = "  ".join(parts)
+        line.show(lambda: shown)
 
-        def show(done: float | None, total: float | None, text: str = "") -> None:
-            progress.update(task, description=text or what, completed=done, total=total)
-
+    try:
         yield show
+    finally:
+        line.show(lambda: shown, last=True)
+
+
+@contextmanager
+def following(what: str) -> Iterator[Bar]:
+    """Show how far a command is: a bar on a terminal, lines at intervals elsewhere.
+
+    Parameters
+    ----------
+    what : str
+        Description, until another text is given.
+    """
+    if sys.stderr.isatty():
+        with bar(what) as show:
+            yield show
+        return
+    shown = what
+
+    def keep(done: float | None, total: float | None, text: str = "") -> None:
+        nonlocal shown
+        shown = text or (what if total is None else f"{what}: {done:g} of {total:g}")
+
+    with ticking(lambda: shown):
+        yield keep

@@ -21,10 +21,7 @@ def software() -> dict[str, str]:
         "adhesis_version": _package("adhesis", missing="unknown"),
         "commit": commit(),
         "python": platform.python_version(),
-        "numpy": _package("numpy"),
-        "scipy": _package("scipy"),
-        "numba": _package("numba"),
-        "llvmlite": _package("llvmlite"),
+        **{name: _package(name) for name in ("numpy", "scipy", "numba", "llvmlite")},
         "processor": processor(),
     }
 

@@ -90,12 +90,8 @@ def warm_missing(methods: Collection[str], *, quiet: bool = False, many_gaps: bo
     compiled = [name for name in methods if name in COMPILED_METHODS]
     missing = [name for name in compiled if compiled_in(name, many_gaps=many_gaps) is None]
     if missing:
-        write = _nowhere if quiet else log
+        write = (lambda text: None) if quiet else log
         warm_up(missing, write, many_gaps=many_gaps, show_bar=not quiet)
-
-
-def _nowhere(_: str) -> None:
-    pass
 
 
 def _listed(methods: Collection[str]) -> str:

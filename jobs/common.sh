@@ -128,18 +128,20 @@ script_of() {
     echo
 }
 
-# Staging. One job at a time holds FILE.h5.staging, from before it copies FILE.h5 to its folder below
-# $STAGING until after it has copied it back; the launcher inherits the lock, which lasts as long as
-# either of them. A file is copied back only when nobody writes to it, and removed only after that.
+# Staging. One job at a time holds FILE.h5.staging: with STAGING from before it copies FILE.h5 to its
+# folder there until after it has copied it back, without it while it runs, as its FILE.h5 must not be
+# replaced. The launcher inherits the lock, which lasts as long as either of them. A file is copied
+# back only when nobody writes to it, and removed only after that.
 
 # stage_in: sets results to where the run writes: the results file, or its copy below $STAGING
 stage_in() {
     results=$file
-    if [ -z "${STAGING:-}" ]; then return 0; fi
     if ! target=$(readlink -f "$file") || [ -z "$target" ]; then
+        if [ -z "${STAGING:-}" ]; then return 0; fi # the run itself says so
         refuse 2 "$file cannot be written: there is no folder $(dirname "$file")"
     fi
     hold "$target.staging"
+    if [ -z "${STAGING:-}" ]; then return 0; fi
     if [ -e "$target" ] && [ ! -f "$target" ]; then refuse 2 "$file is no ordinary file"; fi
     if is_written "$target"; then
         refuse 2 "$file is being written by another run: wait until it has ended"
@@ -153,17 +155,22 @@ stage_in() {
         if [ -e "$target" ] && ! copy "$target" "$results"; then
             refuse 74 "$file could not be copied to $results"
         fi
-    elif is_changed && ! cmp -s "$results" "$target"; then # left by a job that was killed
-        refuse 2 "$results holds results that were not copied back, and $file has changed since:" \
-            "join them (adhesis merge $results --out $file) and remove $stage"
-    elif ! version >"$stage/version"; then
-        refuse 74 "$stage/version could not be written"
+    elif is_changed; then # left by a job that was killed
+        if ! cmp -s "$results" "$target"; then
+            refuse 2 "$results holds results that were not copied back, and $file has changed since:" \
+                "join them (adhesis merge $results --out $file) and remove $stage"
+        fi
+        # only of equal files: a job that is killed here leaves it empty
+        if ! version >"$stage/version"; then refuse 74 "$stage/version could not be written"; fi
     fi
 }
 
 # stage_out: copies the results back whole; if that fails they stay where they are, and code is 74
 stage_out() {
-    if [ -z "${STAGING:-}" ]; then return 0; fi
+    if [ -z "${STAGING:-}" ]; then
+        release
+        return 0
+    fi
     if [ "$code" = 2 ] && [ -n "$found" ]; then
         note "the run did nothing; $results stays as it was" # ranks of an earlier job may write to it
     elif is_written "$results"; then
@@ -199,7 +206,8 @@ refuse() {
     exit "$1"
 }
 
-# hold LOCK: takes the lock of this job, for which it waits as long as the run would (--patience)
+# hold LOCK: takes the lock of this job, for which it waits as long as the run would (--patience).
+# Without STAGING the job goes on where there are no such locks, and so can be no job that has it.
 hold() {
     local refused
     lock=$1
@@ -207,7 +215,11 @@ hold() {
         if [ -L "$lock" ] || { [ -e "$lock" ] && [ ! -f "$lock" ]; }; then
             refuse 2 "$lock is a link or no ordinary file, and not the lock of a job: remove it"
         fi
-        if ! { exec {held}<>"$lock"; } 2>/dev/null; then refuse 74 "$lock cannot be written"; fi
+        if ! { exec {held}<>"$lock"; } 2>/dev/null; then
+            held=''
+            if [ -z "${STAGING:-}" ]; then return 0; fi
+            refuse 74 "$lock cannot be written"
+        fi
         refused=0
         flock -w "${patience:-10}" -E 99 "$held" || refused=$?
         # its last holder may just have removed the file
@@ -216,8 +228,14 @@ hold() {
         held=''
         case $refused in
             0) ;;
-            99) refuse 2 "$file is held by another job with STAGING ($lock): wait until it has ended" ;;
-            *) refuse 2 "STAGING needs the command flock, and locks of files where $file is: leave it out" ;;
+            99) refuse 2 "$file is held by another job ($lock): wait until it has ended" ;;
+            *)
+                if [ -z "${STAGING:-}" ]; then
+                    rm -f "$lock"
+                    return 0
+                fi
+                refuse 2 "STAGING needs the command flock, and locks of files where $file is: leave it out"
+                ;;
         esac
     done
 }

@@ -57,7 +57,7 @@ class EdgeLaw:
     """Law by which the edges move, with the tolerances of one problem."""
 
     @overload
-    def __init__(self, *, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, overlap_limit: float, force_error: float) -> None: ...
+    def __init__(self, *, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, overlap_limit: float, force_error: float, pinning: float) -> None: ...
 
     @overload
     def __init__(self, arg: EdgeLaw, /) -> None: ...
@@ -110,6 +110,12 @@ class EdgeLaw:
     @force_error.setter
     def force_error(self, arg: float, /) -> None: ...
 
+    @property
+    def pinning(self) -> float: ...
+
+    @pinning.setter
+    def pinning(self, arg: float, /) -> None: ...
+
     def critical_openings(self, theta: NDArray[numpy.float64], panels: Panels) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """Evaluate C_c and its θ-derivative."""
 
@@ -130,11 +136,11 @@ class Field:
 
     @property
     def separation(self) -> float:
-        """q0 s"""
+        """q0 s."""
 
     @property
     def unit_mean(self) -> float:
-        """Xᵀ (B + G)⁻¹ X"""
+        """Xᵀ (B + G)⁻¹ X."""
 
     @property
     def resistance(self) -> float:
@@ -142,11 +148,11 @@ class Field:
 
     @property
     def opening(self) -> NDArray[numpy.float64]:
-        """C at each edge"""
+        """C at each edge."""
 
     @property
     def scaled_opening(self) -> NDArray[numpy.float64]:
-        """f: the openings over sqrt(1-η²), at all nodes"""
+        """f: the openings over sqrt(1-η²), at all nodes."""
 
     @property
     def orders(self) -> NDArray[numpy.int64]: ...
@@ -159,11 +165,11 @@ class Field:
 
     @property
     def weight(self) -> NDArray[numpy.float64]:
-        """X"""
+        """X."""
 
     @property
     def load(self) -> NDArray[numpy.float64]:
-        """S~"""
+        """S~."""
 
     def block(self, k: int) -> NDArray[numpy.float64]:
         """Diagonal block of B + G of a gap."""
@@ -286,7 +292,7 @@ class LinearResponse:
     def opening(self) -> NDArray[numpy.float64]:
         """C of every edge in its reference."""
 
-    def update(self, gaps: NDArray[numpy.float64], prescribed: float, least: NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse:
+    def update(self, gaps: NDArray[numpy.float64], prescribed: float, least: NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
         """Set up a response of gaps of which most are those of this one."""
 
     def count_unknown(self, gaps: NDArray[numpy.float64], law: EdgeLaw, model: FieldModel) -> int:
@@ -311,7 +317,7 @@ class LinearResponse:
     def descend(self, gaps: NDArray[numpy.float64], prescribed: float, most: int, equal_speeds: bool, running: Running, law: EdgeLaw, model: FieldModel) -> Descent:
         """Descend in energy until an event."""
 
-def set_up_response(gaps: NDArray[numpy.float64], prescribed: float, least: NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse:
+def set_up_response(gaps: NDArray[numpy.float64], prescribed: float, least: NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
     """
     Solve the field of these gaps, and linearise about it; None if they have none.
     """

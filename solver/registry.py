@@ -46,6 +46,8 @@ def make_method(
     choice("method", name, METHOD_NAMES)
     instance("problem", problem, Problem, "Problem(profile, half_space, work_of_adhesion)")
     accuracy = real("accuracy", accuracy, ACCURACY)
+    if problem.pinning > 0:
+        check_pinning(name, nodes_per_wave)
     if nodes_per_wave is not None:
         nodes_per_wave = whole("nodes_per_wave", nodes_per_wave, NODES_PER_WAVE)
         check_nodes(nodes_per_wave, problem.profile.highest_harmonic)
@@ -75,6 +77,22 @@ def make_method(
 def _load(name: Literal["grid", "sharp"]) -> None:
     """Import a method."""
     import_module(f"adhesis.solver.{name}.method")
+
+
+def check_pinning(name: MethodName, nodes_per_wave: int | None) -> None:
+    """Refuse the method ``grid``, whose edges advance and recede at one work of adhesion.
+
+    Raises
+    ------
+    ValueError
+        If it is named, or meant by a number of nodes.
+    """
+    if name == "grid" or nodes_per_wave is not None:
+        given = "method is 'grid'" if name == "grid" else f"nodes_per_wave is {nodes_per_wave}"
+        raise ValueError(
+            f"{given} beside a work_of_adhesion_open above the work of adhesion: leave it out, as "
+            "only the method 'sharp' has edges that recede at another one"
+        )
 
 
 def check_nodes(nodes_per_wave: int, waves: int) -> None:

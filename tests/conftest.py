@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -25,6 +26,20 @@ gc.disable()
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("anew", deadline=None, database=None, print_blob=True)
 settings.load_profile(os.environ.get("ADHESIS_PROPERTIES", "same"))
+
+
+@pytest.fixture
+def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw figures, and write empty files for them: to lay one out and write it takes a second."""
+
+    def save(figure: object, stem: Path) -> tuple[Path, Path]:
+        paths = stem.with_suffix(".png"), stem.with_suffix(".pdf")
+        for path in paths:
+            path.write_bytes(b"")
+        return paths
+
+    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", save)
+    monkeypatch.setattr("adhesis.ensemble.trace.figures.save", save)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

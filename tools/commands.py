@@ -14,17 +14,24 @@ from pathlib import Path
 from adhesis.ensemble.command.main import COMMANDS, parser_of
 from adhesis.ensemble.escape import markdown
 
+_FEW = 3  # fewer options than these are described again, which is as short as a link
 PAGE = Path(__file__).parents[1] / "docs" / "commands.md"
 
 
 def page(text: str) -> str:
     """Return the page with the commands of today."""
     intro = text.partition("\n## adhesis ")[0].rstrip()
-    return "\n\n".join([intro, *(part for name in COMMANDS for part in _command(name))]) + "\n"
+    shown: dict[str, str] = {}
+    parts = [part for name in COMMANDS for part in _command(name, shown)]
+    return "\n\n".join([intro, *parts]) + "\n"
 
 
-def _command(name: str) -> Iterator[str]:
-    """Return description, usage, options and examples of a command."""
+def _command(name: str, described: dict[str, str]) -> Iterator[str]:
+    """Return description, usage, options and an example of a command.
+
+    ``described`` maps the lines of options of earlier commands to these commands: an option that
+    means the same is named, and not described again.
+    """
     parser = parser_of(name)
     first, *_ = (parser.description or "").split("\n\n")
     yield f"## adhesis {name}\n{markdown(' '.join(first.split()))}"
@@ -33,9 +40,26 @@ def _command(name: str) -> Iterator[str]:
         shown = [a for a in group._group_actions if "--help" not in a.option_strings]
         if shown:
             title = (group.title or "").removeprefix("positional ").capitalize()
-            yield "\n".join([f"**{title}**", "", *map(_option, shown)])
-    examples = (parser.epilog or "").partition("\n")[2]
-    yield "\n".join(["**Examples**", "", "```text", *map(str.strip, examples.splitlines()), "```"])
+            yield "\n".join([f"**{title}**", "", *_options(name, shown, described)])
+    example, *_ = (parser.epilog or "").partition("\n")[2].splitlines()
+    yield f"**Example**: `{example.strip()}`"
+
+
+def _options(name: str, actions: list[argparse.Action], described: dict[str, str]) -> Iterator[str]:
+    """Return a line for each option, and one for those that an earlier command has described."""
+    same: dict[str, list[str]] = {}
+    for action in actions:
+        line = _option(action)
+        if action.option_strings and described.setdefault(line, name) != name:
+            same.setdefault(described[line], []).append(line)
+        else:
+            yield line
+    for earlier, lines in same.items():
+        if len(lines) < _FEW:
+            yield from lines
+        else:
+            names = ", ".join(line.partition(": ")[0].removeprefix("- ") for line in lines)
+            yield f"- as of [adhesis {earlier}](#adhesis-{earlier}): {names}"
 
 
 def _usage(name: str, actions: list[argparse.Action]) -> Iterator[str]:

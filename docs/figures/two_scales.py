@@ -25,7 +25,6 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
-from adhesis.ensemble.loop.film_scenes import jump_places
 
 LOADING, UNLOADING = "#1f5fa8", "#c4472b"
 BODY, RIGID = "#dbe4ee", "#8a8f98"
@@ -73,7 +72,7 @@ def draw_map(axes: Axes, loop: LoopResult, branch: str, colour: str) -> None:
 def draw_jump(axes: Axes, loop: LoopResult, number: int, title: str) -> None:
     """Draw the bodies before and after a jump."""
     jump = loop.jumps[number]
-    place = jump_places(loop)[number]
+    place = loop.states_before_jumps()[number]
     before, after = loop.contact_states[place], loop.contact_states[place + 1]
     method = loop.new_method()
     period = loop.problem.profile.period

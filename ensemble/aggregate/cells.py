@@ -136,8 +136,7 @@ class Cell:
         if stop.relative_error is None:
             return None
         known = self.estimates[stop.quantity]
-        ends = (known.mean, known.low, known.high)
-        return Precision(stop.quantity, stop.relative_error, known.n, *ends, not self.pending)
+        return Precision(stop.quantity, stop.relative_error, known, not self.pending)
 
 
 def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
@@ -162,11 +161,13 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
     cells = []
     names = [axis.name for axis in campaign.axes[2:]]
     axes = [hurst, gamma, *(results.column(d.name) for d in axis_datasets(campaign))]
-    for h, g, *others in sorted(set(zip(*(axis.tolist() for axis in axes), strict=True))):
-        point = zip(axes, (h, g, *others), strict=True)
-        rows_of_cell = np.flatnonzero(np.all([axis == value for axis, value in point], axis=0))
+    written = [{value: value for value in axis.values} for axis in campaign.axes]
+    for point in sorted(set(zip(*(axis.tolist() for axis in axes), strict=True))):
+        h, g, *others = (known.get(v, v) for known, v in zip(written, point, strict=True))
+        here = [axis == value for axis, value in zip(axes, point, strict=True)]
+        rows_of_cell = np.flatnonzero(np.all(here, axis=0))
         task = Task(h, g, 0, 0, tuple(zip(names, others, strict=True)))
-        here, unit = campaign.at(task), campaign.penetration_unit(task)
+        of_cell, unit = campaign.at(task), campaign.penetration_unit(task)
         rows = rows_of_cell[status[rows_of_cell] == DONE]
         rows = rows[np.argsort(realisation[rows], kind="stable")]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
@@ -176,7 +177,7 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         )
         for name, energy in _PER_CONTACT.items():
             values[name] = values[energy] / values["largest_contact_fraction"]
-        scale = stress_scale(here, values["h_max"]) * values["h_max"]
+        scale = stress_scale(of_cell, values["h_max"]) * values["h_max"]
         for name in ("loss_error", "energy_at_stake"):
             values[f"{name}_dimensionless"] = values[name] / scale
         failed = int(np.sum(status[rows_of_cell] == FAILED))
@@ -185,7 +186,7 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
                 hurst=h,
                 work_of_adhesion=g,
                 others=task.others,
-                campaign=here,
+                campaign=of_cell,
                 penetration={
                     "loading": campaign.loading_penetration * unit,
                     "unloading": campaign.unloading_penetration * unit,

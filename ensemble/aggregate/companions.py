@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -60,15 +60,12 @@ class Companion:
 
         None if this campaign lacks it.
         """
-        keys = {(a.table, a.name) for a in (*self.campaign.axes[2:], *self.further)}
-        for other in self.cells:
-            if (other.hurst, other.work_of_adhesion) == (cell.hurst, cell.work_of_adhesion) and all(
-                getattr(getattr(other.campaign, table), name)
-                == getattr(getattr(cell.campaign, table), name)
-                for table, name in keys
-            ):
-                return other
-        return None
+        keys = {axis.key for axis in (*self.campaign.axes[2:], *self.further)}
+
+        def point(of: Cell) -> tuple[Any, ...]:
+            return (of.hurst, of.work_of_adhesion, *(of.campaign.value(key) for key in keys))
+
+        return next((other for other in self.cells if point(other) == point(cell)), None)
 
 
 @dataclass(frozen=True)

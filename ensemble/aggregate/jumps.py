@@ -36,8 +36,6 @@ class JumpStatistics:
     kinds : tuple of str
     small_scale : bool array, shape (kinds,)
         Whether jumps of a kind only move edges inside existing patches.
-    tasks : int array, shape (cells,)
-        Number of tasks.
     number : int array, shape (cells, kinds)
         Number of jumps in all tasks together.
     energy : array, shape (cells, kinds)
@@ -50,7 +48,6 @@ class JumpStatistics:
 
     kinds: tuple[str, ...]
     small_scale: NDArray[np.bool_]
-    tasks: NDArray[np.int64]
     number: NDArray[np.int64]
     energy: Array
     histogram: NDArray[np.int64]
@@ -61,7 +58,6 @@ class JumpStatistics:
         chosen = list(cells)
         return replace(
             self,
-            tasks=self.tasks[chosen],
             number=self.number[chosen],
             energy=self.energy[chosen],
             histogram=self.histogram[chosen],
@@ -97,7 +93,6 @@ def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpS
     return JumpStatistics(
         kinds=tuple(JUMP_KINDS),
         small_scale=np.array([kind in SMALL_SCALE for kind in JUMP_KINDS]),
-        tasks=np.array([mine.size for mine in rows], dtype=np.int64),
         number=number,
         energy=energy,
         histogram=histogram,

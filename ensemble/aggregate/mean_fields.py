@@ -25,18 +25,12 @@ class DeformedShape:
 
     Attributes
     ----------
-    row : int
-        Row in the results file.
-    h_max : float
-        In m.
     height : array, shape (nodes,)
         Rigid profile h in m.
     displacement : array, shape (2, penetrations, nodes)
         Deformed surface v in m, loading and unloading; NaN where there is no contact.
     """
 
-    row: int
-    h_max: float
     height: Array
     displacement: Array
 
@@ -161,11 +155,8 @@ def _shapes(results: Results, rows: Sequence[NDArray[np.intp]]) -> tuple[Deforme
             out.append(None)
             continue
         slot = slice(int(slots[0]), int(slots[0]) + 1)
-        row = int(kept[slots[0]])
         out.append(
             DeformedShape(
-                row=row,
-                h_max=float(results.column("h_max", slice(row, row + 1))[0]),
                 height=results.column("field_height", slot)[0].astype(float),
                 displacement=results.column("field_displacement", slot)[0].astype(float),
             )

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from adhesis.ensemble.bench.equal_error import Exponent, Line, Quotient, Ratio
 from adhesis.ensemble.escape import markdown_table
 
-LINE_COLUMNS = (
-    "method",
-    "setting",
-    "CPU s",
-    "MB",
-    "W~",
-    "error",
-    "audit",
-    "solutions",
-)
+_COLUMNS: dict[str, Callable[[Line], str]] = {
+    "scene": lambda line: line.run.scene.title,
+    "method": lambda line: line.run.method,
+    "setting": lambda line: line.run.described,
+    "CPU s": lambda line: _seconds(line.measured.cpu_seconds),
+    "MB": lambda line: f"{line.measured.megabytes:.0f}",
+    "W~": lambda line: f"{line.measured.loss_dimensionless:.6g}",
+    "error": lambda line: _signed(line.error),
+    "audit": lambda line: _signed(line.measured.audit_residual),
+    "patches": lambda line: str(line.measured.patches),
+    "jumps": lambda line: str(line.measured.jumps),
+    "solutions": lambda line: str(line.measured.solutions),
+    "ms": lambda line: f"{1e3 * line.measured.cpu_seconds / line.measured.solutions:.2f}",
+}
+LINE_COLUMNS = ("method", "setting", "CPU s", "MB", "W~", "error", "audit", "solutions")
 GROWTH_COLUMNS = (
     *("scene", "method", "setting", "CPU s", "MB", "W~", "audit"),
     *("patches", "jumps", "solutions", "ms"),
@@ -26,54 +31,12 @@ _RATIO_COLUMNS = ("scene", "sharp", "error", "grid / sharp", "cheapest grid / sh
 _EXPONENT_COLUMNS = ("among", "grows with", "from", "to", "CPU time of a loop", "of a solution")
 
 
-def line_cells(line: Line) -> list[str]:
-    """Return one line of a scene's table as text."""
-    measured, run = line.measured, line.run
-    if measured.note:
-        return [run.method, run.described, measured.note, *[""] * (len(LINE_COLUMNS) - 3)]
-    return [
-        run.method,
-        run.described,
-        _seconds(measured.cpu_seconds),
-        f"{measured.megabytes:.0f}",
-        f"{measured.loss_dimensionless:.6g}",
-        _signed(line.error),
-        _signed(measured.audit_residual),
-        str(measured.solutions),
-    ]
-
-
-def growth_cells(line: Line) -> list[str]:
-    """Return one line of the table of growth as text."""
-    measured, run = line.measured, line.run
-    if measured.note:
-        rest = [""] * (len(GROWTH_COLUMNS) - 4)
-        return [run.scene.title, run.method, run.described, measured.note, *rest]
-    return [
-        run.scene.title,
-        run.method,
-        run.described,
-        _seconds(measured.cpu_seconds),
-        f"{measured.megabytes:.0f}",
-        f"{measured.loss_dimensionless:.6g}",
-        _signed(measured.audit_residual),
-        str(measured.patches),
-        str(measured.jumps),
-        str(measured.solutions),
-        f"{1e3 * measured.cpu_seconds / measured.solutions:.2f}",
-    ]
-
-
-def exponent_cells(one: Exponent) -> list[str]:
-    """Return one line of the table of exponents as text."""
-    return [
-        one.among,
-        one.variable,
-        str(one.least),
-        str(one.most),
-        f"{one.of_loop:.2f}",
-        f"{one.of_solution:.2f}",
-    ]
+def cells(line: Line, columns: Sequence[str]) -> list[str]:
+    """Return one line of a table as text; behind the setting a note, if it did not finish."""
+    note = line.measured.note
+    known = columns[: columns.index("setting") + 1] if note else columns
+    found = [_COLUMNS[name](line) for name in known] + ([note] if note else [])
+    return found + [""] * (len(columns) - len(found))
 
 
 def record(line: Line) -> dict[str, object]:
@@ -120,7 +83,7 @@ def page(
             f"Δ~max = {scene.max_penetration:g}, {scene.load_steps} load steps. "
             f"Reference: {chosen[0].reference.text}.",
             "",
-            _table(LINE_COLUMNS, (line_cells(line) for line in chosen)),
+            _table(LINE_COLUMNS, (cells(line, LINE_COLUMNS) for line in chosen)),
             "",
         ]
     if compared:
@@ -138,10 +101,17 @@ def page(
         parts += [_table(_RATIO_COLUMNS, rows), ""]
     if grown:
         parts += ["### How the cost grows", ""]
-        parts += [_table(GROWTH_COLUMNS, (growth_cells(line) for line in grown)), ""]
+        parts += [_table(GROWTH_COLUMNS, (cells(line, GROWTH_COLUMNS) for line in grown)), ""]
     if fitted:
         parts += ["### Exponents of the growth of sharp", ""]
-        parts += [_table(_EXPONENT_COLUMNS, (exponent_cells(one) for one in fitted)), ""]
+        rows = [
+            [
+                *(one.among, one.variable, str(one.least), str(one.most)),
+                *(f"{one.of_loop:.2f}", f"{one.of_solution:.2f}"),
+            ]
+            for one in fitted
+        ]
+        parts += [_table(_EXPONENT_COLUMNS, rows), ""]
     return "\n".join(parts)
 
 

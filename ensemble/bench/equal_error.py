@@ -15,23 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.ensemble.bench.measure import Measured, Measurement, Run, measure
-from adhesis.ensemble.bench.scenes import FULL, GROWTH, QUICK, WARM_UP, Scene
+from adhesis.ensemble.bench.scenes import FULL, GROWTH, WARM_UP, Scene
 from adhesis.ensemble.bench.tamaas import has_tamaas
-
-__all__ = [
-    "FULL",
-    "GROWTH",
-    "QUICK",
-    "Exponent",
-    "Line",
-    "Quotient",
-    "Ratio",
-    "Reference",
-    "benchmark",
-    "exponents",
-    "growth",
-    "ratios",
-]
 
 # Doubling the nodes multiplies the time of a grid run by up to this factor.
 _COST_OF_DOUBLING = 4.0
@@ -157,16 +142,10 @@ def growth(*, seconds: float = 360.0, on_line: Callable[[Line], None] | None = N
     lines: list[Line] = []
     _fill_caches()
     for scene in GROWTH:
-        settings: list[tuple[Measured, Sequence[float]]] = [
-            ("sharp", scene.accuracies),
-            ("grid", scene.grids),
-        ]
-        for method, values in settings:
-            for value in values:
-                run = Run(scene, method, value, scene.load_steps, seconds)
-                lines.append(Line(run, unknown, measure(run)))
-                if on_line is not None:
-                    on_line(lines[-1])
+        for run in sorted(_runs(scene, seconds), key=lambda run: run.method == "grid"):
+            lines.append(Line(run, unknown, measure(run)))
+            if on_line is not None:
+                on_line(lines[-1])
     return lines
 
 

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass
 from time import process_time
-from typing import Literal
+from typing import Any, Literal
 
 from adhesis.ensemble.bench.scenes import WARM_UP, Scene
 from adhesis.ensemble.bench.tamaas import tamaas_loop
@@ -138,11 +138,8 @@ def measure_here(run: Run, *, limited: bool = False) -> Measurement:
     """Run and measure in this process; if ``limited``, end it when ``run.seconds`` are over."""
     if limited:
         _limit(_START_LIMIT)
-    if run.method == "tamaas":
-        if limited:
-            _limit(run.seconds)
-        return _measure_tamaas(run)
-    _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
+    if run.method != "tamaas":
+        _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
     if run.method == "sharp" and run.scene.shape == "rough":
         warm(("sharp",))  # load the code for many gaps, too
     before = peak_megabytes()
@@ -150,20 +147,36 @@ def measure_here(run: Run, *, limited: bool = False) -> Measurement:
         _limit(run.seconds)
     with watch_compilation() as compilation:
         started = process_time()
-        loop = _loop(run.method, run.scene, run.setting, run.load_steps)
+        numbers = _numbers(run)
         seconds = process_time() - started
     return Measurement(
         cpu_seconds=seconds,
         megabytes=peak_megabytes(),
         megabytes_before=before,
-        loss=loop.loss,
-        loss_dimensionless=loop.loss_dimensionless,
-        audit_residual=loop.audit_residual,
-        solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
-        jumps=len(loop.jumps),
-        patches=int(loop.patches.max()),
         compiled=compilation.functions > 0,
+        **numbers,
     )
+
+
+def _numbers(run: Run) -> dict[str, Any]:
+    """Run the loop; return its numbers."""
+    if run.method == "tamaas":
+        problem = run.scene.problem()
+        found = tamaas_loop(
+            problem,
+            reach=run.setting * problem.profile.h_max,
+            max_penetration=run.scene.max_penetration,
+            load_steps=run.load_steps,
+        )
+        scaled = found.loss / problem.loss_scale
+        return {"loss": found.loss, "loss_dimensionless": scaled, "solutions": found.states}
+    loop = _loop(run.method, run.scene, run.setting, run.load_steps)
+    same = ("loss", "loss_dimensionless", "audit_residual")
+    return {name: getattr(loop, name) for name in same} | {
+        "solutions": int(asdict(loop.method)[_SOLUTIONS[run.method]]),
+        "jumps": len(loop.jumps),
+        "patches": int(loop.patches.max()),
+    }
 
 
 def _loop(method: MethodName, scene: Scene, setting: float, load_steps: int) -> LoopResult:
@@ -173,26 +186,6 @@ def _loop(method: MethodName, scene: Scene, setting: float, load_steps: int) -> 
     else:
         built = make_method(method, problem, accuracy=setting)
     return run_loop(built, max_penetration=scene.max_penetration, load_steps=load_steps)
-
-
-def _measure_tamaas(run: Run) -> Measurement:
-    before = peak_megabytes()
-    started = process_time()
-    problem = run.scene.problem()
-    loop = tamaas_loop(
-        problem,
-        reach=run.setting * problem.profile.h_max,
-        max_penetration=run.scene.max_penetration,
-        load_steps=run.load_steps,
-    )
-    return Measurement(
-        cpu_seconds=process_time() - started,
-        megabytes=peak_megabytes(),
-        megabytes_before=before,
-        loss=loop.loss,
-        loss_dimensionless=loop.loss / problem.loss_scale,
-        solutions=loop.states,
-    )
 
 
 def _limit(seconds: float) -> None:

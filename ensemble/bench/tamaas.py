@@ -30,10 +30,9 @@ _MAX_STROKES = 20
 
 @dataclass(frozen=True)
 class TamaasLoop:
-    """Loss in J/m² of nominal area, number of nodes, number of states."""
+    """Loss in J/m² of nominal area, and number of states."""
 
     loss: float
-    nodes: int
     states: int
 
 
@@ -83,7 +82,7 @@ def tamaas_loop(
     s, stress = np.array(separations), np.array(stresses)
     closed = s <= s[-1] * (1 + 1e-9)
     loss = -float(np.trapezoid(stress[closed], s[closed]))
-    return TamaasLoop(loss, solver.height.size, s.size)
+    return TamaasLoop(loss, s.size)
 
 
 class _Continuation:

@@ -6,11 +6,11 @@ change a result.
 
 from __future__ import annotations
 
-from dataclasses import Field, dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from adhesis.ensemble.campaign.rules import shown
-from adhesis.ensemble.campaign.tables import TABLES, TURNING_POINTS, Campaign
+from adhesis.ensemble.campaign.tables import KEYS, TURNING_POINTS, Campaign
 from adhesis.ensemble.campaign.tasks import Tasks
 
 
@@ -45,7 +45,7 @@ def compare(old: Campaign, new: Campaign) -> Changes:
     }
     for key in differing(old, new):
         was, value = before[key], after[key]
-        if _is_free(key):
+        if KEYS[key].metadata["free"]:
             continue
         if _extends(key, was, value) and not missing:
             grown.append(key)
@@ -54,31 +54,18 @@ def compare(old: Campaign, new: Campaign) -> Changes:
     return Changes(tuple(grown), tuple(other))
 
 
-def _is_free(key: str) -> bool:
-    entry = _entry(key)
-    return entry is not None and bool(entry.metadata["free"])
-
-
 def _extends(key: str, was: Any, now: Any) -> bool:
     if key in ("sweep.realisations", "stop.most"):
         return bool(now > was)
     if key == "stop.relative_error":
         return was is not None and now is not None and bool(now < was)
-    entry = _entry(key)
-    axis = entry is not None and entry.metadata["axis"] is not None
+    axis = KEYS[key].metadata["axis"] is not None
     if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not axis:
         return False
     # All turning points of a profile belong together: they do not become more.
     if key in [f"cycle.{name}" for name in TURNING_POINTS]:
         return False
     return _values(was) < _values(now)
-
-
-def _entry(key: str) -> Field[Any] | None:
-    """Return the field of a key ``table.name``; None if there is none."""
-    table, name = key.split(".")
-    entries = (f for t in TABLES if t == table for f in fields(TABLES[t]) if f.name == name)
-    return next(entries, None)
 
 
 def _values(value: Any) -> set[Any]:

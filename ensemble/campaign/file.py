@@ -10,7 +10,8 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
-from adhesis.solver.registry import check_nodes
+from adhesis.solver.registry import check_nodes, check_pinning
 
 # HDF5 keeps an attribute of at most 64 KiB, and the text is one.
 _LONGEST_TEXT = 60_000
@@ -62,11 +63,12 @@ def read_campaign(text: str, source: str = "campaign") -> Campaign:
         If it breaks a rule; one sentence.
     """
     campaign = parse_campaign(text, source)
-    _ask_for_units(source, tomllib.loads(text))
+    with _of(source):
+        _ask_for_units(tomllib.loads(text))
     return campaign
 
 
-def _ask_for_units(source: str, document: dict[str, Any]) -> None:
+def _ask_for_units(document: dict[str, Any]) -> None:
     """Refuse numbers that can hardly be in SI units."""
     for table, kind in TABLES.items():
         for entry in fields(kind):
@@ -77,7 +79,7 @@ def _ask_for_units(source: str, document: dict[str, Any]) -> None:
                     try:
                         quantity.check(value)
                     except InputError as error:
-                        raise InputError(f"{source}: [{table}] {entry.name} {error}") from None
+                        raise InputError(f"[{table}] {entry.name} {error}") from None
 
 
 def _decoded(data: bytes, source: str) -> str:
@@ -117,20 +119,30 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
         known = _given_twice(text, str(error)) or _foreign_sign(text, str(error))
         reason = known or " ".join(str(error).split())
         raise InputError(f"{source} is not valid TOML: {reason}") from error
-    for name in document:
-        if name not in TABLES:
-            known = ", ".join(f"[{t}]" for t in TABLES)
-            raise InputError(f"{source}: {shown(name)} is unknown; the tables are {known}")
-    lists: list[tuple[Table, str, tuple[float, ...]]] = []
-    tables = {name: _read_table(source, name, document.get(name, {}), lists) for name in TABLES}
-    _check_zip(source, tables["sweep"], lists)
-    if "stop" in document and tables["stop"].relative_error is None:
-        raise InputError(
-            f"{source}: [stop] relative_error is missing: it must be a number between 0 and 1"
-        )
-    campaign = Campaign(text=text, lists=tuple(lists), **tables)
-    _check_together(source, campaign)
+    with _of(source):
+        for name in document:
+            if name not in TABLES:
+                known = ", ".join(f"[{t}]" for t in TABLES)
+                raise InputError(f"{shown(name)} is unknown; the tables are {known}")
+        lists: list[tuple[Table, str, tuple[float, ...]]] = []
+        tables = {name: _read_table(name, document.get(name, {}), lists) for name in TABLES}
+        _check_zip(tables["sweep"], lists)
+        if "stop" in document and tables["stop"].relative_error is None:
+            raise InputError(
+                "[stop] relative_error is missing: it must be a number between 0 and 1"
+            )
+        campaign = Campaign(text=text, lists=tuple(lists), **tables)
+        _check_together(campaign)
     return campaign
+
+
+@contextmanager
+def _of(source: str) -> Iterator[None]:
+    """Name the file in the sentence of an InputError."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
 
 
 # Signs that word processors and other keyboards put in the place of those of TOML.
@@ -183,22 +195,20 @@ def _given_twice(text: str, error: str) -> str | None:
 
 
 def _read_table(
-    source: str, name: Table, entries: object, lists: list[tuple[Table, str, tuple[float, ...]]]
+    name: Table, entries: object, lists: list[tuple[Table, str, tuple[float, ...]]]
 ) -> Any:
     """Check a table; of an axis it gets the smallest value, and ``lists`` gets all of them."""
     kind = TABLES[name]
     if not isinstance(entries, dict):
-        raise InputError(f"{source}: {name} is {shown(entries)}: it must be a table, [{name}]")
+        raise InputError(f"{name} is {shown(entries)}: it must be a table, [{name}]")
     known = {f.name: f for f in fields(kind)}
     for key in entries:
         if key not in known:
-            names = ", ".join(known)
-            raise InputError(
-                f"{source}: [{name}] {_spelt(key)} is unknown; the keys of [{name}] are {names}"
-            )
+            names, spelt = ", ".join(known), key if key.isidentifier() else shown(key)
+            raise InputError(f"[{name}] {spelt} is unknown; the keys of [{name}] are {names}")
     values = {}
     for key, value in entries.items():
-        metadata, where = known[key].metadata, f"{source}: [{name}] {key}"
+        metadata, where = known[key].metadata, f"[{name}] {key}"
         if metadata["axis"] is not None and isinstance(value, list):
             several = list_of(metadata["rule"])(where, value)
             values[key] = min(several)
@@ -209,19 +219,13 @@ def _read_table(
     for key, entry in known.items():
         if key not in values and entry.default is MISSING:
             raise InputError(
-                f"{source}: [{name}] {key} is missing ({entry.metadata['meaning']}): "
+                f"[{name}] {key} is missing ({entry.metadata['meaning']}): "
                 f"it must be {entry.metadata['rule'].text}"
             )
     return kind(**values)
 
 
-def _spelt(key: str) -> str:
-    return key if key.isidentifier() else shown(key)
-
-
-def _check_zip(
-    source: str, sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...]]]
-) -> None:
+def _check_zip(sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...]]]) -> None:
     """Check that the keys which are to vary together are axes of one length."""
     length = {name: len(values) for _, name, values in lists}
     length |= {"hurst": len(sweep.hurst), "work_of_adhesion": len(sweep.work_of_adhesion)}
@@ -229,13 +233,13 @@ def _check_zip(
         for name in group:
             if name not in length:
                 raise InputError(
-                    f"{source}: [sweep] zip names {shown(name)}: it must name keys that are lists "
+                    f"[sweep] zip names {shown(name)}: it must name keys that are lists "
                     f"of several values, here {', '.join(sorted(length))}"
                 )
         if len({length[name] for name in group}) > 1:
             lengths = ", ".join(f"{name} {length[name]}" for name in group)
             raise InputError(
-                f"{source}: [sweep] zip joins lists of different lengths ({lengths}): they must "
+                f"[sweep] zip joins lists of different lengths ({lengths}): they must "
                 "have "
                 "as many values each"
             )
@@ -245,55 +249,55 @@ def _largest(campaign: Campaign, name: str, value: float) -> float:
     return max((max(v) for _, key, v in campaign.lists if key == name), default=value)
 
 
-def _check_together(source: str, campaign: Campaign) -> None:
+def _check_together(campaign: Campaign) -> None:
     """Check the rules that join several keys."""
     profile, cycle = campaign.profile, campaign.cycle
     given = list(profile.normalisation)
     if campaign.task_count > _MOST_TASKS:
         raise InputError(
-            f"{source}: [sweep] makes {campaign.task_count} tasks: "
-            f"it must make at most {_MOST_TASKS}"
+            f"[sweep] makes {campaign.task_count} tasks: it must make at most {_MOST_TASKS}"
         )
-    _check_turning_point(source, campaign)
+    _check_turning_point(campaign)
     if len(given) != 1:
         raise InputError(
-            f"{source}: [profile] gives {' and '.join(given) or 'none of h_rms, m2 and c0'}: "
+            f"[profile] gives {' and '.join(given) or 'none of h_rms, m2 and c0'}: "
             "exactly one of h_rms, m2 and c0 must be given"
         )
     material = campaign.material
     if material.adhesion_range is not None and material.strength is not None:
         raise InputError(
-            f"{source}: [material] gives adhesion_range and strength: at most one of them can be "
+            "[material] gives adhesion_range and strength: at most one of them can be "
             "given, strength = work_of_adhesion/adhesion_range"
         )
+    _check_open(campaign)
     n0, ratio = (_largest(campaign, name, getattr(profile, name)) for name in ("n0", "ratio"))
     if n0 * ratio > MOST_WAVES:
         raise InputError(
-            f"{source}: [profile] n0 · ratio is {round(n0 * ratio)}: "
+            f"[profile] n0 · ratio is {round(n0 * ratio)}: "
             f"it must be at most {MOST_WAVES} harmonics"
         )
     if _largest(campaign, "rolloff", profile.rolloff) > profile.ratio:
         raise InputError(
-            f"{source}: [profile] rolloff is {_largest(campaign, 'rolloff', profile.rolloff):g}: "
+            f"[profile] rolloff is {_largest(campaign, 'rolloff', profile.rolloff):g}: "
             f"it must be at most ratio ({profile.ratio})"
         )
-    _check_slopes(source, campaign)
+    _check_slopes(campaign)
     if campaign.solver.nodes_per_wave is not None:
         try:
             check_nodes(campaign.solver.nodes_per_wave, round(n0 * ratio))
         except ValueError as error:
-            raise InputError(f"{source}: [solver] {error}") from None
+            raise InputError(f"[solver] {error}") from None
     if (
         campaign.stop.relative_error is not None
         and campaign.stop.most < campaign.sweep.realisations
     ):
         raise InputError(
-            f"{source}: [stop] most is {campaign.stop.most}: it must be at least realisations, the "
+            f"[stop] most is {campaign.stop.most}: it must be at least realisations, the "
             f"number that every cell gets ({campaign.sweep.realisations})"
         )
     if campaign.output.field_penetrations and campaign.has_axis("max_penetration"):
         raise InputError(
-            f"{source}: [output] field_penetrations is given beside several max_penetration: it "
+            "[output] field_penetrations is given beside several max_penetration: it "
             "must be left out there (a third, two thirds and all of each are kept) or be empty"
         )
     if campaign.output.field_penetrations and cycle.turns_at_stress:
@@ -301,25 +305,54 @@ def _check_together(source: str, campaign: Campaign) -> None:
         if cycle.preload is not None:
             where, turn = "beside a preload", "preload"
         raise InputError(
-            f"{source}: [output] field_penetrations is given {where}: it must be left out "
+            f"[output] field_penetrations is given {where}: it must be left out "
             f"there (a third, two thirds and all of {turn} are kept) or be empty"
         )
     for value in campaign.output.field_penetrations or ():
         if not cycle.unloading_until <= value <= cycle.turning_point:
             raise InputError(
-                f"{source}: [output] field_penetrations holds {value}: it must lie between "
+                f"[output] field_penetrations holds {value}: it must lie between "
                 f"unloading_until ({cycle.unloading_until:g}) and max_penetration "
                 f"({cycle.turning_point:g})"
             )
     length = cycle.load_steps * (1 - cycle.unloading_until / cycle.deepest)
     if length > _LONGEST_AXIS:
         raise InputError(
-            f"{source}: [cycle] unloading_until is {cycle.unloading_until}: with these load steps "
+            f"[cycle] unloading_until is {cycle.unloading_until}: with these load steps "
             f"the unloading curve has {length:.6g} values, and at most {_LONGEST_AXIS} are allowed"
         )
 
 
-def _check_slopes(source: str, campaign: Campaign) -> None:
+def _check_open(campaign: Campaign) -> None:
+    """Check the work of adhesion of receding edges against that of advancing ones, in each cell."""
+    material, solver = campaign.material, campaign.solver
+    if material.work_of_adhesion_open is None:
+        return
+    names = [axis.name for axis in campaign.axes]
+    given = {"work_of_adhesion_open": material.work_of_adhesion_open}
+    cells = (given | dict(zip(names, cell, strict=True)) for cell in campaign.cells)
+    works = {(cell["work_of_adhesion"], cell["work_of_adhesion_open"]) for cell in cells}
+    for gamma, found in sorted(works):
+        if found < gamma or gamma == 0 < found:
+            rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
+            raise InputError(
+                f"[material] work_of_adhesion_open is {found:g}: it must be {rule}, in "
+                "every cell of the sweep (zip joins lists whose values belong together)"
+            )
+    if all(found == gamma for gamma, found in works):
+        return
+    if material.opens:
+        raise InputError(
+            "[material] gives work_of_adhesion_open and a range or strength: at most "
+            "one of them can be given, as edges of two works of adhesion have no range"
+        )
+    try:
+        check_pinning(solver.method, solver.nodes_per_wave)
+    except ValueError as error:
+        raise InputError(f"[solver] {error}") from None
+
+
+def _check_slopes(campaign: Campaign) -> None:
     """Check that heights and period are in one unit: by the rms slope of every spectrum.
 
     Where amplitudes are scattered, the slope of their mean stands for all realisations.
@@ -346,7 +379,7 @@ def _check_slopes(source: str, campaign: Campaign) -> None:
                 _check_slope(names, values)
             except ValueError as error:
                 raise InputError(
-                    f"{source}: [profile] {norm} is {shown(values[-1])} with period "
+                    f"[profile] {norm} is {shown(values[-1])} with period "
                     f"{shown(values[1])}, so the {error}"
                 ) from None
 
@@ -358,15 +391,15 @@ def _check_slope(names: Sequence[str], values: Sequence[float]) -> None:
     check_slope(math.sqrt(self_affine_profile(hurst, seed=0, **spectrum).m2))
 
 
-def _check_turning_point(source: str, campaign: Campaign) -> None:
+def _check_turning_point(campaign: Campaign) -> None:
     """Check that the path turns where its control lets it turn."""
     cycle = campaign.cycle
     if cycle.preload is not None:
-        _check_preload(source, campaign)
+        _check_preload(campaign)
     if cycle.max_stress is not None and not cycle.under_load:
         stress = shown(cycle.max_stress)
         raise InputError(
-            f'{source}: [cycle] max_stress is given: with control = "separation" a path turns at '
+            f'[cycle] max_stress is given: with control = "separation" a path turns at '
             "max_penetration, so leave max_stress out. A weight or a machine? For a weight give "
             'control = "load"; for a machine, which turns at that mean stress, give '
             f"preload = {stress}"
@@ -376,31 +409,31 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
     if getattr(cycle, wanted) is None and not by_default:
         entry = next(f for f in fields(type(cycle)) if f.name == wanted)
         raise InputError(
-            f"{source}: [cycle] {wanted} is missing ({entry.metadata['meaning']}): "
+            f"[cycle] {wanted} is missing ({entry.metadata['meaning']}): "
             f"it must be {entry.metadata['rule'].text}"
         )
     if cycle.stiffness is None and not cycle.under_load:
         largest = _largest(campaign, wanted, cycle.deepest)
-        number_in(MAX_PENETRATION)(f"{source}: [cycle] {wanted}", largest)
+        number_in(MAX_PENETRATION)(f"[cycle] {wanted}", largest)
     for name in ("max_penetration", "stiffness") if cycle.under_load else ():
         if getattr(cycle, name) is not None:
             raise InputError(
-                f'{source}: [cycle] {name} is given: with control = "{cycle.control}" a path '
+                f'[cycle] {name} is given: with control = "{cycle.control}" a path '
                 f"turns at {wanted}, so leave {name} out"
             )
 
 
-def _check_preload(source: str, campaign: Campaign) -> None:
+def _check_preload(campaign: Campaign) -> None:
     """Check that a preload stands where a machine presses, and goes to one depth at most."""
     preload = shown(campaign.cycle.preload)
     if campaign.cycle.under_load:
         raise InputError(
-            f'{source}: [cycle] preload is {preload} with control = "load": a weight or a machine? '
+            f'[cycle] preload is {preload} with control = "load": a weight or a machine? '
             f"For a weight give max_stress = {preload} instead; for a machine, which turns at that "
             'mean stress, leave control = "load" out'
         )
     if campaign.has_axis("max_penetration"):
         raise InputError(
-            f"{source}: [cycle] max_penetration has several values beside a preload: it must be "
+            "[cycle] max_penetration has several values beside a preload: it must be "
             "one number, at which a loop turns that has not reached its preload"
         )

@@ -25,8 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble import interval
+from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.quantities import percent
+from adhesis.solver.checks import counted
 
 LEAST = 32
 LOOKS_IN_A_ROW = 4
@@ -56,9 +57,7 @@ class Precision:
         Column of the results file that ``[stop]`` steers.
     wanted : float
         How far the interval may reach from the mean, over the mean.
-    count : int
-        Realisations that the mean is over.
-    mean, low, high : float
+    estimate : Estimate
         The mean and both ends of its interval, in the unit of the quantity; NaN where unknown.
     finished : bool
         Whether no realisation of the cell is still to be computed.
@@ -66,21 +65,18 @@ class Precision:
 
     quantity: str
     wanted: float
-    count: int
-    mean: float
-    low: float
-    high: float
+    estimate: Estimate
     finished: bool = True
 
     @property
     def relative_error(self) -> float:
         """Distance of the further end of the interval over the mean; infinite without one."""
-        return interval.relative_error(self.mean, self.low, self.high)
+        return self.estimate.relative_error
 
     @property
     def narrow(self) -> bool:
         """Whether the interval is narrow enough, over enough realisations."""
-        return self.count >= LEAST and self.relative_error <= self.wanted
+        return self.estimate.n >= LEAST and self.relative_error <= self.wanted
 
     @property
     def met(self) -> bool | None:
@@ -88,18 +84,17 @@ class Precision:
         return self.narrow if self.finished else None
 
     def __str__(self) -> str:
-        error = self.relative_error
         known = f"{self.quantity}: interval unknown"
-        if np.isfinite(error):
+        if np.isfinite(self.relative_error):
             known = (
-                f"{self.quantity} {self.low:.4g} to {self.high:.4g} (± {percent(error, digits=3)})"
+                f"{self.quantity} {self.estimate.low:.4g} to {self.estimate.high:.4g} "
+                f"(± {percent(self.relative_error, digits=3)})"
             )
         verdict = {True: "met", False: "not met", None: "not finished"}[self.met]
-        if self.met is False and self.count < LEAST:
+        if self.met is False and self.estimate.n < LEAST:
             verdict += f", as it takes at least {LEAST} realisations"
-        plural = "" if self.count == 1 else "s"
         return (
-            f"{known} of {self.count} realisation{plural}, wanted ± "
+            f"{known} of {counted(self.estimate.n, 'realisation')}, wanted ± "
             f"{percent(self.wanted, digits=3)}: {verdict}"
         )
 
@@ -120,10 +115,8 @@ def precision(
         Whether no realisation is still to be computed.
     """
     known = np.asarray(values, np.float64)
-    known = known[np.isfinite(known)]
-    mean = float(known.mean()) if known.size else float("nan")
-    low, high = interval.interval(known)
-    return Precision(quantity, wanted, known.size, mean, float(low), float(high), finished)
+    (estimate,) = estimates(known[np.isfinite(known)])
+    return Precision(quantity, wanted, estimate, finished)
 
 
 def enough(values: Sequence[float] | Array, at: Sequence[int], wanted: float) -> int | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from adhesis.ensemble.errors import InputError, UnitError
-from adhesis.ensemble.quantities import QUANTITIES, Quantity
+from adhesis.ensemble.quantities import QUANTITIES, Quantity, Written
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds
 
@@ -24,11 +24,14 @@ class Rule:
         Returns the value as it will be used; ValueError if it breaks the rule.
     quantity : Quantity, optional
         Of the number, or of each one of a list, if it may have a unit.
+    bounds : Bounds, optional
+        Of the number, or of each one of a list.
     """
 
     text: str
     read: Callable[[object], Any]
     quantity: Quantity | None = None
+    bounds: Bounds | None = None
 
     def __call__(self, where: str, value: object) -> Any:
         """Return the value as it will be used.
@@ -65,25 +68,11 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
         kinds = int if bounds.whole else int | float
         if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError
-        return (checks.whole if bounds.whole else checks.real)("", value, bounds)
+        number = (checks.whole if bounds.whole else checks.real)("", value, bounds)
+        return Written(number, value.unit) if isinstance(value, Written) else number
 
     example = "" if quantity is None else f', or a {quantity.name} as "{quantity.example}"'
-    return Rule(bounds.text + example, read, quantity)
-
-
-def positive_number(unit: str) -> Rule:
-    """A number that is positive and of a size that one can compute with."""
-    return number_in(Bounds(1e-30, 1e30, unit=unit))
-
-
-def negative_number(least: float) -> Rule:
-    """Least ≤ value < 0."""
-    return number_in(Bounds(least, 0.0, without_high=True))
-
-
-def number_between(low: float, high: float) -> Rule:
-    """Low < value < high."""
-    return number_in(Bounds(low, high, without_low=True, without_high=True))
+    return Rule(bounds.text + example, read, quantity, bounds)
 
 
 def whole_number(least: int, most: int = 2**63 - 1) -> Rule:
@@ -113,7 +102,8 @@ def list_of(rule: Rule, *, may_be_empty: bool = False) -> Rule:
             raise ValueError
         return values
 
-    return Rule(f"a list of different values, each {rule.text}", read, rule.quantity)
+    text = f"a list of different values, each {rule.text}"
+    return Rule(text, read, rule.quantity, rule.bounds)
 
 
 def list_of_names() -> Rule:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -21,10 +22,7 @@ from adhesis.ensemble.campaign.rules import (
     choice,
     list_of,
     list_of_names,
-    negative_number,
-    number_between,
     number_in,
-    positive_number,
     whole_number,
 )
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
@@ -49,6 +47,7 @@ from adhesis.solver.checks import (
     YOUNG,
     Bounds,
 )
+from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
 
@@ -72,6 +71,8 @@ def _key(
 
 # The far side of a stiffness may go beyond 1; at a fixed separation the file's rules refuse that.
 _DISPLACEMENT = Bounds(0.0, FAR_DISPLACEMENT.high, without_low=True)
+# Penetrations at which fields are stored.
+_STORED = Bounds(-1000, 1, without_low=True, without_high=True)
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,18 @@ class MaterialTable:
     )
     strength: float | None = _key(
         number_in(STRENGTH), "instead of adhesion_range, the strength in Pa", None, axis="Pa"
+    )
+    work_of_adhesion_open: float | None = _key(
+        number_in(WORK_OF_ADHESION),
+        "work of adhesion in J/m² where an edge recedes, at least γ, at which it advances; between "
+        "both it is pinned. By default γ",
+        None,
+        axis="J m-2",
+    )
+    measure: Measure = _key(  # noqa: RUF009  # a field
+        choice(*get_args(Measure)),
+        "adhesion acts on the length of the profile, or on its projection",
+        "arc",
     )
 
     @property
@@ -192,7 +205,7 @@ class CycleTable:
         axis="Pa m-1",
     )
     unloading_until: float = _key(
-        negative_number(-1000),
+        number_in(Bounds(-1000, 0.0, without_high=True)),
         "end of the stored unloading curve, in units of h_max (the loop itself ends at detachment)",
         -8.0,
     )
@@ -234,7 +247,7 @@ class SolverTable:
         number_in(NODES_PER_WAVE), "nodes per shortest wave, instead of those of accuracy", None
     )
     time_limit: float | None = _key(
-        positive_number("s"), "longest time of one task in s", None, free=True
+        number_in(Bounds(1e-30, 1e30, unit="s")), "longest time of one task in s", None, free=True
     )
 
 
@@ -244,7 +257,7 @@ class OutputTable:
 
     jumps: int = _key(whole_number(1, 100_000), "places in the catalogue of jumps of a task", 512)
     field_penetrations: tuple[float, ...] | None = _key(
-        list_of(number_between(-1000, 1), may_be_empty=True),
+        list_of(number_in(_STORED), may_be_empty=True),
         "penetrations Δ/h_max at which spectra and gaps are kept, on both branches; by default a "
         "third, two thirds and all of max_penetration",
         None,
@@ -260,7 +273,7 @@ class OutputTable:
 TURNING_POINTS = ("max_penetration", "max_stress", "preload")
 """Keys of the cycle of which one is the turning point."""
 
-Quantity = Literal["loss_dimensionless", "loss"]
+Steered = Literal["loss_dimensionless", "loss"]
 
 
 @dataclass(frozen=True)
@@ -268,12 +281,12 @@ class StopTable:
     """``[stop]``: realisations in batches until a mean of every cell is known well enough."""
 
     relative_error: float | None = _key(
-        number_between(0, 1),
+        number_in(Bounds(0, 1, without_low=True, without_high=True)),
         "how far the 95 % interval of the mean of the quantity may reach from it, over it",
         None,
     )
-    quantity: Quantity = _key(  # noqa: RUF009  # a field
-        choice(*get_args(Quantity)),
+    quantity: Steered = _key(  # noqa: RUF009  # a field
+        choice(*get_args(Steered)),
         "column of the results file whose mean is to be known so well",
         "loss_dimensionless",
     )
@@ -292,6 +305,10 @@ TABLES: dict[Table, type] = {
     "output": OutputTable,
     "stop": StopTable,
 }
+KEYS: dict[str, Field[Any]] = {
+    f"{table}.{entry.name}": entry for table in TABLES for entry in fields(TABLES[table])
+}
+"""Every key ("cycle.load_steps") with its rule, meaning and default."""
 
 
 @dataclass(frozen=True)
@@ -341,8 +358,7 @@ class Campaign:
         """H, γ, and every key of the profile, material and cycle that has several values."""
         found = {axis.key: axis for group in self._groups for axis in group}
         first = [found.pop("sweep.hurst"), found.pop("sweep.work_of_adhesion")]
-        order = [f"{table}.{entry.name}" for table in TABLES for entry in fields(TABLES[table])]
-        return (*first, *sorted(found.values(), key=lambda axis: order.index(axis.key)))
+        return (*first, *(found[key] for key in KEYS if key in found))
 
     @cached_property
     def cells(self) -> list[tuple[Value, ...]]:
@@ -428,12 +444,7 @@ class Campaign:
     def identity(self, task: Task) -> tuple[Any, ...]:
         """Return what identifies a task, also in a campaign that grew new axes."""
         here = self.at(task)
-        rest = tuple(
-            getattr(getattr(here, table), entry.name)
-            for table in TABLES
-            for entry in fields(TABLES[table])
-            if entry.metadata["axis"] is not None
-        )
+        rest = tuple(here.value(k) for k, e in KEYS.items() if e.metadata["axis"] is not None)
         return (task.hurst, task.work_of_adhesion, task.realisation, task.seed, rest)
 
     def tasks(self, part: Part = WHOLE) -> Tasks:
@@ -490,12 +501,12 @@ class Campaign:
         several = self.has_axis("max_penetration")
         return self.at(task).cycle.turning_point if several else 1.0
 
+    def value(self, key: str) -> Any:
+        """Return the value in the tables of a key ("cycle.load_steps")."""
+        return attrgetter(key)(self)
+
     def values(self) -> dict[str, Any]:
         """Every value by its key ("sweep.hurst"), defaults included, lists ascending."""
-        out: dict[str, Any] = {}
-        for name in TABLES:
-            table = getattr(self, name)
-            for entry in fields(table):
-                value = getattr(table, entry.name)
-                out[f"{name}.{entry.name}"] = sorted(value) if type(value) is tuple else value
-        return out | {axis.key: list(axis.values) for axis in self.axes}
+        found = {key: self.value(key) for key in KEYS}
+        found = {k: sorted(v) if type(v) is tuple else v for k, v in found.items()}
+        return found | {axis.key: list(axis.values) for axis in self.axes}

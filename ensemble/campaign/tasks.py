@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.quantities import with_unit
+from adhesis.ensemble.quantities import gamma_text, with_unit
 
 
 def place(others: Iterable[tuple[str, float]]) -> str:
@@ -22,7 +22,7 @@ def place(others: Iterable[tuple[str, float]]) -> str:
 
 def name_at(hurst: float, work_of_adhesion: float, others: Sequence[tuple[str, float]]) -> str:
     """Return "H = 0.8, γ = 0.04 J/m²", and where a cell stands on further axes."""
-    name = f"H = {hurst:g}, γ = {work_of_adhesion:g} J/m²"
+    name = f"H = {hurst:g}, γ = {gamma_text(work_of_adhesion)}"
     return f"{name}, {place(others)}" if others else name
 
 

@@ -29,6 +29,7 @@ EXAMPLES = {
     "profile.c0": "1e-14",
     "material.adhesion_range": '"0.3 nm"',
     "material.strength": "1e8",
+    "material.work_of_adhesion_open": '"80 mJ/m2"',
     "cycle.max_stress": "200",
     "cycle.preload": '"0.5 kPa"',
     "cycle.stiffness": "1e9",
@@ -78,8 +79,4 @@ def _entry(key: str, entry: Field[Any]) -> str:
     if key in EXAMPLES:
         return f"{comment}# {entry.name} = {EXAMPLES[key]}  # example; left out by default\n"
     assert entry.default not in (MISSING, None), f"{key} has neither default nor example"
-    return f"{comment}# {entry.name} = {_literal(entry.default)}\n"
-
-
-def _literal(value: Any) -> str:
-    return json.dumps(list(value) if isinstance(value, tuple) else value)
+    return f"{comment}# {entry.name} = {json.dumps(entry.default)}\n"

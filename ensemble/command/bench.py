@@ -11,13 +11,12 @@ import csv
 import math
 import platform
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
-from adhesis.ensemble.reporter import ticking
+from adhesis.ensemble.reporter import following
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -55,16 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from adhesis.ensemble.bench.bench_page import (
-        GROWTH_COLUMNS,
-        LINE_COLUMNS,
-        growth_cells,
-        line_cells,
-        page,
-    )
-    from adhesis.ensemble.bench.equal_error import FULL, QUICK, benchmark, exponents, growth, ratios
+    from adhesis.ensemble.bench.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, cells, page
+    from adhesis.ensemble.bench.equal_error import benchmark, exponents, growth, ratios
+    from adhesis.ensemble.bench.scenes import FULL, QUICK
     from adhesis.ensemble.warm import warm_missing
     from adhesis.solver.precompile import COMPILED_METHODS
 
@@ -74,30 +67,22 @@ def execute(args: argparse.Namespace) -> int:
     warm_missing(COMPILED_METHODS)  # or the first run of each would do it, silently
     # A file or a pipe has no width of its own; the tables need this one.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
-    live = sys.stderr.isatty()
-    with (
-        Progress(
-            SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True
-        ) as progress,
-        nullcontext() if live else ticking("adhesis bench: measuring"),
-    ):
-        task = progress.add_task("measuring")
+    with following("adhesis bench: measuring") as show_run:
 
         def show(line: Line) -> None:
             run = line.run
-            if not live:  # no spinner there; half an hour of silence is too long
-                print(run.scene.name, *line_cells(line), sep="  ", file=sys.stderr, flush=True)
-            progress.update(task, description=f"{run.scene.title}: {run.method}, {run.described}")
+            if not sys.stderr.isatty():  # no bar there; half an hour of silence is too long
+                print(run.scene.name, *cells(line, LINE_COLUMNS), sep="  ", file=sys.stderr)
+            show_run(None, None, f"{run.scene.title}: {run.method}, {run.described}")
 
         lines = benchmark(QUICK if args.quick else FULL, seconds=args.budget, on_line=show)
         grown = [] if args.quick else growth(seconds=args.budget, on_line=show)
     for scene in dict.fromkeys(line.run.scene for line in lines):
         chosen = [line for line in lines if line.run.scene is scene]
         title = f"{scene.title}; reference: {chosen[0].reference.text}"
-        console.print(_table(title, LINE_COLUMNS, [line_cells(line) for line in chosen]))
+        console.print(_table(title, LINE_COLUMNS, chosen))
     if grown:
-        rows = [growth_cells(line) for line in grown]
-        console.print(_table("How the cost grows", GROWTH_COLUMNS, rows))
+        console.print(_table("How the cost grows", GROWTH_COLUMNS, grown))
     compared = ratios(lines)
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
     text = page(lines, grown, compared, exponents(grown), f"`{command}` on {_machine()}")
@@ -111,14 +96,16 @@ def execute(args: argparse.Namespace) -> int:
     return 0
 
 
-def _table(title: str, columns: tuple[str, ...], rows: list[list[str]]) -> Table:
+def _table(title: str, columns: tuple[str, ...], lines: list[Line]) -> Table:
     from rich.table import Table
+
+    from adhesis.ensemble.bench.bench_page import cells
 
     table = Table(title=title, title_justify="left")
     for k, heading in enumerate(columns):
         table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*row)
+    for line in lines:
+        table.add_row(*cells(line, columns))
     return table
 
 

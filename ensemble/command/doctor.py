@@ -46,11 +46,13 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _text(diagnosis: Diagnosis) -> str:
-    versions = dict(diagnosis.versions)
+    versions, mpirun = dict(diagnosis.versions), diagnosis.mpirun
+    if mpirun and diagnosis.mpirun_version:
+        mpirun += f" ({diagnosis.mpirun_version})"
     rows = [
         ("adhesis", f"{versions.pop('adhesis')}, Python {versions.pop('python')}"),
         ("MPI", f"{versions.pop('mpi')} (mpi4py {versions.pop('mpi4py')})"),
-        ("mpirun", _join(diagnosis.mpirun, diagnosis.mpirun_version) or "none"),
+        ("mpirun", mpirun or "none"),
         ("HDF5", f"{versions.pop('hdf5')} (h5py {versions.pop('h5py')})"),
         ("FFTW", f"{versions.pop('fftw')} (pyfftw {versions.pop('pyfftw')})"),
         *versions.items(),
@@ -65,7 +67,3 @@ def _text(diagnosis: Diagnosis) -> str:
     lines.append("")
     lines.append("usable" if diagnosis.usable else "not usable as it is: see FAIL above")
     return "\n".join(lines)
-
-
-def _join(path: str, version: str) -> str:
-    return f"{path} ({version})" if path and version else path

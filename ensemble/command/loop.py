@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -16,17 +16,16 @@ from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
-    FieldStates,
+    document,
+    fields_at_penetrations,
     fields_at_stresses,
     loop_summary,
-    loops_document,
-    path_document,
     path_summary,
     write_npz,
 )
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.reporter import StatusLine, ticking
+from adhesis.ensemble.reporter import StatusLine, following
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -67,35 +66,39 @@ def execute(args: argparse.Namespace) -> int:
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
         strength = strength_of(args.work_of_adhesion, args.adhesion_range, args.strength)
-        problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control, strength)
+        problem = Problem(
+            *(profile, half_space, args.work_of_adhesion, cycle.control, strength),
+            measure=args.measure,
+            work_of_adhesion_open=args.work_of_adhesion_open,
+        )
         cycle.check(problem)
     _check_film(args, cycle)
-    penetrations = _field_penetrations(args, cycle)
-    stresses = _field_stresses(args, cycle)
+    wanted, at_stresses = _wanted_fields(args, cycle)
     with refused_as_input(vars(args)):
         method = make_method(
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
-    wanted = [*penetrations, *stresses]
     nodes = _field_nodes(args, method, wanted) if wanted else 0
     warm_missing([method.name], quiet=args.quiet, many_gaps=False)
-    picked = FieldStates(method, penetrations)
+    fields: dict[str, Any] = {}
     try:
-        results = _run(args, method, cycle, picked.visit if penetrations else None)
-        fields = picked.collect(nodes) if penetrations else {}
-        if stresses:
-            assert isinstance(results, tuple)
-            fields = fields_at_stresses(results[0], stresses, nodes)
+        results = _run(args, method, cycle)
+        if wanted:
+            assert isinstance(results, tuple)  # fields are those of one loop
+            if at_stresses:
+                fields = fields_at_stresses(results[0], wanted, nodes)
+            else:
+                fields = fields_at_penetrations(results[0], method, wanted, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return 1
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
-            document = _document(results, warnings)
+            numbers = document(results, warnings)
             seed = (args.seed or 0) if source is None else None
-            document["provenance"] = provenance(args.words, source, seed, document)
-            write_json(args.json, document)
+            numbers["provenance"] = provenance(args.words, source, seed, numbers)
+            write_json(args.json, numbers)
     if args.csv is not None:
         from adhesis.ensemble.loop.saved import write_csv  # loads pandas
 
@@ -129,31 +132,23 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _run(
-    args: argparse.Namespace,
-    method: Method,
-    cycle: Cycle,
-    on_state: Callable[[Branch, ContactState], None] | None,
+    args: argparse.Namespace, method: Method, cycle: Cycle
 ) -> tuple[LoopResult, ...] | PathResult:
     step = cycle.top(method.problem) / cycle.load_steps
     progress = None if args.quiet else _progress(step, cycle.control.is_load)
     if cycle.is_path:
         return run_path(
             method,
-            cycle.turning_points,
+            cycle.points,
             load_steps=cycle.load_steps,
             out=cycle.out,
             progress=progress,
-            on_state=on_state,
         )
-    points, turns = cycle.turning_points, cycle.turns
-    if len(points) > 1:
-        turn = turns.arguments(points, cycle.control)
+    if len(cycle.points) > 1:
+        turn = cycle.arguments(cycle.points)
         return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turn)
-    turn = turns.arguments(points[0], cycle.control)
-    loop = run_loop(
-        method, load_steps=cycle.load_steps, progress=progress, on_state=on_state, **turn
-    )
-    return (loop,)
+    turn = cycle.arguments(cycle.points[0])
+    return (run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn),)
 
 
 # ---------------------------------------------------------------------- input
@@ -208,11 +203,11 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
     """Refuse a film that cannot be made, before the loop is run."""
     if args.film is None:
         return
-    if not cycle.is_path and len(cycle.turning_points) > 1:
+    if not cycle.is_path and len(cycle.points) > 1:
         name = "--max-stress" if cycle.control.is_load else "--max-penetration"
-        name = "--preload" if cycle.turns.are_preloads else name
+        name = "--preload" if cycle.are_preloads else name
         raise InputError(
-            f"--film is given with {len(cycle.turning_points)} turning points: a film shows one "
+            f"--film is given with {len(cycle.points)} turning points: a film shows one "
             f"loop, so give {name} one value"
         )
     from adhesis.ensemble.loop.film import check_film
@@ -282,54 +277,37 @@ def _self_affine(args: argparse.Namespace) -> Profile:
     )
 
 
-def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
-    """Penetrations of the fields; empty if none are wanted there."""
+def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float], bool]:
+    """Return where fields are wanted, and whether these are mean stresses in Pa; else Δ/h_max."""
     if args.fields is None:
         for name in ("field_penetrations", "field_stresses", "field_nodes"):
             if getattr(args, name) is not None:
                 option = "--" + name.replace("_", "-")
                 raise InputError(f"{option} needs --fields, the file to which fields are written")
-        return []
-    if cycle.is_path or len(cycle.turning_points) > 1:
+        return [], False
+    if cycle.is_path or len(cycle.points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
-    if args.field_stresses is not None:
-        if args.field_penetrations is not None:
-            raise InputError(
-                "--field-penetrations and --field-stresses are given: give one of them"
-            )
-        return []
-    if not cycle.control.is_fixed or cycle.turns.are_preloads:
-        if cycle.turns.are_preloads and args.field_penetrations is None:
-            return []
+    penetrations, stresses = args.field_penetrations, args.field_stresses
+    if penetrations is not None and stresses is not None:
+        raise InputError("--field-penetrations and --field-stresses are given: give one of them")
+    at_preload, (top,) = cycle.are_preloads, cycle.points
+    at_stresses = stresses is not None or (at_preload and penetrations is None)
+    if not at_stresses and (at_preload or not cycle.control.is_fixed):
         raise InputError(
             "--fields at penetrations belongs to one loop that turns at --max-penetration at fixed "
             "separation: give --field-stresses, as 5kPa 10kPa, instead"
         )
-    (top,) = cycle.turning_points
-    if args.field_penetrations is None:
-        return [part * top for part in _FIELD_PARTS]
-    wanted = [float(value) for value in args.field_penetrations]
+    wanted = stresses if at_stresses else penetrations
+    if wanted is None:
+        return [part * top for part in _FIELD_PARTS], at_stresses
     for value in wanted:
-        if not (np.isfinite(value) and value <= top):
+        if at_stresses and not np.isfinite(value):
+            raise InputError(f"--field-stresses holds {value}: it must be a finite number, in Pa")
+        if not at_stresses and not (np.isfinite(value) and value <= top):
             raise InputError(
                 f"--field-penetrations holds {value}: the loop goes no deeper than {top:g}"
             )
-    return list(dict.fromkeys(wanted))
-
-
-def _field_stresses(args: argparse.Namespace, cycle: Cycle) -> list[float]:
-    """Mean stresses of the fields in Pa; empty if none are wanted there."""
-    if args.fields is None or args.field_penetrations is not None:
-        return []
-    if args.field_stresses is None:
-        if not cycle.turns.are_preloads:
-            return []
-        return [part * cycle.turning_points[0] for part in _FIELD_PARTS]
-    wanted = [float(value) for value in args.field_stresses]
-    for value in wanted:
-        if not np.isfinite(value):
-            raise InputError(f"--field-stresses holds {value}: it must be a finite number, in Pa")
-    return list(dict.fromkeys(wanted))
+    return list(dict.fromkeys(wanted)), at_stresses
 
 
 def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[float]) -> int:
@@ -352,14 +330,6 @@ def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[floa
 # ---------------------------------------------------------------------- output
 
 
-def _document(
-    results: tuple[LoopResult, ...] | PathResult, warnings: Sequence[str]
-) -> dict[str, Any]:
-    if isinstance(results, PathResult):
-        return path_document(results, warnings)
-    return loops_document(results, warnings)
-
-
 def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
     from adhesis.ensemble.loop.loop_figure import draw_loops
 
@@ -372,15 +342,8 @@ def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool)
     from adhesis.ensemble.loop.film import film_of
 
     result = results if isinstance(results, PathResult) else results[0]
-    done = ""
-
-    def progress(number: int, total: int, what: str = "computed") -> None:
-        nonlocal done
-        done = f"film: {number} of {total} frames {what}"
-
-    with nullcontext() if quiet else ticking(lambda: done):
-        film = film_of(result, progress=progress)
-        film.save(path, progress=lambda number, total: progress(number, total, "drawn"))
+    with nullcontext() if quiet else following("frames of the film") as show:
+        film_of(result, progress=show).save(path, progress=show)
 
 
 # ---------------------------------------------------------------------- progress

@@ -19,7 +19,14 @@ from types import FrameType
 
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
-from adhesis.ensemble.errors import InputError, RankError, WriteError, lack, naming_options
+from adhesis.ensemble.errors import (
+    InputError,
+    RankError,
+    WriteError,
+    check_memory,
+    lack,
+    naming_options,
+)
 from adhesis.ensemble.exit_codes import (
     BAD_INPUT,
     INTERRUPTED,
@@ -54,6 +61,7 @@ EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
 )
 _CAMPAIGNS = ("new", "run", "status", "verify", "merge", "report")
+_WITHOUT_NUMERICS = ("new", "sample", "completion")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
 _OPTIONS = {
     "loop": "adhesis.ensemble.loop.loop_arguments",
@@ -153,6 +161,8 @@ def _execute(name: str, words: Sequence[str]) -> int:
     except SystemExit:  # --help
         return 0
     args.words = list(words)
+    if name not in _WITHOUT_NUMERICS:
+        check_memory()
     with naming_options():
         code: int = importlib.import_module(module_of(name)).execute(args)
     return code

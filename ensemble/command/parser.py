@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -105,6 +106,23 @@ def _number(value: str) -> float:
         return float(value)  # NaN too: the rule of the quantity refuses it
     except ValueError:
         raise argparse.ArgumentTypeError(f"is {quoted(value)}: it must be a number") from None
+
+
+def within(
+    low: float, high: float, rule: str, kind: Callable[[str], float] = float
+) -> Callable[[str], Any]:
+    """Return the type of an option that is a number between two others."""
+
+    def read(value: str) -> float:
+        try:
+            number = kind(value)
+        except ValueError:
+            number = math.nan
+        if not low <= number <= high:
+            raise argparse.ArgumentTypeError(f"is {quoted(value)}: it must be {rule}")
+        return number
+
+    return read
 
 
 def _path(value: str) -> Path:

@@ -38,6 +38,7 @@ def execute(args: argparse.Namespace) -> int:
         cycle = make_cycle(
             half_space, gammas, turns.points, args.load_steps, args.method, args.accuracy, control,
             args.adhesion_range, args.strength, at_preload=turns.are_preloads, latest=turns.latest,
+            work_of_adhesion_open=args.work_of_adhesion_open,
         )  # fmt: skip
     if args.to is not None:
         check_output_folder("--to", args.to, FILES, {"the command": args.file})

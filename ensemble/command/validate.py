@@ -9,12 +9,11 @@ import argparse
 import json
 import math
 import sys
-from contextlib import nullcontext
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.reporter import ticking
+from adhesis.ensemble.reporter import following
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -49,21 +48,16 @@ def execute(args: argparse.Namespace) -> int:
         if name not in METHODS:
             raise InputError(f"--method is {name!r}: it must be one of {', '.join(METHODS)}")
     warm_missing(names)  # a time of compiling is no time of a method
-    live = sys.stderr.isatty()
     lines = not args.json and not sys.stdout.isatty()
     judged: list[Row] = []
+    with following("adhesis validate") as show:
 
-    def follow(row: Row) -> None:
-        judged.append(row)
-        if live:
-            _follow(row)
-        if lines:
-            print(_line(row), flush=True)
+        def follow(row: Row) -> None:
+            judged.append(row)
+            show(None, None, f"adhesis validate: {len(judged)} claims judged")
+            if lines:
+                print(_line(row), flush=True)
 
-    def so_far() -> str:
-        return f"adhesis validate: {len(judged)} claims judged"
-
-    with nullcontext() if live else ticking(so_far):
         rows = validate(names, on_row=follow)
     if args.json:
         print(json.dumps([_record(row) for row in rows], indent=1, allow_nan=False))
@@ -75,11 +69,6 @@ def execute(args: argparse.Namespace) -> int:
     if not args.json:
         print(f"{len(rows) - len(failed)} of {len(rows)} claims hold")
     return _EXCEEDED if failed else 0
-
-
-def _follow(row: Row) -> None:
-    """Show on the terminal how far the validation has come."""
-    print(f"\r\033[K{row.method}: {row.claim}", end="", file=sys.stderr, flush=True)
 
 
 def _record(row: Row) -> dict[str, object]:

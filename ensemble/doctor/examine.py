@@ -12,11 +12,13 @@ import socket
 import subprocess
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.run.launch import (
+    check_file_size_limit,
     cores,
     end_with_parent,
     launch_environment,
@@ -45,12 +47,12 @@ class Check:
 class Diagnosis:
     """Result of :func:`examine`."""
 
-    versions: dict[str, str]
+    writer: str  # "mpio" or "rank 0"
+    why: str
     cores: int
     mpirun: str
     mpirun_version: str
-    writer: str  # "mpio" or "rank 0"
-    why: str
+    versions: dict[str, str]
     checks: list[Check] = field(default_factory=list)
 
     @property
@@ -60,16 +62,7 @@ class Diagnosis:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the results as a dictionary, for ``--json``."""
-        return {
-            "usable": self.usable,
-            "writer": self.writer,
-            "why": self.why,
-            "cores": self.cores,
-            "mpirun": self.mpirun,
-            "mpirun_version": self.mpirun_version,
-            "versions": self.versions,
-            "checks": [vars(check) for check in self.checks],
-        }
+        return {"usable": self.usable, **asdict(self)}
 
 
 def examine(directory: Path | str | None = None) -> Diagnosis:
@@ -137,30 +130,32 @@ class _Probe:
 
 
 def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
-    with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
-        command = [*launch, *python("-m", "adhesis.ensemble.doctor.probe", scratch)]
+    try:
         if launch:
-            command.append("together")
-        failure = _failure_of(command, python_environment(launch_environment(_RANKS)))
-        reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
-        return _Probe([report for report in reports if report], failure)
+            check_file_size_limit()
+        with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
+            command = [*launch, *python("-m", "adhesis.ensemble.doctor.probe", scratch)]
+            if launch:
+                command.append("together")
+            failure = _failure_of(command, python_environment(launch_environment(_RANKS)))
+            reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
+            return _Probe([report for report in reports if report], failure)
+    except (OSError, WriteError) as error:
+        return _Probe([], f"cannot be started: {error}")
 
 
 def _failure_of(command: list[str], env: dict[str, str]) -> str:
     """Run a command to its end or the time limit; return its failure, empty if there is none."""
-    try:
-        process = subprocess.Popen(
-            command,
-            env=env,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            preexec_fn=end_with_parent,
-        )
-    except OSError as error:
-        return str(error)
+    process = subprocess.Popen(
+        command,
+        env=env,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        preexec_fn=end_with_parent,
+    )
     try:
         output, _ = process.communicate(timeout=_TIME_LIMIT)
     except subprocess.TimeoutExpired:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from adhesis.ensemble.errors import InputError
@@ -38,42 +38,37 @@ class Turns:
     are_preloads: bool = False
     latest: float | None = None
 
-    def arguments(self, points: object, control: Control) -> dict[str, Any]:
-        """Return the arguments of ``run_loop`` or ``run_loops`` for some of the points."""
-        return turn_arguments(control, points, self.are_preloads, self.latest)
 
-
-@dataclass(frozen=True)
-class Cycle:
+@dataclass(frozen=True, kw_only=True)
+class Cycle(Turns):
     """Loading path and control of a loop.
+
+    The turning points are one for each loop, ascending; those of one path, in order, if
+    ``is_path``.
 
     Attributes
     ----------
     control : Control
-    turns : Turns
-        One for each loop, ascending; those of one path, in order, if ``is_path``.
+    load_steps : int
     is_path : bool
     out : bool
         Whether a path continues until contact is lost.
-    load_steps : int
     """
 
     control: Control
-    turns: Turns
-    is_path: bool
-    out: bool
     load_steps: int
+    is_path: bool = False
+    out: bool = True
 
-    @property
-    def turning_points(self) -> tuple[float, ...]:
-        """The turning points, of loops or of the path."""
-        return self.turns.points
+    def arguments(self, points: object) -> dict[str, Any]:
+        """Return the arguments of ``run_loop`` or ``run_loops`` for some of the points."""
+        return turn_arguments(self.control, points, self.are_preloads, self.latest)
 
     def top(self, problem: Problem) -> float:
         """Return the prescribed value of the last load step; ValueError as in :meth:`check`."""
-        largest = max(self.turning_points)
-        if self.turns.are_preloads:
-            return latest_turn(problem, largest, self.turns.latest)
+        largest = max(self.points)
+        if self.are_preloads:
+            return latest_turn(problem, largest, self.latest)
         return largest
 
     def check(self, problem: Problem) -> None:
@@ -85,13 +80,13 @@ class Cycle:
             If it breaks a rule, which the message gives.
         """
         if self.is_path:
-            check_path(self.turning_points, self.load_steps, problem, self.out)
-        elif self.turns.are_preloads:
-            for preload in self.turning_points:
-                latest = latest_turn(problem, preload, self.turns.latest)
+            check_path(self.points, self.load_steps, problem, self.out)
+        elif self.are_preloads:
+            for preload in self.points:
+                latest = latest_turn(problem, preload, self.latest)
                 check_cycle(latest, self.load_steps, self.control)
         else:
-            for turn in self.turning_points:
+            for turn in self.points:
                 check_cycle(turn, self.load_steps, self.control)
 
 
@@ -114,10 +109,11 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
         if not words:
             raise InputError("--path holds no turning point")
         points = read_words("--path", words, rule="numbers with commas between them")
-        return Cycle(control, Turns(points), True, out, args.load_steps)
-    turns = turns_of(args, control)
-    turns = replace(turns, points=tuple(sorted(turns.points)))
-    return Cycle(control, turns, False, True, args.load_steps)
+        steps = args.load_steps
+        return Cycle(points=points, control=control, load_steps=steps, is_path=True, out=out)
+    turns = {**vars(turns_of(args, control))}
+    turns["points"] = tuple(sorted(turns["points"]))
+    return Cycle(**turns, control=control, load_steps=args.load_steps)
 
 
 def turns_of(args: argparse.Namespace, control: Control) -> Turns:

@@ -27,7 +27,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError, one_of
 from adhesis.ensemble.loop.film_page import BODY, STYLE
-from adhesis.ensemble.loop.film_scenes import Scene, Scenes, jump_places, scenes_of
+from adhesis.ensemble.loop.film_scenes import Scene, Scenes, scenes_of
 from adhesis.ensemble.outputs import check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.ensemble.report.html import whole_page
@@ -252,7 +252,7 @@ class _Drawing:
         for branch in ("loading", "unloading"):
             rows = np.where(result.branch == branch, y, np.nan)
             axes.plot(x, rows, color="k", ls=LINE_OF_BRANCH[branch], lw=1.0, label=branch)
-        places = np.array(jump_places(result), dtype=int)
+        places = np.array(result.states_before_jumps(), dtype=int)
         axes.plot(x[places], y[places], "o", ms=3, mfc="#D55E00", mew=0, label="jumps")
         axes.axhline(0, color="0.7", lw=0.5, zorder=0)
         (self._point,) = axes.plot(x[:1], y[:1], "o", ms=8, mfc="#0072B2", mec="w")

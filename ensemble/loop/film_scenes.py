@@ -104,7 +104,7 @@ def scenes_of(
     profile = result.problem.profile
     x = np.linspace(0.0, profile.period, _NODES)
     height = profile.at(x)
-    places = jump_places(result)
+    places = result.states_before_jumps()
     chosen, shown = _chosen(result, places, frames)
     scenes = []
     last = -1
@@ -126,11 +126,6 @@ def scenes_of(
         if progress is not None:
             progress(done, len(chosen))
     return Scenes(x, height, scenes, shown)
-
-
-def jump_places(result: LoopResult | PathResult) -> list[int]:
-    """Return the number of the state before each jump; the next one is that after it."""
-    return result.states_before_jumps()
 
 
 def _chosen(

@@ -14,8 +14,9 @@ from pathlib import Path
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, STRESS, WORK_OF_ADHESION
 from adhesis.ensemble.trace.trace_arguments import (
     add_cycle_arguments,
+    add_method_arguments,
+    add_open_argument,
     add_reading_arguments,
-    add_strength_arguments,
 )
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
@@ -70,7 +71,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in Pa, or 1MPa (likewise; with --hurst 1e6)",
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
-    add_strength_arguments(contact)
+    add_open_argument(contact)
+    contact.add_argument(
+        "--measure",
+        default="arc",
+        metavar="NAME",
+        help="adhesion acts on the length of the profile (arc, default) or its projection (flat)",
+    )
     add_cycle_arguments(contact)
     contact.add_argument(
         "--path",
@@ -79,12 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in contact",
     )
     method = parser.add_argument_group("method")
-    method.add_argument(
-        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
-    )
-    method.add_argument(
-        "--accuracy", type=float, default=1e-3, help="relative error of the loss (default 1e-3)"
-    )
+    add_method_arguments(method, "relative error of the loss (default 1e-3)")
     method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
     output = parser.add_argument_group("output")
     output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,12 @@ from adhesis.ensemble.report.figures.style import (
     LOOKS,
     MM,
     TWO_COLUMNS,
+    drawn_into,
     new_figure,
     style,
 )
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
-from adhesis.solver.checks import shown
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import LoopState
 from adhesis.solver.loading.path import PathResult
@@ -41,26 +41,13 @@ def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) ->
     ------
     TypeError
         If ``ax`` is neither.
+    ValueError
+        If it holds more than two.
     """
-    if ax is None:
-        with style():
-            figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
-            _draw(results, figure.axes)
-        return figure
-    panels = _panels_of(ax)
-    _draw(results, panels)
-    found = panels[0].get_figure(root=True)
-    assert found is not None
-    return found
-
-
-def _panels_of(ax: object) -> list[Axes]:
-    """Return one or two axes as a list."""
-    panels = [ax] if isinstance(ax, Axes) else list(ax) if isinstance(ax, Iterable) else []
-    found = [panel for panel in panels if isinstance(panel, Axes)]
-    if len(found) not in (1, 2) or len(found) < len(panels):
-        raise TypeError(f"ax is {shown(ax)}: it must be one Axes of matplotlib, or two of them")
-    return found
+    with drawn_into(ax):
+        figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
+        _draw(results, figure.given or figure.panels)
+        return figure.finish()
 
 
 def _draw(results: Sequence[LoopResult] | PathResult, panels: Sequence[Axes]) -> None:

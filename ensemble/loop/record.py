@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -54,22 +54,20 @@ def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
     return document | {"states": [dict(zip(columns, row, strict=True)) for row in rows]}
 
 
-def loops_document(results: Sequence[LoopResult], warnings: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the JSON document of loops with ascending turning points.
+def document(
+    results: Sequence[LoopResult] | PathResult, warnings: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Return the JSON document of a path, or of loops with ascending turning points.
 
-    That of the last one, and where there are several all of them, in order, as ``turns``.
-    ``warnings`` of the input stand before those of each loop.
+    That of the last loop, and where there are several all of them, in order, as ``turns``. The keys
+    of a path are those of a loop where they mean the same. ``warnings`` of the input stand before
+    those of each result.
     """
-    documents = [loop_document(result) for result in results]
-    for document in documents:
-        document["warnings"] = [*warnings, *document["warnings"]]
+    several = [results] if isinstance(results, PathResult) else results
+    documents = [loop_document(result) for result in several]
+    for one in documents:
+        one["warnings"] = [*warnings, *one["warnings"]]
     return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})
-
-
-def path_document(result: PathResult, warnings: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the JSON document of a path; the keys are those of a loop where they mean the same."""
-    document = loop_document(result)
-    return document | {"warnings": [*warnings, *document["warnings"]]}
 
 
 def _displacement(result: LoopResult | PathResult) -> dict[str, Any]:
@@ -91,6 +89,7 @@ def path_summary(result: PathResult) -> str:
         f"{in_works_of_adhesion(result.work, result.problem.work_of_adhesion)}, of which "
         f"{result.energy_change:.6g} J/m² are stored"
         f"{f'; {result.loss_note}' if result.loss_note else ''}",
+        *_friction(result),
         _audit(result),
         _range(result),
     ]
@@ -104,7 +103,7 @@ def path_summary(result: PathResult) -> str:
             f"minor loop  {part.start:g}, {part.turn:g}, {part.start:g}: {part.loss:.6g} J/m² "
             f"(drops {part.loss_from_drops:.6g}), {end}"
         )
-    lines.append(f"method      {result.method.name}, {result.seconds:.1f} s")
+    lines.append(_method(result))
     return "\n".join(lines)
 
 
@@ -128,15 +127,27 @@ def loop_summary(result: LoopResult) -> str:
             f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)} "
             f"(dimensionless {result.loss_dimensionless:.6g})"
             f"{f'; {result.loss_note}' if result.loss_note else ''}",
+            *_friction(result),
             _range(result),
             _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "
             f"{counted(result.races, 'jump')} raced, {result.energy_at_stake:.3g} J/m² at stake",
             f"jumps       {kinds}",
             f"pull-off    mean tension {result.pull_off_stress + 0.0:.6g} Pa",
-            f"method      {result.method.name}, {result.seconds:.1f} s",
+            _method(result),
         )
     )
+
+
+def _friction(result: LoopResult | PathResult) -> list[str]:
+    """The line on the friction of edges; none with one work of adhesion."""
+    text = result.friction_summary()
+    return [f"friction    {text}"] if text else []
+
+
+def _method(result: LoopResult | PathResult) -> str:
+    measure = "" if result.problem.measure == "arc" else f"{result.problem.measure} measure, "
+    return f"method      {result.method.name}, {measure}{result.seconds:.1f} s"
 
 
 def _range(result: LoopResult | PathResult) -> str:
@@ -145,7 +156,9 @@ def _range(result: LoopResult | PathResult) -> str:
 
 def _audit(result: LoopResult | PathResult) -> str:
     """The line of the audit; without adhesion there is no loss that a residual could refer to."""
-    drops = f"{result.loss_from_drops:.6g} J/m² in {counted(len(result.jumps), 'jump')}"
+    friction = " and the friction between them" if result.problem.pinning > 0 else ""
+    jumps = f"{counted(len(result.jumps), 'jump')}{friction}"
+    drops = f"{result.loss_from_drops:.6g} J/m² in {jumps}"
     if result.problem.work_of_adhesion == 0:
         return f"audit       {drops}; without adhesion nothing is lost"
     return f"audit       {drops}, residual {result.audit_residual:.2e}"
@@ -181,59 +194,42 @@ FieldsOfState = tuple[Branch, float, ContactState, Fields]
 """Branch, penetration Δ/h_max, state and its fields."""
 
 
-@dataclass
-class FieldStates:
-    """Picks the states before the wanted penetrations while a loop runs.
+def fields_at_penetrations(
+    loop: LoopResult, method: Method, penetrations: Sequence[float], n: int
+) -> dict[str, Any]:
+    """Return the fields on n nodes at penetrations Δ/h_max of both branches, as arrays.
 
-    Parameters
-    ----------
-    method : Method
-    penetrations : sequence of float
-        Δ/h_max.
+    ``branch`` and ``penetration`` have shape (k,), ``x`` and ``height`` (n,), ``stress``,
+    ``displacement`` and ``gap`` (k, n), ``edges`` (k, most patches, 2) with NaN for none.
     """
+    found: list[FieldsOfState] = []
+    for branch in BRANCHES:
+        states = [loop.contact_states[k] for k in np.flatnonzero(loop.branch == branch)]
+        for wanted in penetrations:
+            state = _state_at(method, branch, states, wanted)
+            found.append((branch, wanted, state, method.fields(state, n)))
+    return _arrays(found)
 
-    method: Method
-    penetrations: Sequence[float]
-    _before: dict[tuple[Branch, float], ContactState] = field(default_factory=dict)
-    _last: dict[Branch, ContactState] = field(default_factory=dict)
 
-    def visit(self, branch: Branch, state: ContactState) -> None:
-        """Take note of one state of the path; hand this to ``run_loop`` as ``on_state``."""
-        here = self.method.problem.penetration(state.separation)
-        for wanted in self.penetrations:
-            if state.patches and state.separation == self.method.problem.separation(wanted):
-                self._before[branch, wanted] = state  # the very state, not one followed anew
-                continue
-            reached = here >= wanted if branch == "loading" else here <= wanted
-            if reached and (branch, wanted) not in self._before:
-                self._before[branch, wanted] = self._last.get(branch, state)
-        self._last[branch] = state
-
-    def collect(self, n: int) -> dict[str, Any]:
-        """Return the fields on n nodes at every wanted penetration of both branches, as arrays.
-
-        ``branch`` and ``penetration`` have shape (k,), ``x`` and ``height`` (n,), ``stress``,
-        ``displacement`` and ``gap`` (k, n), ``edges`` (k, most patches, 2) with NaN for none.
-        """
-        found: list[FieldsOfState] = []
-        for branch in BRANCHES:
-            for wanted in self.penetrations:
-                state = self._state(branch, wanted)
-                found.append((branch, wanted, state, self.method.fields(state, n)))
-        return _arrays(found)
-
-    def _state(self, branch: Branch, wanted: float) -> ContactState:
-        separation = self.method.problem.separation(wanted)
-        before = self._before.get((branch, wanted))
-        if before is None or (branch == "unloading" and not before.patches):
-            return self.method.detached(separation)
-        if before.patches and before.separation == separation:
-            return before
-        return self.method.follow(before, separation).states[-1]
+def _state_at(
+    method: Method, branch: Branch, states: Sequence[ContactState], wanted: float
+) -> ContactState:
+    """Return the state of a branch at a penetration: one of its own, or one followed from there."""
+    separation = method.problem.separation(wanted)
+    before = None
+    for k, state in enumerate(states):
+        if state.patches and state.separation == separation:
+            return state
+        here = method.problem.penetration(state.separation)
+        if before is None and (here >= wanted if branch == "loading" else here <= wanted):
+            before = states[max(k - 1, 0)]
+    if before is None or (branch == "unloading" and not before.patches):
+        return method.detached(separation)
+    return method.follow(before, separation).states[-1]
 
 
 def fields_at_stresses(loop: LoopResult, stresses: Sequence[float], n: int) -> dict[str, Any]:
-    """Return the fields on n nodes at mean stresses in Pa, as :meth:`FieldStates.collect` does.
+    """Return the fields on n nodes at mean stresses in Pa, as :func:`fields_at_penetrations`.
 
     A branch that does not have a mean stress is left out.
 

@@ -22,6 +22,7 @@ from adhesis.ensemble.quantities import UNITS, with_units
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult
+from adhesis.solver.loading.path_record import dissipated
 from adhesis.solver.loading.zero_range import InteriorTension
 from adhesis.solver.method import MethodReport
 from adhesis.solver.model.control import Control
@@ -44,6 +45,7 @@ _KIND_OF = {
     "NDArray[np.bool_]": "b",
     "NDArray[np.int64]": "i",
     "Array": "f",
+    "Array | None": "f",
 }
 # What a file may hold: variables of either kind of result, and their dimensions.
 _MEMBERS = frozenset(
@@ -276,7 +278,9 @@ def _recomputed(result: Result) -> dict[str, Any]:
     """Compute anew what a result keeps beside the states and jumps that it follows from."""
     values: dict[str, Any] = {
         "penetration": result.problem.penetration(result.separation),
-        "loss_from_drops": float(sum(jump.energy_drop for jump in result.jumps)),
+        "loss_from_drops": dissipated(
+            result.problem, result.jumps, result.states_before_jumps(), result.receded
+        ),
     }
     if isinstance(result, LoopResult):
         deepest = result.penetration[_turn(result)]
@@ -345,5 +349,7 @@ def _result(found: xr.Dataset) -> Result:
         float(about["work_of_adhesion"]),
         Control(float(about["stiffness"])),
         float(about.get("strength", math.inf)),
+        work_of_adhesion_open=float(about["work_of_adhesion_open"]),
+        measure=about.get("measure", "arc"),
     )
     return kind(problem=problem, method=method, **values)

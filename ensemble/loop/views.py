@@ -5,7 +5,6 @@ The mechanics find this module by :data:`adhesis.solver.views.maker`. A call loa
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -86,7 +85,7 @@ def save(result: Result, path: str | os.PathLike[str]) -> None:
 def page(shown: Any) -> str:
     """Return the numbers of an object with their units, and its figure if it has one, as HTML."""
     from adhesis.ensemble.loop.loop_figure import draw_shape
-    from adhesis.ensemble.report.html import table_of
+    from adhesis.ensemble.report.html import picture_of, table_of
 
     if isinstance(shown, LoopResult | PathResult):
         return table_of(_rows_of_result(shown)) + picture_of(plot(shown))
@@ -103,7 +102,7 @@ def trace_summary(answer: Answer) -> str:
 
 def trace_page(answer: Answer) -> str:
     """Return the summary of a trace's answer and the figure of its loop as HTML."""
-    from adhesis.ensemble.report.html import table_of
+    from adhesis.ensemble.report.html import picture_of, table_of
     from adhesis.ensemble.trace.figures import draw_loop
 
     rows = [line.split(maxsplit=1) for line in str(answer).splitlines()]
@@ -142,6 +141,7 @@ def _rows_of_result(result: Result) -> list[tuple[str, str]]:
             f"{f'; {result.loss_note}' if result.loss_note else ''}",
         ),
         ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
+        *(("friction", text) for text in (result.friction_summary(),) if text),
         ("jumps", str(len(result.jumps))),
         ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),
         ("h_max", f"{problem.profile.h_max:.4g} m"),
@@ -183,15 +183,6 @@ def _rows(shown: Any) -> list[tuple[str, str]]:
         if not (value is None or (isinstance(value, tuple) and not value) or name in drawn)
     }
     return [(name, f"{text} {UNITS.get(name, '')}".rstrip()) for name, text in texts.items()]
-
-
-def picture_of(figure: Any) -> str:
-    """Return a figure as a picture in HTML."""
-    from adhesis.ensemble.report.html import picture
-
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=110)
-    return picture(stream.getvalue(), "figure")
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import xarray as xr
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.mean_curves import QUANTILES
-from adhesis.ensemble.outputs import write_netcdf
 from adhesis.solver.method import BRANCHES
 
 # curve -> (unit, what it is)
@@ -22,6 +20,8 @@ QUANTITIES = {
     "patches": ("1", "number of contact patches in one period"),
     "energy": ("J m-1", "elastic and adhesion energy of one period per unit depth"),
 }
+# part of a curve -> (what it is, a dimension of its own)
+_PARTS = {"mean": ("mean",), "std": ("standard deviation",), "quantiles": ("quantiles", "quantile")}
 
 
 def curves_dataset(data: Aggregate) -> xr.Dataset:
@@ -40,30 +40,23 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
     ]
     key_dims, shape = tuple(axes), tuple(map(len, axes.values()))
     depth = "max_penetration" if data.campaign.has_axis("max_penetration") else "h_max"
+    campaign = data.campaign
+    coordinates: list[tuple[str, Any, str, str]] = [
+        ("hurst", axes["hurst"], "1", "Hurst exponent"),
+        ("work_of_adhesion", axes["work_of_adhesion"], "J m-2", "work of adhesion"),
+        *((axis.name, axes[axis.name], axis.unit, axis.meaning) for axis in data.further),
+        ("quantile", list(QUANTILES), "1", "quantile over realisations"),
+        *(
+            (f"{branch}_penetration", values, "1", f"penetration/{depth} on {branch}")
+            for branch, values in zip(
+                BRANCHES,
+                (campaign.loading_penetration, campaign.unloading_penetration),
+                strict=True,
+            )
+        ),
+    ]
     out = xr.Dataset(
-        coords={
-            "hurst": ("hurst", axes["hurst"], _about("1", "Hurst exponent")),
-            "work_of_adhesion": (
-                "work_of_adhesion",
-                axes["work_of_adhesion"],
-                _about("J m-2", "work of adhesion"),
-            ),
-            **{
-                axis.name: (axis.name, axes[axis.name], _about(axis.unit, axis.meaning))
-                for axis in data.further
-            },
-            "quantile": ("quantile", list(QUANTILES), _about("1", "quantile over realisations")),
-            "loading_penetration": (
-                "loading_penetration",
-                data.campaign.loading_penetration,
-                _about("1", f"penetration/{depth} on loading"),
-            ),
-            "unloading_penetration": (
-                "unloading_penetration",
-                data.campaign.unloading_penetration,
-                _about("1", f"penetration/{depth} on unloading"),
-            ),
-        },
+        coords={name: (name, values, _about(*about)) for name, values, *about in coordinates},
         attrs={
             "title": "Loading-unloading curves averaged over realisations",
             "source": data.path.name,
@@ -75,37 +68,16 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
         count[where] = cell.done
     out["realisations"] = (key_dims, count, _about("1", "realisations that were averaged"))
     for branch in BRANCHES:
-        axis = f"{branch}_penetration"
-        points = out.sizes[axis]
         for name, (unit, text) in QUANTITIES.items():
-            mean = np.full((*shape, points), np.nan)
-            std = mean.copy()
-            quantiles = np.full((*shape, len(QUANTILES), points), np.nan)
-            for where, cell in zip(place, data.cells, strict=True):
-                curve = cell.curves[f"{branch}_{name}"]
-                mean[where], std[where], quantiles[where] = curve.mean, curve.std, curve.quantiles
             base = f"{branch}_{name}"
-            out[f"{base}_mean"] = (
-                (*key_dims, axis),
-                mean,
-                _about(unit, f"{text}, mean on {branch}"),
-            )
-            out[f"{base}_std"] = (
-                (*key_dims, axis),
-                std,
-                _about(unit, f"{text}, standard deviation on {branch}"),
-            )
-            out[f"{base}_quantiles"] = (
-                (*key_dims, "quantile", axis),
-                quantiles,
-                _about(unit, f"{text}, quantiles on {branch}"),
-            )
+            for part, (what, *further) in _PARTS.items():
+                dims = (*further, f"{branch}_penetration")
+                values = np.full((*shape, *(out.sizes[dim] for dim in dims)), np.nan)
+                for where, cell in zip(place, data.cells, strict=True):
+                    values[where] = getattr(cell.curves[base], part)
+                about = _about(unit, f"{text}, {what} on {branch}")
+                out[f"{base}_{part}"] = ((*key_dims, *dims), values, about)
     return out
-
-
-def write_curves(data: Aggregate, path: Path) -> None:
-    """Write :func:`curves_dataset` as NetCDF 4, replacing a file that is there."""
-    write_netcdf(path, curves_dataset(data))
 
 
 def _about(unit: str, text: str) -> dict[str, str]:

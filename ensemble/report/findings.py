@@ -12,9 +12,15 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import place
-from adhesis.ensemble.quantities import percent, stress_text, with_unit
+from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.further_axes import cell_name, failed_cells, lines_along, together
+from adhesis.ensemble.report.further_axes import (
+    cell_name,
+    failed_cells,
+    lines_along,
+    short_of_preload,
+    together,
+)
 from adhesis.ensemble.report.tables.loss_tables import least
 from adhesis.ensemble.task.doubt import why_beyond
 
@@ -42,14 +48,29 @@ def _outcome(data: Aggregate) -> str:
             f"A loop to {turning_point(data)} and back under a weight, which falls off at {ends} "
             "(the energy of the fall is not counted), loses"
         )
+    friction = _friction(data, cells)
     if len(cells) == 1:
-        return f"{top} on average {_loss(cells[0])}."
+        return f"{top} on average {_loss(cells[0])}{friction}."
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
     return (
         f"{top}, on average over realisations, from {_loss(cells[0])} to {_loss(cells[-1])}; "
         f"{100 * min(share):.0f} to {100 * max(share):.0f} % of it is lost where edges run inside "
-        "patches."
+        f"patches{friction}."
     )
+
+
+def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
+    """Return a clause on the friction of edges; empty for one work of adhesion."""
+    if data.campaign.material.work_of_adhesion_open is None:
+        return ""
+    share = [
+        cell.estimates["friction"].mean / loss
+        for cell in cells
+        if (loss := cell.estimates["loss"].mean) > 0
+    ]
+    if not share:
+        return ""
+    return f"; {percent(*sorted({min(share), max(share)}))} is friction of receding edges"
 
 
 def turning_point(data: Aggregate) -> str:
@@ -57,9 +78,8 @@ def turning_point(data: Aggregate) -> str:
     cycle = data.campaign.cycle
     ends = sorted({cell.campaign.cycle.turning_point for cell in data.cells if cell.done})
     if cycle.turns_at_stress:
-        texts = [stress_text(end) for end in ends]
         what = "mean stress" if cycle.under_load else "preload"
-        return f"a {what} of {' … '.join(dict.fromkeys((texts[0], texts[-1])))}"
+        return f"a {what} of {in_one_unit('mean_stress', sorted({ends[0], ends[-1]}), ' … ')}"
     texts = [f"{end:g}" for end in ends]
     end = " … ".join(dict.fromkeys((texts[0], texts[-1])))
     return f"{penetration_sign(data)} = {end}"
@@ -245,8 +265,7 @@ def quality(data: Aggregate) -> list[str]:
 
 def _preload(data: Aggregate) -> list[str]:
     """Report the loops whose mean stress did not reach the preload, by cell."""
-    short = [(int(np.sum(cell.values["preload_reached"] == 0)), cell) for cell in data.cells]
-    short = [(count, cell) for count, cell in short if count]
+    short = short_of_preload(data)
     if not short:
         return ["Every loop reached its preload."]
     return [
@@ -355,7 +374,7 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
             filter(
                 None,
                 (
-                    f"H = {pair.hurst:g}, γ = {pair.lower:g} to {pair.upper:g} J/m²",
+                    f"H = {pair.hurst:g}, γ = {gamma_text(pair.lower)} to {gamma_text(pair.upper)}",
                     place(pair.others),
                 ),
             )
@@ -378,12 +397,10 @@ def _along(data: Aggregate, axis: Axis) -> list[str]:
         return []
     up = sum(bool(np.all(step > 0)) for step in steps)
     down = sum(bool(np.all(step < 0)) for step in steps)
-    mixed = len(steps) - up - down
-    parts = [
-        f"{verb} in {count}"
-        for verb, count in (("grows", up), ("falls", down), ("is not monotone", mixed))
-        if count
-    ]
+    flat = sum(bool(np.all(step == 0)) for step in steps)
+    verbs = {"grows": up, "falls": down, "stays the same": flat}
+    verbs["is not monotone"] = len(steps) - sum(verbs.values())
+    parts = [f"{verb} in {count}" for verb, count in verbs.items() if count]
     low, high = (with_unit(axis.name, end) for end in (min(axis.values), max(axis.values)))
     return [
         f"Along {axis.name} from {low} to {high} the mean loss in J/m² "
@@ -404,8 +421,8 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:
         verb = "falls with m2" if steps[0] < 0 else "grows with m2"
         if not (np.all(steps > 0) or np.all(steps < 0)):
             verb = "is not monotone in m2"
-        found.setdefault(verb, []).append(f"{gamma:g}")
-    parts = [f"{verb} at γ = {_listed(gammas, ', ')} J/m²" for verb, gammas in found.items()]
+        found.setdefault(verb, []).append(gamma_text(gamma))
+    parts = [f"{verb} at γ = {_listed(gammas, ', ')}" for verb, gammas in found.items()]
     rest = "; the paper's table is not monotone" if of_paper else ""
     what = "mean W~" if of_paper else "mean loss in J/m²"
     return [f"Through H, the {what} {', and '.join(parts)}{rest}."] if parts else []

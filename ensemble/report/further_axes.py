@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+
+import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
-from adhesis.ensemble.quantities import shown_unit
+from adhesis.ensemble.quantities import common_unit, with_unit
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
@@ -26,6 +29,7 @@ _LABELS = {
     "poisson": r"Poisson's ratio $\nu$",
     "adhesion_range": r"range of adhesion $\delta$",
     "strength": r"strength $\sigma_\mathrm{th}$",
+    "work_of_adhesion_open": r"work of adhesion of receding edges $\gamma_\mathrm{open}$",
 }
 
 
@@ -36,9 +40,18 @@ def cell_name(cell: Cell) -> str:
 
 def axis_label(axis: Axis) -> tuple[str, float]:
     """Return the label of an axis of a figure, and its unit in the SI unit."""
-    unit, size = shown_unit(axis.name, max(axis.values))
+    unit, size = common_unit(axis.name, axis.values)
     label = _LABELS.get(axis.name, axis.name)
     return (f"{label} ({unit})" if unit else label), size
+
+
+def symbols(others: Sequence[tuple[str, float]]) -> str:
+    """Return :func:`place` for figures, with symbols where a name is no word: "$h_rms$ = 2 µm"."""
+    named = []
+    for name, value in others:
+        symbol = None if name.isalpha() else re.search(r"\$.*\$", _LABELS.get(name, ""))
+        named.append(f"{symbol[0] if symbol else name} = {with_unit(name, value)}")
+    return ", ".join(named)
 
 
 def together(data: Aggregate, axis: Axis) -> set[str]:
@@ -72,13 +85,23 @@ def failed_cells(data: Aggregate) -> list[str]:
     return [cell_name(cell) for cell in data.cells if not cell.done and not cell.pending]
 
 
+def short_of_preload(data: Aggregate) -> list[tuple[int, Cell]]:
+    """Return the cells with loops that did not reach their preload, and how many these are."""
+    if data.campaign.cycle.preload is None:
+        return []
+    short = ((int(np.sum(cell.values["preload_reached"] == 0)), cell) for cell in data.cells)
+    return [(count, cell) for count, cell in short if count]
+
+
 def below(data: Aggregate, others: Sequence[tuple[str, float]]) -> str:
-    """Return what stands below a figure: what its cells have in common, and which are missing."""
+    """Return what stands below a figure: what its cells have in common, and what is amiss."""
     failed = failed_cells(data)
-    parts = [place(others)] if others else []
+    parts = [symbols(others)] if others else []
     if failed:
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         parts.append(f"missing, as all tasks failed: {failed[0]}{more}")
+    if short := sum(count for count, _ in short_of_preload(data)):
+        parts.append(f"{short} of {data.done} loops did not reach their preload")
     return "; ".join(parts)
 
 

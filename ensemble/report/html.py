@@ -80,6 +80,11 @@ def picture(png: bytes, name: str, kind: str = "") -> str:
     return f'<img {shape}alt="{escape(name)}" src="data:image/png;base64,{data}">'
 
 
+def picture_of(figure: Any) -> str:
+    """Return a figure as a picture in HTML."""
+    return picture(figure._repr_png_(), "figure")
+
+
 def table_of(rows: Iterable[tuple[str, str]]) -> str:
     """Return rows of a name and a value as a table."""
     cells = (f"<th>{escape(name)}</th><td>{escape(text)}</td>" for name, text in rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.escape import code_span, fence, markdown, printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
-from adhesis.ensemble.quantities import with_unit
+from adhesis.ensemble.quantities import in_one_unit
 from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import Illustration
 from adhesis.ensemble.report.figures.style import left_out
@@ -117,7 +117,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
 def _summary(data: Aggregate) -> str:
     sweep, cycle = data.campaign.sweep, data.campaign.cycle
     further = "".join(
-        f"{axis.name} = {', '.join(with_unit(axis.name, v) for v in sorted(axis.values))}; "
+        f"{axis.name} = {in_one_unit(axis.name, axis.values)}; "
         for axis in data.further
         if axis.name not in TURNING_POINTS
     )
@@ -127,7 +127,8 @@ def _summary(data: Aggregate) -> str:
         many = f"{min(counts)} to {max(counts)} realisations by `[stop]`"
     return (
         f"{data.done} loops of {data.done + data.failed + data.pending} tasks: "
-        f"H = {_list(sweep.hurst)}; γ = {_list(sweep.work_of_adhesion)} J/m²; {further}"
+        f"H = {in_one_unit('hurst', sweep.hurst)}; "
+        f"γ = {in_one_unit('work_of_adhesion', sweep.work_of_adhesion)}; {further}"
         f"{many}. Each loop was loaded to {findings.turning_point(data)} "
         f"in {cycle.load_steps} steps and unloaded until detached; "
         f"method `{data.campaign.solver.method}`. Numbers: `losses.csv`; curves: `curves.nc`."
@@ -209,7 +210,3 @@ def _shown(item: Illustration, data: Aggregate, of_paper: bool) -> str:
     if of_paper and item.beside_paper is not None:
         caption += f" {item.beside_paper(data if item.whole else data.shown)}"
     return f"![{title}]({item.name}.png)\n\n**{title}.** {caption} ([PDF]({item.name}.pdf))"
-
-
-def _list(values: Iterable[float]) -> str:
-    return ", ".join(f"{value:g}" for value in sorted(values))

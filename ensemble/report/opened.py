@@ -6,7 +6,6 @@ run may go on writing to it.
 
 from __future__ import annotations
 
-import io
 import warnings
 from collections.abc import Iterable, Sequence
 from functools import cached_property, partial
@@ -112,16 +111,18 @@ class CampaignResults:
 
     def _repr_html_(self) -> str:
         """Return counts, mean losses and their figure, for notebooks."""
+        from adhesis.ensemble.report.figures import along
+
         rows = [("file", str(self.path)), *((k, str(n)) for k, n in self._counts.items())]
         page = table_of([*rows, ("axes", ", ".join(self.axes))])
         if not self._counts["done"]:
             return page
-        figure: Any = self.plot.loss_against_hurst()[0].figure
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=110)
-        names = [f"loss_dimensionless_{part}" for part in ("mean", "ci_low", "ci_high")]
+        names = [f"loss_{part} [J/m^2]" for part in ("mean", "ci_low", "ci_high")]
         table: str = self.losses[names].to_html(float_format="{:.4g}".format)
-        return page + table + picture(stream.getvalue(), "losses")
+        several = along.with_figure(self.averages) if len(self.averages.hursts) == 1 else []
+        draw = partial(self.plot.loss_along, several[0].name) if several else None
+        figure: Any = (draw or self.plot.loss_against_hurst)()
+        return page + table + picture(figure._repr_png_(), "losses")
 
     @cached_property
     def averages(self) -> Aggregate:

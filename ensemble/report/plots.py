@@ -1,4 +1,4 @@
-"""The figures of the report as methods: each draws one and returns its axes."""
+"""The figures of the report as methods: each draws one and returns it."""
 
 from __future__ import annotations
 
@@ -8,33 +8,17 @@ from typing import TYPE_CHECKING
 from adhesis.ensemble.aggregate.average import Aggregate
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-class Panels(list["Axes"]):
-    """The axes of a figure, panel by panel; a notebook displays the figure."""
-
-    @property
-    def figure(self) -> Figure:
-        """The figure, with ``savefig``."""
-        found = self[0].get_figure(root=True)
-        assert found is not None
-        return found
-
-    def _repr_html_(self) -> str:
-        """Return the figure as a picture, for notebooks."""
-        from adhesis.ensemble.loop.views import picture_of
-
-        return picture_of(self.figure)
+    from adhesis.ensemble.report.figures.style import PublishedFigure
 
 
 class Plots:
     """One method for each figure of the report; docs/theory.md says what each shows.
 
-    Every method returns the figure's axes, panel by panel, which a notebook displays as the figure;
-    ``axes.figure`` is the figure, with ``savefig``. What is drawn are averages over the
-    realisations that are finished.
+    Every method returns the figure, which a notebook displays. With ``ax``, one Axes of matplotlib
+    or several, its first panels are drawn into these, and their figure is returned. What is drawn
+    are averages over the realisations that are finished.
     """
 
     def __init__(self, averages: Callable[[], Aggregate]) -> None:
@@ -44,23 +28,22 @@ class Plots:
         names = (name for name in vars(type(self)) if not name.startswith("_"))
         return f"<Plots: {', '.join(names)}>"
 
-    def _draw(self, name: str) -> Panels:
+    def _draw(self, name: str, ax: object) -> Figure:
         from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
-        from adhesis.ensemble.report.figures.style import say_below, style
+        from adhesis.ensemble.report.figures.style import drawn_into, say_below
         from adhesis.ensemble.report.further_axes import below, common
 
         modules = (loops, loss_figures, shapes_and_spectra)
-        draw: Callable[[Aggregate], Figure] = next(
+        draw: Callable[[Aggregate], PublishedFigure] = next(
             getattr(module, name) for module in modules if hasattr(module, name)
         )
-        with style():
+        with drawn_into(ax):
             shown = self._averages().shown
             figure = draw(shown)
             say_below(figure, below(shown, common(shown)))
-            figure.canvas.draw()  # the layout is found with the style's own sizes
-        return Panels(figure.axes)
+            return figure.finish()
 
-    def loss_along(self, name: str) -> Panels:
+    def loss_along(self, name: str, ax: object = None) -> Figure:
         """Loss along a further axis of the campaign ("max_penetration"), with intervals.
 
         Raises
@@ -69,70 +52,69 @@ class Plots:
             If the campaign has no such axis beside H and γ.
         """
         from adhesis.ensemble.report.figures.along import along, with_figure
-        from adhesis.ensemble.report.figures.style import style
+        from adhesis.ensemble.report.figures.style import drawn_into
 
         data = self._averages()
         axes = {axis.name: axis for axis in with_figure(data)}
         if name not in axes:
             known = ", ".join(axes) or "none"
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
-        with style():
+        with drawn_into(ax):
             figure = along(axes[name])(data)
-            figure.canvas.draw()
-        return Panels(figure.axes)
+            return figure.finish()
 
-    def contact_against_stress(self) -> Panels:
+    def contact_against_stress(self, ax: object = None) -> Figure:
         """Contact fraction against mean stress, a panel for each H."""
-        return self._draw("contact_against_stress")
+        return self._draw("contact_against_stress", ax)
 
-    def loop_against_penetration(self) -> Panels:
+    def loop_against_penetration(self, ax: object = None) -> Figure:
         """Mean stress and contact fraction against penetration, a row for each H."""
-        return self._draw("loop_against_penetration")
+        return self._draw("loop_against_penetration", ax)
 
-    def loss_against_hurst(self) -> Panels:
+    def loss_against_hurst(self, ax: object = None) -> Figure:
         """Loss against the Hurst exponent, a panel for each work of adhesion, with intervals."""
-        return self._draw("loss_against_hurst")
+        return self._draw("loss_against_hurst", ax)
 
-    def loss_against_slope(self) -> Panels:
+    def loss_against_slope(self, ax: object = None) -> Figure:
         """Loss against mean square slope, a panel for each work of adhesion, with intervals."""
-        return self._draw("loss_against_slope")
+        return self._draw("loss_against_slope", ax)
 
-    def loss_against_penetration(self) -> Panels:
+    def loss_against_penetration(self, ax: object = None) -> Figure:
         """Loss against the largest penetration, of this campaign and those beside it."""
-        return self._draw("loss_against_penetration")
+        return self._draw("loss_against_penetration", ax)
 
-    def loss_by_mechanism(self) -> Panels:
+    def loss_by_mechanism(self, ax: object = None) -> Figure:
         """Energy drops at small-scale and at large-scale jumps."""
-        return self._draw("loss_by_mechanism")
+        return self._draw("loss_by_mechanism", ax)
 
-    def jump_energies(self) -> Panels:
+    def jump_energies(self, ax: object = None) -> Figure:
         """Jumps a loop and decade of energy drop."""
-        return self._draw("jump_energies")
+        return self._draw("jump_energies", ax)
 
-    def pull_off(self) -> Panels:
+    def pull_off(self, ax: object = None) -> Figure:
         """Pull-off stress against work of adhesion, with intervals."""
-        return self._draw("pull_off")
+        return self._draw("pull_off", ax)
 
-    def shapes(self) -> Panels:
+    def shapes(self, ax: object = None) -> Figure:
         """Rigid profile and deformed surface of one realisation."""
-        return self._draw("shapes")
+        return self._draw("shapes", ax)
 
-    def spectra_of_branches(self) -> Panels:
+    def spectra_of_branches(self, ax: object = None) -> Figure:
         """Spectral density of profile and deformed surface on both branches at one state."""
-        return self._draw("spectra_of_branches")
+        return self._draw("spectra_of_branches", ax)
 
-    def spectra_on_loading(self) -> Panels:
+    def spectra_on_loading(self, ax: object = None) -> Figure:
         """Spectral density of profile and deformed surface on loading."""
-        return self._draw("spectra_on_loading")
+        return self._draw("spectra_on_loading", ax)
 
-    def spectra_on_unloading(self) -> Panels:
+    def spectra_on_unloading(self, ax: object = None) -> Figure:
         """Spectral density of profile and deformed surface on unloading."""
-        return self._draw("spectra_on_unloading")
+        return self._draw("spectra_on_unloading", ax)
 
-    def gap_density(self) -> Panels:
+    def gap_density(self, ax: object = None) -> Figure:
         """Probability density of the gap."""
-        return self._draw("gap_density")
+        return self._draw("gap_density", ax)
 
-    def height_density(self) -> Panels:
+    def height_density(self, ax: object = None) -> Figure:
         """Probability density of the heights."""
-        return self._draw("height_density")
+        return self._draw("height_density", ax)

@@ -9,7 +9,7 @@ from typing import IO
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.outputs import Writing, staged_folder
+from adhesis.ensemble.outputs import Writing, staged_folder, write_netcdf
 
 
 def write_report(
@@ -71,7 +71,7 @@ def _write_files(
     """Write all files; returns the names of the figures."""
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
-    from adhesis.ensemble.report.curves_dataset import write_curves
+    from adhesis.ensemble.report.curves_dataset import curves_dataset
     from adhesis.ensemble.report.figures.catalogue import (
         HEIGHTS,
         LOOPS,
@@ -95,7 +95,7 @@ def _write_files(
     loss_tables.paired(data).write_csv(directory / "growth.csv")
     mechanisms.jumps(data).write_csv(directory / "jumps.csv")
     works.works(data).write_csv(directory / "works.csv")
-    write_curves(data, directory / "curves.nc")
+    write_netcdf(directory / "curves.nc", curves_dataset(data))
     if data.companions:
         loss_tables.companions(data).write_csv(directory / "beside.csv")
     mechanisms.slopes(data).write_csv(directory / "slopes.csv")

@@ -20,13 +20,13 @@ import h5py
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.solver.runtime.uninterrupted import signals_held
 
-# The disk is at fault, and not the name or its permissions.
-_OF_THE_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+# The disk or a limit is at fault, and not the name or its permissions.
+_OF_THE_SYSTEM = {*(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO), errno.EMFILE, errno.ENFILE}
 
 
 def refusal(error: OSError) -> type[InputError | WriteError]:
     """Return the kind of error by which a file that cannot be written is reported."""
-    return WriteError if error.errno in _OF_THE_DISK else InputError
+    return WriteError if error.errno in _OF_THE_SYSTEM else InputError
 
 
 class DiskFile(io.RawIOBase):

@@ -28,21 +28,10 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
+from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.disk_file import opened, refusal
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results, stretches
-from adhesis.ensemble.results.schema import (
-    DAMAGED,
-    DATASETS,
-    TASK_DATASETS,
-    axis_datasets,
-    datasets,
-    description,
-    file_size,
-    fixed_attributes,
-    scales,
-    shape_of,
-)
 from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
 from adhesis.solver.runtime.uninterrupted import signals_held
@@ -71,7 +60,7 @@ def check_results_file(option: str, path: Path) -> None:
 
 def check_space(path: Path, campaign: Campaign, part: Part = WHOLE) -> None:
     """Refuse a file that the disk has no room for (InputError), before its tasks are made."""
-    needed = file_size(campaign, part)
+    needed = schema.file_size(campaign, part)
     free = shutil.disk_usage(path.parent).free
     if needed > free:
         raise InputError(
@@ -137,21 +126,21 @@ def create(
 
 
 def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
-    laid_out = scales(campaign, part)
+    laid_out = schema.scales(campaign, part)
     sizes = sizes_of(laid_out)
     for scale in laid_out:
         dataset = file.create_dataset(scale.name, data=scale.values)
         dataset.make_scale(scale.name)
-        _set_attributes(dataset, description(scale))
-    for column in datasets(campaign):
-        dataset = _allocate(file, column, shape_of(column, sizes))
-        _set_attributes(dataset, description(column))
+        _set_attributes(dataset, schema.description(scale))
+    for column in schema.datasets(campaign):
+        dataset = _allocate(file, column, schema.shape_of(column, sizes))
+        _set_attributes(dataset, schema.description(column))
         for axis, dim in enumerate(column.dims):
             dataset.dims[axis].attach_scale(file[dim])
     tasks = campaign.tasks(part)
-    for column in TASK_DATASETS:
+    for column in schema.TASK_DATASETS:
         file[column.name][...] = tasks.column(column.name)
-    for name, column in zip(tasks.names, axis_datasets(campaign), strict=True):
+    for name, column in zip(tasks.names, schema.axis_datasets(campaign), strict=True):
         file[column.name][...] = tasks.column(name)
 
 
@@ -178,7 +167,7 @@ def _describe(
 ) -> None:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     attributes: dict[str, Any] = {
-        **fixed_attributes(campaign, part),
+        **schema.fixed_attributes(campaign, part),
         "created": now if old is None else old.attributes.get("created", now),
         "laid_out": now,
         **versions,
@@ -195,12 +184,12 @@ def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) ->
     """Copy every row but those that are damaged: in the new file they are pending."""
     place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks(part))}
     target = np.array([place[old.campaign.identity(task)] for task in old.tasks()], np.intp)
-    sound = old.status() != DAMAGED
+    sound = old.status() != schema.DAMAGED
     # A task that kept its fields does so in the grown campaign: realisations are only added.
     of_kept = old.column(KEPT)
     kept = np.searchsorted(file[KEPT][:], target[of_kept])
-    for column in DATASETS:
-        if column in TASK_DATASETS:
+    for column in schema.DATASETS:
+        if column in schema.TASK_DATASETS:
             continue
         dataset = file[column.name]
         targets = kept if column.dims[0] == KEPT else target

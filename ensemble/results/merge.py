@@ -20,20 +20,10 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import (
-    DAMAGED,
-    DATASETS,
-    DONE,
-    FAILED,
-    PENDING,
-    STATUS,
-    TASK_DATASETS,
-    kept_rows,
-    same_rows,
-)
 from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.ensemble.task.row import RESULT_DATASETS
@@ -50,7 +40,9 @@ _COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
 _NOT_VERSIONS = frozenset(
     ("file_type", "file_version", "Conventions", "title", "campaign", "seed", "created", "laid_out")
 ) | {"part"}
-_COPIED = tuple(d for d in DATASETS if d not in TASK_DATASETS and d is not STATUS)
+_COPIED = tuple(
+    d for d in schema.DATASETS if d not in schema.TASK_DATASETS and d is not schema.STATUS
+)
 
 
 @dataclass(frozen=True)
@@ -135,22 +127,18 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         doubts = [doubt for file in opened for doubt in file.doubts()]
         sources = _assign(opened, campaign, status, there)
         if there is None:
-            create(out, campaign, versions=_versions(opened[0]))
+            known = opened[0].attributes.items()
+            create(out, campaign, versions={k: v for k, v in known if k not in _NOT_VERSIONS})
         else:
             there.close()
         _copy(sources, out)
     return Merged(
         total=status.size,
-        done=int(np.sum(status == DONE)),
-        failed=int(np.sum(status == FAILED)),
+        done=int(np.sum(status == schema.DONE)),
+        failed=int(np.sum(status == schema.FAILED)),
         taken=sum(int(source.taken.sum()) for source in sources),
         doubts=tuple(doubts),
     )
-
-
-def _versions(results: Results) -> dict[str, str]:
-    """Return what computed a file, of its root attributes."""
-    return {k: v for k, v in results.attributes.items() if k not in _NOT_VERSIONS}
 
 
 def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
@@ -161,7 +149,7 @@ def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
             f"{part.path} holds another campaign than {of}: {'; '.join(difference.other)} "
             f"(here: {of}, there: {part.path})"
         )
-    if not same_rows(part.campaign, campaign):
+    if not schema.same_rows(part.campaign, campaign):
         raise InputError(
             f"{part.path} cannot be merged into {of}: the bins of its spectra differ (they follow "
             "the highest n0 · ratio of the campaign)"
@@ -173,23 +161,25 @@ def _assign(
 ) -> list[_Source]:
     """Decide which file gives which row; ``status`` becomes that of the merged file."""
     place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks())}
-    kept = kept_rows(campaign)
+    kept = schema.kept_rows(campaign)
     sources: list[_Source] = []
     giver = np.full(status.size, -1)  # source of each row that is not there yet
     for part in opened:
         target = np.array([place[part.campaign.identity(t)] for t in part.tasks()], np.intp)
         own = part.status()
         rows = part.column(KEPT)
-        source = _Source(part, target, np.searchsorted(kept, target[rows]), rows, own == DONE)
-        for row in np.flatnonzero((own == DONE) & (status[target] == DONE)).tolist():
+        source = _Source(
+            part, target, np.searchsorted(kept, target[rows]), rows, own == schema.DONE
+        )
+        for row in np.flatnonzero((own == schema.DONE) & (status[target] == schema.DONE)).tolist():
             other = giver[target[row]]
             if other >= 0:
                 _compare(source, row, sources[other].results, sources[other].row_of(target[row]))
             elif there is not None:
                 _compare(source, row, there, int(target[row]))
         # A row that failed elsewhere, in time or place, gives way to one that did not.
-        better = (own == DONE) & (status[target] != DONE)
-        better |= (own == FAILED) & np.isin(status[target], (PENDING, DAMAGED))
+        better = (own == schema.DONE) & (status[target] != schema.DONE)
+        better |= (own == schema.FAILED) & np.isin(status[target], (schema.PENDING, schema.DAMAGED))
         for row in np.flatnonzero(better & (giver[target] >= 0)).tolist():
             loser = sources[giver[target[row]]]
             loser.taken[loser.row_of(target[row])] = False
@@ -232,7 +222,7 @@ def _copy(sources: Sequence[_Source], out: Path) -> None:
                             _copy_dataset(sources, file, dataset, first, stop)
                     file.flush()
                     disk.check()
-                    _copy_dataset(sources, file, STATUS, first, stop)
+                    _copy_dataset(sources, file, schema.STATUS, first, stop)
                     file.flush()
                     disk.check()
     except OSError as error:

@@ -15,29 +15,10 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, lack
+from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import check_head
-from adhesis.ensemble.results.schema import (
-    CHECKSUM,
-    DAMAGED,
-    DATASETS,
-    DONE,
-    NOT_NEEDED,
-    ORIGIN,
-    PENDING,
-    ROOT_ATTRIBUTES,
-    STATUS,
-    TASK_DATASETS,
-    axis_datasets,
-    check_version,
-    datasets,
-    description,
-    file_size,
-    fixed_attributes,
-    scales,
-    shape_of,
-)
 from adhesis.ensemble.task.dataset import KEPT, sizes_of
 from adhesis.solver.checks import shown
 
@@ -97,12 +78,12 @@ class Results:
                 self._check_members()
                 self._check_size()
                 self.attributes = self._root_attributes()
-                check_version(
+                schema.check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
                 self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
-                self._datasets = datasets(self.campaign)
+                self._datasets = schema.datasets(self.campaign)
                 self._check_layout()
                 self._check_attributes()
                 self._check_scales()
@@ -117,7 +98,7 @@ class Results:
         HDF5 keeps texts beside the datasets, with no limit to their length.
         """
         size = os.path.getsize(self.path)
-        rows = (self._file[d.name] for d in DATASETS if d.name in self._file)
+        rows = (self._file[d.name] for d in schema.DATASETS if d.name in self._file)
         held = sum(min(size, dataset.id.get_storage_size()) for dataset in rows)
         if size - held > _MOST_BESIDES + held:
             raise InputError(
@@ -139,7 +120,7 @@ class Results:
 
     def _root_attributes(self) -> dict[str, Any]:
         found = {}
-        for name in ROOT_ATTRIBUTES:
+        for name in schema.ROOT_ATTRIBUTES:
             if name not in self._file.attrs:
                 continue
             if self._file.attrs.get_id(name).get_storage_size() > _LONGEST_ATTRIBUTE:
@@ -152,14 +133,22 @@ class Results:
 
     def _check_layout(self) -> None:
         """Compare shapes and types with those of the campaign, before anything of them is read."""
-        if file_size(self.campaign, self.part) > os.path.getsize(self.path):
+        missing = [column.name for column in self._datasets if column.name not in self._file]
+        if missing:
+            raise InputError(
+                f"{self.path} was written by another state of adhesis, without {missing[0]}: read "
+                "it with that one, or compute the campaign again into another file"
+            )
+        if schema.file_size(self.campaign, self.part) > os.path.getsize(self.path):
             raise ValueError("truncated")
-        wanted = scales(self.campaign, self.part)
+        wanted = schema.scales(self.campaign, self.part)
         self._sizes = sizes_of(wanted)
         for scale in wanted:
             self._check_dataset(scale.name, scale.values.shape, scale.values.dtype)
         for column in self._datasets:
-            self._check_dataset(column.name, shape_of(column, self._sizes), np.dtype(column.dtype))
+            self._check_dataset(
+                column.name, schema.shape_of(column, self._sizes), np.dtype(column.dtype)
+            )
 
     def _check_dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
         found = self._file[name]
@@ -173,16 +162,18 @@ class Results:
 
         Readers of other programs go by them: by a seed, a unit, or a factor of a dataset.
         """
-        for name, value in ({"part": None} | fixed_attributes(self.campaign, self.part)).items():
+        for name, value in (
+            {"part": None} | schema.fixed_attributes(self.campaign, self.part)
+        ).items():
             found: Any = self.attributes.get(name)
             if name not in _WORDING and not np.array_equal(found, value):
                 raise InputError(
                     f"{self.path} is damaged: its attribute {name} is {shown(found)}, and that of "
                     f"its campaign is {shown(value)}; {_INSTEAD}"
                 )
-        wanted = {s.name: description(s) for s in scales(self.campaign, self.part)}
+        wanted = {s.name: schema.description(s) for s in schema.scales(self.campaign, self.part)}
         for column in self._datasets:
-            wanted[column.name] = description(column)
+            wanted[column.name] = schema.description(column)
             of_dims = [[scale.name for scale in d.values()] for d in self._file[column.name].dims]
             if of_dims != [[f"/{name}"] for name in column.dims]:
                 raise ValueError(column.name)
@@ -196,7 +187,7 @@ class Results:
 
     def _check_scales(self) -> None:
         """Compare the dimension scales with the campaign."""
-        for scale in scales(self.campaign, self.part):
+        for scale in schema.scales(self.campaign, self.part):
             found = self._file[scale.name][:]
             if not np.allclose(found, scale.values, rtol=_SCALE_ROUNDING, atol=0.0):
                 raise InputError(
@@ -207,8 +198,8 @@ class Results:
     def _checked_tasks(self) -> Tasks:
         """Return the tasks of the campaign, which those of the file must be."""
         tasks = self.campaign.tasks(self.part)
-        columns = [(d.name, d.name) for d in TASK_DATASETS]
-        further = zip(axis_datasets(self.campaign), tasks.names, strict=True)
+        columns = [(d.name, d.name) for d in schema.TASK_DATASETS]
+        further = zip(schema.axis_datasets(self.campaign), tasks.names, strict=True)
         columns += [(dataset.name, axis) for dataset, axis in further]
         for name, axis in columns:
             found, wanted = self._file[name][:], tasks.column(axis)
@@ -234,16 +225,6 @@ class Results:
     def __len__(self) -> int:
         """Number of tasks."""
         return int(self._file["task"].shape[0])
-
-    @property
-    def loading_penetration(self) -> NDArray[np.float64]:
-        """Δ/h_max of the loading curves."""
-        return self.column("loading_penetration")
-
-    @property
-    def unloading_penetration(self) -> NDArray[np.float64]:
-        """Δ/h_max of the unloading curves, descending."""
-        return self.column("unloading_penetration")
 
     def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Return a dataset, or some rows of it.
@@ -275,7 +256,7 @@ class Results:
 
     def damaged(self) -> NDArray[np.intp]:
         """Return the rows that are damaged."""
-        return np.flatnonzero(self.status() == DAMAGED)
+        return np.flatnonzero(self.status() == schema.DAMAGED)
 
     def damage(self) -> str:
         """Return the sentence that names the damaged rows; empty without any."""
@@ -287,8 +268,8 @@ class Results:
 
         A text is empty where a program other than a run has written rows.
         """
-        done = np.flatnonzero(self.status() == DONE)
-        names, counts = np.unique(self.column(ORIGIN.name)[done], return_counts=True)
+        done = np.flatnonzero(self.status() == schema.DONE)
+        names, counts = np.unique(self.column(schema.ORIGIN.name)[done], return_counts=True)
         texts = (name.decode("utf-8", "replace") for name in names.tolist())
         return dict(zip(texts, counts.tolist(), strict=True))
 
@@ -302,24 +283,24 @@ class Results:
         return tuple(out)
 
     def _checked_status(self) -> NDArray[np.uint8]:
-        status = self.column(STATUS.name)
-        suspects = np.flatnonzero(status != PENDING)
+        status = self.column(schema.STATUS.name)
+        suspects = np.flatnonzero(status != schema.PENDING)
         suspects = suspects[self._differ(suspects, status[suspects])]
         # A row that a run empties and computes again at this moment looks damaged, once.
         for _ in range(_LOOKS):
             if not suspects.size:
                 break
-            status[suspects] = self.column(STATUS.name, suspects)
-            suspects = suspects[status[suspects] != PENDING]
+            status[suspects] = self.column(schema.STATUS.name, suspects)
+            suspects = suspects[status[suspects] != schema.PENDING]
             suspects = suspects[self._differ(suspects, status[suspects])]
-        status[suspects] = DAMAGED
+        status[suspects] = schema.DAMAGED
         return status
 
     def _differ(self, rows: NDArray[np.intp], status: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Whether rows that are not pending cannot be what was written."""
-        written = self.column(CHECKSUM.name, rows)
+        written = self.column(schema.CHECKSUM.name, rows)
         held = row_checksums(self.column, self._sizes, self.column(KEPT), rows)
-        return np.asarray((status > NOT_NEEDED) | (written != held))
+        return np.asarray((status > schema.NOT_NEEDED) | (written != held))
 
     def tasks(self) -> Tasks:
         """Return every task, row by row."""
@@ -372,6 +353,8 @@ def _damage(path: Path) -> Iterator[None]:
     except PermissionError as error:
         raise InputError(f"{path} cannot be read: permission denied") from error
     except Exception as error:  # h5py raises nearly every kind over damaged bytes
+        if isinstance(error, OSError) and lack(error):
+            raise  # too many open files, say: nothing is wrong with this one
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
             raise InputError(f"{path} cannot be read: {os.strerror(error.errno)}") from error
         raise InputError(

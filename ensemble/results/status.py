@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -118,10 +118,13 @@ def read_status(path: Path | str) -> dict[str, Any]:
     }
 
 
-def named(column: Mapping[str, NDArray[Any]], rows: NDArray[np.intp]) -> list[dict[str, Any]]:
-    """Return row number and task of some rows."""
+def named(
+    column: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], *further: str
+) -> list[dict[str, Any]]:
+    """Return row number and task of some rows, and further numbers; None where not finite."""
     return [
-        {"row": row, **{name: column[name][row].item() for name in _TASK}} for row in rows.tolist()
+        {"row": row, **{name: finite(column[name][row].item()) for name in (*_TASK, *further)}}
+        for row in rows.tolist()
     ]
 
 
@@ -130,16 +133,7 @@ def _doubtful(
 ) -> list[dict[str, Any]]:
     rows = np.flatnonzero(doubtful(column, accuracy) & (state == DONE))
     rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
-    return [
-        {
-            "row": row,
-            **{
-                name: column[name][row].item()
-                for name in (*_TASK, "loss", "audit_residual", "loss_error")
-            },
-        }
-        for row in rows.tolist()
-    ]
+    return named(column, rows, "loss", "audit_residual", "loss_error")
 
 
 def _beyond_limit(
@@ -147,15 +141,7 @@ def _beyond_limit(
 ) -> list[dict[str, Any]]:
     rows = np.flatnonzero(beyond_zero_range(column) & (state == DONE))
     least = least_range(*(column[name][rows] for name in _RANGES))
-    rows = rows[np.argsort(least, kind="stable")]
-    return [
-        {
-            "row": row,
-            **{name: column[name][row].item() for name in (*_TASK, "loss")},
-            **{name: finite(column[name][row].item()) for name in _RANGES},
-        }
-        for row in rows.tolist()
-    ]
+    return named(column, rows[np.argsort(least, kind="stable")], "loss", *_RANGES)
 
 
 def _times(times: NDArray[np.float64]) -> dict[str, float]:
@@ -177,48 +163,38 @@ def _groups(
         np.stack([column[name] for name in axes]), axis=1, return_inverse=True
     )
     group_of = group_of.ravel()
-    size = points.shape[1]
-    done = state == DONE
     count = {
-        name: np.bincount(group_of[state == code], minlength=size) for name, code in _CODES.items()
+        name: np.bincount(group_of[state == code], minlength=points.shape[1])
+        for name, code in _CODES.items()
     }
-
-    rows = np.flatnonzero(done)
+    rows = np.flatnonzero(state == DONE)
     rows = rows[np.argsort(group_of[rows], kind="stable")]
-    rows_of = np.split(rows, np.cumsum(count["done"])[:-1])
-
-    def known(rows: NDArray[np.intp], finished: bool) -> dict[str, Any]:
-        """Return the precision of the steered quantity of a cell, and the wanted one."""
-        if stop.relative_error is None:
-            return {}
-        values = column[stop.quantity][rows]
-        now = precision(values, stop.relative_error, stop.quantity, finished=finished)
-        return {
-            "quantity": now.quantity,
-            "relative_error": finite(now.relative_error),
-            "interval_low": finite(now.low),
-            "interval_high": finite(now.high),
-            "wanted_relative_error": now.wanted,
-            "met": now.met,
-            "precision": str(now),
-        }
-
     groups = []
-    for i, rows in enumerate(rows_of):
-        values = np.array([column[name][rows] for name in _AVERAGED])
+    for i, rows_of in enumerate(np.split(rows, np.cumsum(count["done"])[:-1])):
+        values = np.array([column[name][rows_of] for name in _AVERAGED])
         seconds, loss, scaled = estimates(values, with_interval=False)
-        groups.append(
-            {
-                **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
-                **{name: int(cells[i]) for name, cells in count.items()},
-                "mean_seconds": finite(seconds.mean),
-                "loss": finite(loss.mean),
-                "loss_standard_error": finite(loss.sem),
-                "loss_dimensionless": finite(scaled.mean),
-                "loss_dimensionless_standard_error": finite(scaled.sem),
-                **known(rows, not count["pending"][i]),
+        group: dict[str, Any] = {
+            **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
+            **{name: int(cells[i]) for name, cells in count.items()},
+            "mean_seconds": finite(seconds.mean),
+            "loss": finite(loss.mean),
+            "loss_standard_error": finite(loss.sem),
+            "loss_dimensionless": finite(scaled.mean),
+            "loss_dimensionless_standard_error": finite(scaled.sem),
+        }
+        if stop.relative_error is not None:
+            steered, finished = column[stop.quantity][rows_of], not count["pending"][i]
+            now = precision(steered, stop.relative_error, stop.quantity, finished=finished)
+            group |= {
+                "quantity": now.quantity,
+                "relative_error": finite(now.relative_error),
+                "interval_low": finite(now.estimate.low),
+                "interval_high": finite(now.estimate.high),
+                "wanted_relative_error": now.wanted,
+                "met": now.met,
+                "precision": str(now),
             }
-        )
+        groups.append(group)
     return groups
 
 
@@ -240,7 +216,11 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         )
     groups = status["groups"]
     if len(groups) <= _MOST_GROUPS_SHOWN:
-        further = {name: _heading(name, status["axis_units"][name]) for name in status["axes"][2:]}
+        units = status["axis_units"]
+        further = {
+            name: name if units[name] == "1" else f"{name} in {AXIS_UNITS[units[name]]}"
+            for name in status["axes"][2:]
+        }
         names = "".join(f"{heading}  " for heading in further.values())
         loss = "loss W~ ± standard error of the mean"
         lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  {loss}"]
@@ -252,17 +232,16 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if status["damaged"]:
         lines += ["", *damage_lines(status["damaged"])]
     if status["doubtful"]:
-        lines += ["", *_doubt_lines(status["doubtful"])]
+        why = "by their own account less accurate than asked for"
+        lines += ["", f"{len(status['doubtful'])} losses are doubtful: {why}"]
+        lines += _listed(status["doubtful"], _errors_of)
     if status["beyond_limit"]:
-        lines += ["", *_limit_lines(status["beyond_limit"], status["opens"])]
+        why = why_beyond(status["opens"])
+        lines += ["", f"{len(status['beyond_limit'])} losses are doubtful: {why}"]
+        lines += _listed(status["beyond_limit"], _range_of)
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"])]
     return printable("\n".join(lines))
-
-
-def _heading(name: str, unit: str) -> str:
-    """Return "max_stress in Pa", or the name alone of a dimensionless key."""
-    return name if unit == "1" else f"{name} in {AXIS_UNITS[unit]}"
 
 
 def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
@@ -283,62 +262,48 @@ def _loss(loss: float, error: float | None) -> str:
     return f"{loss:.4g}" if error is None else with_error(loss, error, 0.0)
 
 
-def _task(row: Mapping[str, Any]) -> str:
-    return (
-        f"row {row['row']}: H = {row['hurst']:g}, γ = {row['work_of_adhesion']:g} J/m², "
-        f"realisation {row['realisation']}, seed {row['seed']}"
-    )
-
-
-def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
+def _listed(
+    rows: Sequence[Mapping[str, Any]], about: Callable[[Mapping[str, Any]], str] = lambda row: ""
+) -> list[str]:
+    """Return a line for each of the first rows, and how many more there are."""
     lines = [
-        f"{len(doubts)} losses are doubtful: by their own account less accurate than asked for"
+        f"  row {row['row']}: H = {row['hurst']:g}, γ = {row['work_of_adhesion']:g} J/m², "
+        f"realisation {row['realisation']}, seed {row['seed']}{about(row)}"
+        for row in rows[:_MOST_FAILURES_SHOWN]
     ]
-    for d in doubts[:_MOST_FAILURES_SHOWN]:
-        lines.append(
-            f"  {_task(d)}: audit residual {percent(d['audit_residual'])}, "
-            f"estimated error {percent(d['loss_error'] / (abs(d['loss']) or 1))}"
-        )
-    if len(doubts) > _MOST_FAILURES_SHOWN:
-        lines.append(f"  … and {len(doubts) - _MOST_FAILURES_SHOWN} more (--json lists all)")
-    return lines
-
-
-def _limit_lines(rows: list[dict[str, Any]], opens: bool) -> list[str]:
-    lines = [f"{len(rows)} losses are doubtful: {why_beyond(opens)}"]
-    for d in rows[:_MOST_FAILURES_SHOWN]:
-        known = {name: d[name] for name in _RANGES if d[name] is not None}
-        least = min(known, key=lambda name: known[name]) if known else None
-        shown = "range unknown" if least is None else f"{least} {known[least]:.2g} m"
-        lines.append(f"  {_task(d)}: {shown}, loss {d['loss']:.3g} J/m²")
     if len(rows) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(rows) - _MOST_FAILURES_SHOWN} more (--json lists all)")
     return lines
 
 
+def _errors_of(row: Mapping[str, Any]) -> str:
+    share = row["loss_error"] / (abs(row["loss"]) or 1)
+    return f": audit residual {percent(row['audit_residual'])}, estimated error {percent(share)}"
+
+
+def _range_of(row: Mapping[str, Any]) -> str:
+    known = {name: row[name] for name in _RANGES if row[name] is not None}
+    least = min(known, key=lambda name: known[name]) if known else None
+    shown = "range unknown" if least is None else f"{least} {known[least]:.2g} m"
+    return f": {shown}, loss {row['loss']:.3g} J/m²"
+
+
 def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the damaged rows as lines for people, and what is to be done."""
-    rows = named_rows([d["row"] for d in damaged])
-    lines = [f"damaged: {rows}; damaged rows are not used"]
-    for d in damaged[:_MOST_FAILURES_SHOWN]:
-        lines.append(f"  {_task(d)}")
-    if len(damaged) > _MOST_FAILURES_SHOWN:
-        lines.append(f"  … and {len(damaged) - _MOST_FAILURES_SHOWN} more (--json lists all)")
-    lines.append("again: adhesis run CAMPAIGN.toml computes damaged rows as if they were pending")
-    return lines
+    return [
+        f"damaged: {named_rows([d['row'] for d in damaged])}; damaged rows are not used",
+        *_listed(damaged),
+        "again: adhesis run CAMPAIGN.toml computes damaged rows as if they were pending",
+    ]
 
 
 def _failure_lines(failures: list[dict[str, Any]]) -> list[str]:
-    lines = [
-        f"failed {count}×: {error}"
-        for error, count in Counter(f["error"] for f in failures).most_common(5)
+    errors = [f["error"] for f in failures]
+    return [
+        *(f"failed {count}×: {error}" for error, count in Counter(errors).most_common(5)),
+        *_listed(failures, lambda row: f", after {row['seconds']:.3g} s"),
+        advice_on_failures(errors),
     ]
-    for f in failures[:_MOST_FAILURES_SHOWN]:
-        lines.append(f"  {_task(f)}, after {f['seconds']:.3g} s")
-    if len(failures) > _MOST_FAILURES_SHOWN:
-        lines.append(f"  … and {len(failures) - _MOST_FAILURES_SHOWN} more (--json lists all)")
-    lines.append(advice_on_failures([f["error"] for f in failures]))
-    return lines
 
 
 def advice_on_failures(errors: Sequence[str]) -> str:

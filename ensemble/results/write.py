@@ -18,29 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.errors import WriteError
+from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
 from adhesis.ensemble.results.disk_file import DiskFile
-from adhesis.ensemble.results.schema import (
-    CHECKSUM,
-    DATASETS,
-    DONE,
-    FAILED,
-    NOT_NEEDED,
-    ORIGIN,
-    ORIGIN_LENGTH,
-    PENDING,
-    STATUS,
-    TASK_DATASETS,
-    encode_text,
-)
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row
 from adhesis.solver.runtime.uninterrupted import signals_held
 
-_KEPT_NAMES = frozenset(d.name for d in DATASETS if d.dims[0] == KEPT)
+_KEPT_NAMES = frozenset(d.name for d in schema.DATASETS if d.dims[0] == KEPT)
 _NAMES = frozenset(d.name for d in RESULT_DATASETS)
 # What a row holds beside the task itself, its status and its checksum.
-_CONTENT = tuple(d for d in DATASETS if d not in (*TASK_DATASETS, STATUS, CHECKSUM))
+_CONTENT = tuple(
+    d for d in schema.DATASETS if d not in (*schema.TASK_DATASETS, schema.STATUS, schema.CHECKSUM)
+)
 
 # Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
 _LONGEST_NAME = 200
@@ -77,7 +67,7 @@ class Writer:
             else:
                 name = self._names.enter_context(_short_name(self.path))
                 self._file = h5py.File(name, "r+", driver="mpio", comm=comm)
-            self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
+            self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in schema.DATASETS}
             self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
         self._origin = origin
 
@@ -116,20 +106,20 @@ class Writer:
         wanted = _NAMES if row in self._kept else _NAMES - _KEPT_NAMES
         if wanted - result.keys() or result.keys() - _NAMES:
             raise ValueError(f"a row of {sorted(result)} where {sorted(wanted)} is wanted")
-        self._write(row, {**result, "rank": rank, **self._origin_of(rank)}, DONE)
+        self._write(row, {**result, "rank": rank, **self._origin_of(rank)}, schema.DONE)
 
     def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> None:
         """Write the row of a task that failed: why, after how many seconds; its status last."""
-        values = {"error": encode_text(error), "wall_time": wall_time, "rank": rank}
-        self._write(row, values | self._origin_of(rank), FAILED)
+        values = {"error": schema.encode_text(error), "wall_time": wall_time, "rank": rank}
+        self._write(row, values | self._origin_of(rank), schema.FAILED)
 
     def reset(self, rows: Sequence[int]) -> None:
         """Make rows pending again; what they held is lost."""
-        cleared = (*_CONTENT, CHECKSUM)
+        cleared = (*_CONTENT, schema.CHECKSUM)
         for row in rows:
             with self._writing(row):
                 # First the status: a row that is being emptied must not be taken for a whole one.
-                self._write_status(row, PENDING)
+                self._write_status(row, schema.PENDING)
                 self.flush()
                 for dataset in cleared:
                     place = self._place(dataset.name, row)
@@ -143,9 +133,9 @@ class Writer:
         for row in rows:
             if needed:
                 with self._writing(row):
-                    self._write_status(row, PENDING)
+                    self._write_status(row, schema.PENDING)
             else:
-                self._write(row, {}, NOT_NEEDED)
+                self._write(row, {}, schema.NOT_NEEDED)
         self.flush()
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
@@ -154,7 +144,7 @@ class Writer:
         All of a row is written: a run that was killed may have left a part of it.
         """
         with self._writing(row):
-            blocks = {STATUS.name: self._datasets[STATUS.name].block(status)}
+            blocks = {schema.STATUS.name: self._datasets[schema.STATUS.name].block(status)}
             for dataset in _CONTENT:
                 name, place = dataset.name, self._place(dataset.name, row)
                 if place is not None:
@@ -166,18 +156,18 @@ class Writer:
                     rows_of.write(place, blocks[name])
             covered = (d.name for d in (*OF_TASKS, *OF_KEPT))
             parts = (blocks[name] for name in covered if name in blocks)
-            rows_of = self._datasets[CHECKSUM.name]
+            rows_of = self._datasets[schema.CHECKSUM.name]
             rows_of.write(row, rows_of.block(checksum(parts)))
             self.flush()
-            self._datasets[STATUS.name].write(row, blocks[STATUS.name])
+            self._datasets[schema.STATUS.name].write(row, blocks[schema.STATUS.name])
             self.flush()
 
     def _write_status(self, row: int, status: int) -> None:
-        rows_of = self._datasets[STATUS.name]
+        rows_of = self._datasets[schema.STATUS.name]
         rows_of.write(row, rows_of.block(status))
 
     def _origin_of(self, rank: int) -> dict[str, bytes]:
-        return {ORIGIN.name: encode_text(self._origin(rank), ORIGIN_LENGTH)}
+        return {schema.ORIGIN.name: schema.encode_text(self._origin(rank), schema.ORIGIN_LENGTH)}
 
     def _place(self, name: str, row: int) -> int | None:
         """Return the place of the row of a task in a dataset; None where it has none."""

@@ -41,7 +41,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from adhesis.ensemble.run.attempt import Compute, GivenUp, Outcome, attempt
@@ -117,6 +117,7 @@ class Limits:
     report_interval: float = REPORT_INTERVAL
 
 
+@dataclass(eq=False)
 class Master:
     """Master of a hand-out; see the module.
 
@@ -141,38 +142,28 @@ class Master:
         Last note of each task that is handed out and not answered; None before the first.
     """
 
-    def __init__(
-        self,
-        channel: Channel,
-        schedule: Schedule,
-        group_of: Mapping[int, Hashable],
-        collect: Collect,
-        limits: Limits,
-        tick: Callable[[], None] = lambda: None,
-        clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
-        units: Units | None = None,
-    ) -> None:
-        self._channel = channel
-        self._units = units or Units()
-        self._schedule = schedule
-        self._group_of = group_of
-        self._collect = collect
-        self._limits = limits
-        self._tick = tick
-        self._clock = clock
-        self._sleep = sleep
+    channel: Channel
+    schedule: Schedule
+    group_of: Mapping[int, Hashable]
+    collect: Collect
+    limits: Limits
+    tick: Callable[[], None] = lambda: None
+    clock: Callable[[], float] = time.monotonic
+    sleep: Callable[[float], None] = time.sleep
+    units: Units = field(default_factory=Units)
+
+    def __post_init__(self) -> None:
         self.notes: dict[int, Any] = {}
         # Of each worker, the tasks that it was sent and has not answered, with the mean times of
         # their groups: nothing is queued behind a task of a group that was not measured.
-        self._sent: dict[int, dict[int, float]] = {rank: {} for rank in channel.workers}
+        self._sent: dict[int, dict[int, float]] = {rank: {} for rank in self.channel.workers}
         # Workers that may have room, the emptiest first (entries go stale).
         self._room = [(0, rank) for rank in self._sent]
         self._halted: float | None = None
         self._reason: str | None = None
         self._dismissed = False
         # Time that the master was awake, and when each worker was last heard from by that clock.
-        self._awake, self._looked, self._next_count = 0.0, clock(), 0.0
+        self._awake, self._looked, self._next_count = 0.0, self.clock(), 0.0
         self._heard = dict.fromkeys(self._sent, 0.0)
 
     @property
@@ -200,46 +191,46 @@ class Master:
             self._consider_stopping()
             message = self._look()
             if message is None:
-                self._tick()
-                self._sleep(pause)
+                self.tick()
+                self.sleep(pause)
                 pause = min(1.5 * pause, LONGEST_PAUSE)
             else:
                 pause = SHORTEST_PAUSE
                 self._receive(*message)
         self._dismiss()
-        if self._reason is None and self._schedule.waiting:
+        if self._reason is None and self.schedule.waiting:
             return "no time left for another task"
         return self._reason
 
     def _look(self) -> tuple[int, Message] | None:
         """Return the next message; if there is none, look for workers that are silent."""
-        message = self._channel.poll()
-        now = self._clock()
+        message = self.channel.poll()
+        now = self.clock()
         self._awake += min(now - self._looked, _LONGEST_LOOK)
         self._looked = now
         if message is not None:
             self._heard[message[0]] = self._awake
         elif self._awake > self._next_count:
-            self._next_count = self._awake + self._limits.silence / 12
+            self._next_count = self._awake + self.limits.silence / 12
             for rank, heard in self._heard.items():
-                if self._awake - heard > self._limits.silence:
+                if self._awake - heard > self.limits.silence:
                     raise Unresponsive(
-                        f"rank {rank} has not answered for {self._limits.silence:g} s"
+                        f"rank {rank} has not answered for {self.limits.silence:g} s"
                     )
         return message
 
     def _consider_stopping(self) -> None:
         if self._halted is not None:
-            if self._clock() - self._halted > self._limits.grace:
+            if self.clock() - self._halted > self.limits.grace:
                 raise Unresponsive(f"{self.in_flight} tasks did not stop in time ({self._reason})")
-        elif (reason := self._limits.stop()) is not None:
+        elif (reason := self.limits.stop()) is not None:
             self._halt(reason)
 
     def _halt(self, reason: str) -> None:
         if self._halted is None:
-            self._halted, self._reason = self._clock(), reason
+            self._halted, self._reason = self.clock(), reason
             for rank in self._sent:
-                self._channel.send(rank, ("halt",), urgent=True)
+                self.channel.send(rank, ("halt",), urgent=True)
 
     def _receive(self, rank: int, message: Message) -> None:
         kind, *content = message
@@ -250,7 +241,7 @@ class Master:
         elif kind == "stop":
             self._halt(content[0])
         elif kind == "given up":
-            self._units.answered(content[0], None)
+            self.units.answered(content[0], None)
             self._answered(rank, content[0])
             self._hand_out()
         elif kind == "ended":
@@ -262,10 +253,10 @@ class Master:
     def _finish(self, rank: int, outcome: Outcome) -> None:
         self._answered(rank, outcome.task)
         seconds = outcome.seconds if outcome.error is None else None
-        if done := self._units.answered(outcome.task, seconds):
-            self._schedule.measured(self._group_of[done[0]], done[1])
+        if done := self.units.answered(outcome.task, seconds):
+            self.schedule.measured(self.group_of[done[0]], done[1])
         self._hand_out()
-        self._collect(outcome)
+        self.collect(outcome)
         self._hand_out()  # what was collected may have brought further tasks
 
     def _answered(self, rank: int, task: int) -> None:
@@ -277,21 +268,21 @@ class Master:
         """Give every worker that has room a task, while there are any; the emptiest goes first."""
         if self._dismissed:
             return
-        while self._room and self._halted is None and self._schedule.waiting:
+        while self._room and self._halted is None and self.schedule.waiting:
             load, rank = self._room[0]
             sent = self._sent[rank]
             if len(sent) != load or not self._has_room(sent):
                 heapq.heappop(self._room)
                 continue
-            first = self._schedule.take(self._limits.time_left())
+            first = self.schedule.take(self.limits.time_left())
             if first is None:
                 return
-            seconds = self._schedule.mean(self._group_of[first])
-            tasks = self._units.tasks(first)
+            seconds = self.schedule.mean(self.group_of[first])
+            tasks = self.units.tasks(first)
             for task in tasks:
                 sent[task] = math.inf if seconds is None else seconds / len(tasks)
                 self.notes[task] = None
-                self._channel.send(rank, ("task", task))
+                self.channel.send(rank, ("task", task))
             heapq.heapreplace(self._room, (len(sent), rank))
 
     @staticmethod
@@ -301,22 +292,23 @@ class Master:
     def _dismiss(self) -> None:
         self._dismissed = True
         for rank in self._sent:
-            self._channel.send(rank, ("dismissed",))
-        waiting, end = set(self._sent), self._clock() + self._limits.grace
+            self.channel.send(rank, ("dismissed",))
+        waiting, end = set(self._sent), self.clock() + self.limits.grace
         while waiting:
             message = self._look()
             if message is None:
-                if self._clock() > end:  # what has no task answers at once, or hangs
+                if self.clock() > end:  # what has no task answers at once, or hangs
                     names = ", ".join(map(str, sorted(waiting)))
                     raise Unresponsive(f"rank {names} did not answer at the end")
-                self._sleep(SHORTEST_PAUSE)
+                self.sleep(SHORTEST_PAUSE)
             elif message[1][0] in ("goodbye", "ended"):
                 waiting.discard(message[0])
                 self._heard.pop(message[0], None)
-            elif message[1][0] == "stop" and self._schedule.waiting:
+            elif message[1][0] == "stop" and self.schedule.waiting:
                 self._reason = self._reason or message[1][1]
 
 
+@dataclass(eq=False)
 class Worker:
     """Worker of a hand-out, which computes what it is sent until it is dismissed; see the module.
 
@@ -329,19 +321,13 @@ class Worker:
         Replaced in tests.
     """
 
-    def __init__(
-        self,
-        channel: Channel,
-        compute: Compute,
-        deliver: Deliver,
-        limits: Limits,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._channel = channel
-        self._compute = compute
-        self._deliver = deliver
-        self._limits = limits
-        self._clock = clock
+    channel: Channel
+    compute: Compute
+    deliver: Deliver
+    limits: Limits
+    clock: Callable[[], float] = time.monotonic
+
+    def __post_init__(self) -> None:
         self._halted = False
         self._reported = False
         self._looking = False
@@ -357,27 +343,27 @@ class Worker:
     def act(self, message: Message) -> bool:
         """Act on a message; returns whether more may come."""
         if message[0] == "dismissed":
-            self._channel.send(MASTER, ("goodbye",))
+            self.channel.send(MASTER, ("goodbye",))
             return False
         self._task, self._note = message[1], None
         answer: Message = ("given up", self._task)
         if not self._stopped():
             try:
                 outcome = attempt(
-                    *(self._compute, self._task, self._channel.rank),
-                    *(self._stopped, self._limits.task_seconds),
+                    *(self.compute, self._task, self.channel.rank),
+                    *(self._stopped, self.limits.task_seconds),
                 )
-                answer = ("outcome", self._deliver(outcome))
+                answer = ("outcome", self.deliver(outcome))
             except GivenUp:
                 pass
         self._task = None
-        self._channel.send(MASTER, answer)
+        self.channel.send(MASTER, answer)
         return True
 
     def _received(self) -> Message:
         """Wait for the next message."""
         pause = SHORTEST_PAUSE
-        while (message := self._channel.poll()) is None:
+        while (message := self.channel.poll()) is None:
             self._stopped()
             time.sleep(pause)
             pause = min(1.5 * pause, LONGEST_PAUSE)
@@ -397,19 +383,21 @@ class Worker:
 
     def _look(self) -> None:
         """Report if it is time to, and look for urgent messages."""
-        now = self._clock()
-        if now - self._reported_at > self._limits.report_interval:
+        now = self.clock()
+        if now - self._reported_at > self.limits.report_interval:
             self._reported_at = now
-            self._channel.send(MASTER, ("alive", self._task, self._note))
-        while self._channel.poll(urgent=True) is not None:
+            self.channel.send(MASTER, ("alive", self._task, self._note))
+        while self.channel.poll(urgent=True) is not None:
             self._halted = True
-        if not self._halted and not self._reported and (reason := self._limits.stop()) is not None:
+        if not self._halted and not self._reported and (reason := self.limits.stop()) is not None:
             self._reported = True
-            self._channel.send(MASTER, ("stop", reason))
+            self.channel.send(MASTER, ("stop", reason))
 
 
 class OwnWorker:
     """Channel of a master whose own process works: on a task each time it looks for a message.
+
+    Both ends of it are this object: the worker alone looks for urgent messages.
 
     Parameters
     ----------
@@ -419,35 +407,21 @@ class OwnWorker:
 
     def __init__(self, compute: Compute, deliver: Deliver, limits: Limits) -> None:
         self.rank = MASTER
-        self.workers: Sequence[int] = (MASTER,)
-        self._boxes: dict[bool, deque[Message]] = {False: deque(), True: deque()}
-        self._answers = _Answers(self._boxes[True])
-        self._worker = Worker(self._answers, compute, deliver, limits)
+        self.workers: Sequence[int] = (MASTER + 1,)
+        self._tasks: deque[Message] = deque()
+        self._urgent: deque[Message] = deque()
+        self._answers: deque[Message] = deque()
+        self._worker = Worker(self, compute, deliver, limits)
 
     def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
-        """Keep a message for the worker."""
-        self._boxes[urgent].append(message)
+        """Keep a message for the other end."""
+        box = self._urgent if urgent else self._tasks
+        (self._answers if to == MASTER else box).append(message)
 
     def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
-        """Return what the worker has sent; if there is nothing, let it work."""
-        if not self._answers.sent and self._boxes[False]:
-            self._worker.act(self._boxes[False].popleft())
-        return (MASTER, self._answers.sent.popleft()) if self._answers.sent else None
-
-
-class _Answers:
-    """The same channel as the worker sees it."""
-
-    def __init__(self, urgent: deque[Message]) -> None:
-        self.rank = MASTER
-        self.workers: Sequence[int] = ()
-        self.sent: deque[Message] = deque()
-        self._urgent = urgent
-
-    def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
-        """Keep a message for the master."""
-        self.sent.append(message)
-
-    def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
-        """Return the next urgent message; others are brought by the master."""
-        return (MASTER, self._urgent.popleft()) if urgent and self._urgent else None
+        """Return what the other end has sent; if there is nothing, let the worker work."""
+        if urgent:
+            return (MASTER, self._urgent.popleft()) if self._urgent else None
+        if not self._answers and self._tasks:
+            self._worker.act(self._tasks.popleft())
+        return (self.workers[0], self._answers.popleft()) if self._answers else None

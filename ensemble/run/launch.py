@@ -29,7 +29,7 @@ from types import FrameType
 from typing import NamedTuple
 
 from adhesis import _version
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, lack
 from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.exit_codes import BAD_INPUT, INTERRUPTED, KILLED, RESUME
 from adhesis.ensemble.reporter import log
@@ -174,9 +174,8 @@ def check_file_size_limit() -> None:
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     if limit != resource.RLIM_INFINITY and limit < _SHARED_BYTES:
         raise WriteError(
-            f"ranks could not be started: they share memory in files of some MB, and the limit of "
-            f"file sizes (ulimit -f) is {limit / 1e6:g} MB; raise it to {_SHARED_BYTES / 1e6:.0f} "
-            "MB, or leave --ranks out"
+            "ranks share memory in files of some MB, and the limit of file sizes (ulimit -f) is "
+            f"{limit / 1e6:g} MB: raise it to {_SHARED_BYTES / 1e6:.0f} MB, or leave --ranks out"
         )
 
 
@@ -317,6 +316,8 @@ def run_ranks(
                 preexec_fn=end_with_parent,
             )
         except OSError as error:
+            if lack(error):
+                raise
             reason = error.strerror or str(error)
             raise InputError(f"{launcher} cannot be started: {reason}") from error
         launched = _Launched(Path(launcher).name, process, handed_over, output)

@@ -205,14 +205,7 @@ class RunLock:
             raise WriteError(f"{self.path} cannot be written: {error.strerror}") from error
 
     def _holder(self) -> str:
-        try:
-            descriptor = os.open(self.path, os.O_RDONLY | _SAFELY)
-        except OSError:
-            return ""
-        try:
-            record = _read_record(descriptor)
-        finally:
-            os.close(descriptor)
+        record = holder(self._results)
         return f" ({described(record)})" if record else ""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, parameter
 from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results.layout import check_space, create
 from adhesis.ensemble.results.read import Results
@@ -38,14 +38,12 @@ class Selection:
     Attributes
     ----------
     status : {"failed", "all"}
-    hurst, work_of_adhesion, realisation : tuple
-        If not empty, only tasks with one of these values.
+    values : mapping of str to numbers
+        By the name of an attribute of tasks; if there are any, only tasks with one of them.
     """
 
     status: Literal["failed", "all"]
-    hurst: tuple[float, ...] = ()
-    work_of_adhesion: tuple[float, ...] = ()
-    realisation: tuple[int, ...] = ()
+    values: Mapping[str, Collection[float]] = field(default_factory=dict)
 
     def check(self, tasks: Sequence[Task]) -> None:
         """Refuse values that the campaign does not have.
@@ -54,28 +52,21 @@ class Selection:
         ------
         InputError
         """
-        for option, name, chosen in (
-            ("--hurst", "hurst", self.hurst),
-            ("--work-of-adhesion", "work_of_adhesion", self.work_of_adhesion),
-            ("--realisation", "realisation", self.realisation),
-        ):
+        for name, chosen in self.values.items():
             known = {getattr(task, name) for task in tasks}
             for value in chosen:
                 if value not in known:
                     values = ", ".join(f"{v:g}" for v in sorted(known)[:_MOST_SHOWN])
                     more = ", …" if len(known) > _MOST_SHOWN else ""
                     raise InputError(
-                        f"{option} is {value:g}: this campaign has no such task, "
+                        f"{parameter(name)} is {value:g}: this campaign has no such task, "
                         f"only {values}{more}"
                     )
 
     def takes(self, task: Task, status: int) -> bool:
         """Whether a row is selected."""
-        return (
-            (status == FAILED or (self.status == "all" and status == DONE))
-            and (not self.hurst or task.hurst in self.hurst)
-            and (not self.work_of_adhesion or task.work_of_adhesion in self.work_of_adhesion)
-            and (not self.realisation or task.realisation in self.realisation)
+        return (status == FAILED or (self.status == "all" and status == DONE)) and all(
+            getattr(task, name) in chosen for name, chosen in self.values.items() if chosen
         )
 
 
@@ -222,16 +213,12 @@ def prepare(
                 wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
                 writer.mark(sorted(wanted), needed=True)
     grown = f", {len(plan.tasks) - before} of them new" if difference.grown else ""
+    planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
-        f"{path}: {plan.done} of {_planned(plan)} tasks done, {len(plan.rows)} to do{grown}"
+        f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
         + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
     )
     return plan
-
-
-def _planned(plan: Plan) -> int:
-    """Tasks that are computed or to be so; with ``[stop]`` more may follow."""
-    return plan.done + plan.failed + len(plan.rows)
 
 
 def _check_path(path: Path) -> None:

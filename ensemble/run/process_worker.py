@@ -13,9 +13,10 @@ import threading
 from collections.abc import Sequence
 from typing import BinaryIO
 
+from adhesis.ensemble.errors import lack
+from adhesis.ensemble.exit_codes import TOO_FEW_RESOURCES
 from adhesis.ensemble.run.dispatch import MASTER, Limits, Message, Worker
 from adhesis.ensemble.run.launch import end_with_parent
-from adhesis.ensemble.run.processes import Work
 
 
 class Pipes:
@@ -64,11 +65,17 @@ def main() -> None:
     end_with_parent()
     incoming, outgoing = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # stdout carries messages alone
-    work: Work = pickle.load(incoming)
-    limits = Limits(task_seconds=work.task_seconds, report_interval=work.report_interval)
+    compute, task_seconds, report_interval = pickle.load(incoming)
+    limits = Limits(task_seconds=task_seconds, report_interval=report_interval)
     channel = Pipes(int(sys.argv[1]), incoming, outgoing)
-    Worker(channel, work.compute, lambda outcome: outcome, limits).run()
+    Worker(channel, compute, lambda outcome: outcome, limits).run()
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except Exception as failure:
+        if not (sentence := lack(failure)):
+            raise
+        print(sentence, file=sys.stderr)
+        sys.exit(TOO_FEW_RESOURCES)

@@ -8,7 +8,6 @@ import queue
 import subprocess
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Self
 
 from adhesis.ensemble.run.attempt import Compute
@@ -16,25 +15,6 @@ from adhesis.ensemble.run.dispatch import REPORT_INTERVAL, Message
 from adhesis.ensemble.run.launch import ONE_THREAD, python, python_environment
 
 _TO_END = 10.0  # s for a process to end once its pipe is closed
-
-
-@dataclass(frozen=True)
-class Work:
-    """What a process needs to know before its first task; it is pickled.
-
-    Attributes
-    ----------
-    compute : callable
-        Of :mod:`adhesis.ensemble.run.dispatch`.
-    task_seconds : float, optional
-        Longest time of one task.
-    report_interval : float
-        Time between two signs of life, in s.
-    """
-
-    compute: Compute
-    task_seconds: float | None = None
-    report_interval: float = REPORT_INTERVAL
 
 
 class Processes:
@@ -48,13 +28,24 @@ class Processes:
     ----------
     count : int
         Number of processes.
-    work : Work
+    compute : callable
+        Of :mod:`adhesis.ensemble.run.dispatch`; it is pickled.
+    task_seconds : float, optional
+        Longest time of one task.
+    report_interval : float
+        Time between two signs of life, in s.
     """
 
-    def __init__(self, count: int, work: Work) -> None:
+    def __init__(
+        self,
+        count: int,
+        compute: Compute,
+        task_seconds: float | None = None,
+        report_interval: float = REPORT_INTERVAL,
+    ) -> None:
         self.rank = 0
         self.workers: Sequence[int] = range(1, count + 1)
-        self._work = work
+        self._work = (compute, task_seconds, report_interval)
         self._inbox: queue.SimpleQueue[tuple[int, Message]] = queue.SimpleQueue()
         self._processes: dict[int, subprocess.Popen[bytes]] = {}
         self._dismissed: set[int] = set()

@@ -16,14 +16,34 @@ _MOST_FAILURES_SHOWN = 5
 
 @dataclass
 class Counts:
-    """Numbers of tasks that a run has to do and has done."""
+    """Numbers of tasks of a run.
+
+    Attributes
+    ----------
+    total, done, failed : int
+        In the results file, or the part of it that is asked for.
+    computed, failed_now : int
+        Of these, by this run.
+    doubtful : int
+        Losses, of those computed now, whose own checks say that they are wrong
+        (:mod:`adhesis.ensemble.task.doubt`).
+    beyond_limit : int
+        Losses, of those computed now, that are those of the zero-range limit alone
+        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`).
+    """
 
     total: int
-    done_before: int
     done: int = 0
     failed: int = 0
+    computed: int = 0
+    failed_now: int = 0
     doubtful: int = 0
     beyond_limit: int = 0
+
+    @property
+    def pending(self) -> int:
+        """Tasks still to do."""
+        return self.total - self.done - self.failed
 
 
 def _interval(elapsed: float) -> float:
@@ -32,7 +52,7 @@ def _interval(elapsed: float) -> float:
     return min(max(first, elapsed / _LINES_AT_LEAST), most)
 
 
-class ProgressLine:
+class ProgressLine(StatusLine):
     """Report the progress of a run, on rank 0.
 
     Parameters
@@ -50,15 +70,15 @@ class ProgressLine:
         time_left: Callable[[], float | None],
         stream: TextIO | None = None,
     ) -> None:
+        super().__init__(_interval, stream, at_once=True)
         self._counts = counts
         self._time_left = time_left
-        self._line = StatusLine(_interval, stream, at_once=True)
         self._failures_shown = 0
         self._doubts_shown = 0
 
     def tick(self) -> None:
         """Report, if it is time to."""
-        self._line.show(self._text)
+        self.show(self._text)
 
     def failure(self, what: str, error: str) -> None:
         """Report a failed task: the first ones each, then only their number."""
@@ -74,22 +94,18 @@ class ProgressLine:
             self.say(f"doubtful loss: {what}")
         self._doubts_shown += 1
 
-    def say(self, text: str) -> None:
-        """Write a line of its own."""
-        self._line.say(text)
-
-    def close(self) -> None:
+    def end(self) -> None:
         """Show the last state and end the line on a terminal."""
-        self._line.close(self._text)
+        self.close(self._text)
 
     def _text(self) -> str:
         c = self._counts
-        parts = [f"{c.done_before + c.done} of {c.total} tasks done"]
-        if c.failed:
-            parts.append(f"{c.failed} failed")
-        if c.done:
-            parts.append(f"{duration(self._line.seconds)} so far")
+        parts = [f"{c.done} of {c.total} tasks done"]
+        if c.failed_now:
+            parts.append(f"{c.failed_now} failed")
+        if c.computed:
+            parts.append(f"{duration(self.seconds)} so far")
         left = self._time_left()
-        if left is not None and c.done_before + c.done + c.failed < c.total:
+        if left is not None and c.pending:
             parts.append(f"about {duration(left)} left")
         return ", ".join(parts)

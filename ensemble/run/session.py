@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, S
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, Self, TextIO
+from typing import Any, TextIO
 
 import h5py
 
@@ -17,7 +17,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
-from adhesis.ensemble.quantities import percent
+from adhesis.ensemble.quantities import duration, percent
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
@@ -34,58 +34,16 @@ from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
 from adhesis.ensemble.run.launch import described_signal
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
-from adhesis.ensemble.run.processes import Processes, Work
+from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, one_a_node_first, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.ensemble.task.compute import Runner, check_task, methods_of
-from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
+from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
 from adhesis.solver.loading.loop import Progress
-
-
-@dataclass(frozen=True)
-class RowSummary:
-    """Numbers of a row that a worker wrote, for the master.
-
-    Attributes
-    ----------
-    loss, loss_error : float
-        In J/m².
-    audit_residual : float
-    doubtful : bool
-        See :mod:`adhesis.ensemble.task.doubt`.
-    steered : float
-        The quantity of ``[stop]``.
-    beyond_limit : bool
-        See :func:`adhesis.ensemble.task.doubt.beyond_zero_range`.
-    """
-
-    loss: float
-    audit_residual: float
-    loss_error: float
-    doubtful: bool
-    steered: float
-    beyond_limit: bool
-
-
-class RowWriter(Protocol):
-    """Destination of rows: :class:`adhesis.ensemble.results.write.Writer`."""
-
-    def write_result(self, row: int, result: Row, rank: int = 0) -> None:
-        """Write the row of a task that was computed."""
-
-    def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> None:
-        """Write the row of a task that failed."""
-
-    def mark(self, rows: Iterable[int], *, needed: bool) -> None:
-        """Mark rows without a result as to be computed, or as not needed."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: Any) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -113,7 +71,7 @@ class Engine:
 
     compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
     check: Callable[[Campaign, Task], None] = check_task
-    writer: Callable[[Path, Any, Callable[[int], str]], RowWriter] = Writer
+    writer: Callable[[Path, Any, Callable[[int], str]], Writer] = Writer
     all_write: bool = bool(h5py.get_config().mpi)
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
     methods: Callable[[Campaign, Iterable[Task]], Collection[str]] = methods_of
@@ -148,39 +106,26 @@ class Options:
     processes: int = 0
 
 
-@dataclass(frozen=True)
-class Summary:
-    """Result of a run: tasks by status in the file, and what it did itself.
+@dataclass
+class Summary(Counts):
+    """Result of a run: its counts, and how it ended.
 
     Attributes
     ----------
-    doubtful : int
-        Losses, of those computed now, whose own checks say that they are wrong
-        (:mod:`adhesis.ensemble.task.doubt`).
-    beyond_limit : int
-        Losses, of those computed now, that are those of the zero-range limit alone
-        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`).
     stopped : str or None
         Why it stopped before the last task.
     precisions : tuple of (str, Precision)
         With ``[stop]``: name of every cell, and how well the mean of its quantity is known.
     """
 
-    total: int
-    done: int
-    failed: int
-    computed: int
-    failed_now: int
-    seconds: float
-    doubtful: int
-    beyond_limit: int
-    stopped: str | None
+    seconds: float = 0.0
+    stopped: str | None = None
     precisions: tuple[tuple[str, Precision], ...] = ()
 
-    @property
-    def pending(self) -> int:
-        """Tasks still to do."""
-        return self.total - self.done - self.failed
+    def __str__(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        now = f"{self.computed} computed in {duration(self.seconds)}"
+        return f"{self.done} of {self.total} tasks done{failed}; {now}"
 
 
 def run_campaign(
@@ -302,28 +247,23 @@ class _Computing:
         return self.compute(self.campaign, self.tasks[row], lambda *_: check())
 
 
+@dataclass(eq=False)
 class _Session:
     """One rank's part of a run."""
 
-    def __init__(
-        self,
-        campaign: Campaign,
-        plan: Plan,
-        writer: RowWriter | None,
-        options: Options,
-        signals: StopSignals,
-        engine: Engine,
-        stream: TextIO | None = None,
-    ) -> None:
-        self._stream = stream
-        self._campaign = campaign
-        self._plan = plan
-        self._writer = writer
-        self._options = options
-        self._signals = signals
+    campaign: Campaign
+    plan: Plan
+    writer: Writer | None
+    options: Options
+    signals: StopSignals
+    engine: Engine
+    stream: TextIO | None = None
+
+    def __post_init__(self) -> None:
+        campaign, plan, options, engine = self.campaign, self.plan, self.options, self.engine
         self._started = time.monotonic()
         total = plan.done + plan.failed + len(plan.rows)
-        self._counts = Counts(total=total, done_before=plan.done)
+        self._counts = Counts(total, plan.done, plan.failed)
         self._groups: Mapping[int, Group] = {
             row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
         }
@@ -349,9 +289,13 @@ class _Session:
             channel: Channel
             if comm.size > 1:
                 channel = MpiChannel(comm)
-            elif self._options.processes and self._plan.rows:
-                work = Work(self._compute, limits.task_seconds, limits.report_interval)
-                channel = stack.enter_context(Processes(self._options.processes, work))
+            elif self.options.processes and self.plan.rows:
+                channel = stack.enter_context(
+                    Processes(
+                        *(self.options.processes, self._compute),
+                        *(limits.task_seconds, limits.report_interval),
+                    )
+                )
             else:
                 channel = OwnWorker(self._compute_here, self._write, self._limits)
                 own_rows = True
@@ -366,9 +310,9 @@ class _Session:
         progress = self._progress = ProgressLine(
             self._counts,
             lambda: self._estimate(
-                *(schedule, master.in_flight / self._campaign.branch_loops, len(channel.workers))
+                *(schedule, master.in_flight / self.campaign.branch_loops, len(channel.workers))
             ),
-            self._stream,
+            self.stream,
         )
         master = Master(
             *(channel, schedule, self._groups, collect, self._limits, progress.tick),
@@ -377,22 +321,14 @@ class _Session:
         try:
             return master.run()
         finally:
-            progress.close()
+            progress.end()
 
     def summary(self, stopped: str | None) -> Summary:
-        done = self._plan.done + self._counts.done
-        failed = self._plan.failed + self._counts.failed
-        batches = self._plan.batches
+        batches = self.plan.batches
         return Summary(
-            total=self._counts.total,
-            done=done,
-            failed=failed,
-            computed=self._counts.done,
-            failed_now=self._counts.failed,
+            **vars(self._counts),
             seconds=time.monotonic() - self._started,
-            doubtful=self._counts.doubtful,
-            beyond_limit=self._counts.beyond_limit,
-            stopped=stopped if done + failed < self._counts.total else None,
+            stopped=stopped if self._counts.pending else None,
             precisions=() if batches is None else tuple(batches.precisions),
         )
 
@@ -406,78 +342,71 @@ class _Session:
         return self._compute(row, check_and_show)
 
     def _write(self, outcome: Outcome) -> Outcome:
-        assert self._writer is not None
-        if outcome.error is None:
-            self._writer.write_result(outcome.task, outcome.result, outcome.rank)
-        else:
-            self._writer.write_failure(outcome.task, outcome.error, outcome.seconds, outcome.rank)
-        summary = self._summarise(outcome.result, self._plan.tasks[outcome.task])
-        return replace(outcome, result=summary)
-
-    def _summarise(self, row: Row | None, task: Task) -> RowSummary | None:
-        if row is None:
-            return None
-        values = {**row, "work_of_adhesion": task.work_of_adhesion}
-        return RowSummary(
-            loss=float(row["loss"]),
-            audit_residual=float(row["audit_residual"]),
-            loss_error=float(row["loss_error"]),
-            doubtful=bool(doubtful(values, self._campaign.solver.accuracy)),
-            steered=float(row[self._campaign.stop.quantity]),
-            beyond_limit=bool(beyond_zero_range(values)),
-        )
+        """Write a row; of its numbers the master gets those by which it is judged."""
+        assert self.writer is not None
+        task, rank = outcome.task, outcome.rank
+        if outcome.error is not None:
+            self.writer.write_failure(task, outcome.error, outcome.seconds, rank)
+            return outcome
+        self.writer.write_result(task, outcome.result, rank)
+        gamma = self.plan.tasks[task].work_of_adhesion
+        row = {**outcome.result, "work_of_adhesion": gamma}
+        judged = (*OF_DOUBT, self.campaign.stop.quantity)
+        return replace(outcome, result={name: row[name] for name in judged})
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
-        if outcome.error is None:
-            self._counts.done += 1
-            written: RowSummary = outcome.result
-            self._counts.beyond_limit += written.beyond_limit
-            if written.doubtful:
-                self._counts.doubtful += 1
-                what = str(self._plan.tasks[outcome.task])
-                share = 100 * written.loss_error / (abs(written.loss) or 1.0)
+        counts, what, row = self._counts, str(self.plan.tasks[outcome.task]), outcome.result
+        if outcome.error is not None:
+            counts.failed += 1
+            counts.failed_now += 1
+            progress.failure(what, outcome.error)
+        else:
+            counts.done += 1
+            counts.computed += 1
+            counts.beyond_limit += bool(beyond_zero_range(row))
+            if doubtful(row, self.campaign.solver.accuracy):
+                counts.doubtful += 1
+                share = 100 * row["loss_error"] / (abs(row["loss"]) or 1.0)
                 progress.doubt(
-                    f"{what}: audit residual {percent(written.audit_residual)}, "
+                    f"{what}: audit residual {percent(row['audit_residual'])}, "
                     f"estimated error {share:.2g} %"
                 )
-        else:
-            self._counts.failed += 1
-            progress.failure(str(self._plan.tasks[outcome.task]), outcome.error)
-        if self._plan.batches is not None:
-            value = math.nan if outcome.error is not None else outcome.result.steered
-            further, spare = self._plan.batches.finished(outcome.task, value)
-            assert self._writer is not None
-            self._writer.mark(spare, needed=False)
+        if self.plan.batches is not None:
+            steered = self.campaign.stop.quantity
+            value = math.nan if outcome.error is not None else float(row[steered])
+            further, spare = self.plan.batches.finished(outcome.task, value)
+            assert self.writer is not None
+            self.writer.mark(spare, needed=False)
             self._counts.total += len(further)
             schedule.add(self._units.form(further))
         progress.tick()
 
     def _schedule(self) -> Schedule:
-        tasks = self._plan.tasks
+        tasks = self.plan.tasks
         priors: dict[Hashable, float] = {
             self._groups[row]: prior(task) for row, task in enumerate(tasks)
         }
         rounds = {row: task.realisation for row, task in enumerate(tasks)}
-        first = self._units.form(self._plan.rows)
+        first = self._units.form(self.plan.rows)
         schedule = Schedule(first, self._groups, priors, rounds)
-        for group, (seconds, count) in self._plan.times.items():
+        for group, (seconds, count) in self.plan.times.items():
             # of loops that share a loading branch the time is that of all of them
-            schedule.measured(group, seconds, max(1, round(count / self._campaign.branch_loops)))
+            schedule.measured(group, seconds, max(1, round(count / self.campaign.branch_loops)))
         return schedule
 
     def _stop(self) -> str | None:
-        if self._signals.received is not None:
-            return f"{described_signal(self._signals.received)} received"
+        if self.signals.received is not None:
+            return f"{described_signal(self.signals.received)} received"
         left = self._time_left()
         if left is not None and left <= 0:
             return "the walltime ends"
-        most = self._options.max_failures
-        if most is not None and self._counts.failed >= most:
-            return f"{self._counts.failed} tasks failed (the limit is --max-failures {most})"
+        most = self.options.max_failures
+        if most is not None and self._counts.failed_now >= most:
+            return f"{self._counts.failed_now} tasks failed (the limit is --max-failures {most})"
         return None
 
     def _time_left(self) -> float | None:
-        deadline = self._options.deadline
+        deadline = self.options.deadline
         return None if deadline is None else deadline.at - time.time()
 
     @staticmethod

@@ -50,7 +50,15 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
         control = Control() if stiffness is None else Control(stiffness)
     material = campaign.material
     strength = strength_of(task.work_of_adhesion, material.adhesion_range, material.strength)
-    return Problem(profile, half_space, task.work_of_adhesion, control, strength)
+    return Problem(
+        profile,
+        half_space,
+        task.work_of_adhesion,
+        control,
+        strength,
+        work_of_adhesion_open=material.work_of_adhesion_open,
+        measure=material.measure,
+    )
 
 
 def check_task(campaign: Campaign, task: Task) -> None:
@@ -82,19 +90,6 @@ def methods_of(campaign: Campaign, tasks: Iterable[Task]) -> set[str]:
     return {_make_method(campaign, task).name for task in of_adhesion.values()}
 
 
-def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -> Row:
-    """Compute one loop, independently of ranks and files.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    task : Task
-    progress : callable, optional
-        Called after each load step; it may raise an exception to give the task up.
-    """
-    return Runner()(campaign, task, progress)
-
-
 @dataclass(frozen=True)
 class _Shared:
     """Loading branch of the last task, which the next one may continue."""
@@ -106,7 +101,7 @@ class _Shared:
 
 
 class Runner:
-    """Runner of tasks one after the other, each with the bits of :func:`run_task`.
+    """Runner of tasks one after the other, each with the bits that it has alone.
 
     The tasks of a campaign with several turning points share a loading branch
     (:meth:`adhesis.ensemble.campaign.tables.Campaign.branch_of`): it is kept from one task to the
@@ -117,8 +112,9 @@ class Runner:
         self._shared: _Shared | None = None
 
     def __call__(self, campaign: Campaign, task: Task, progress: Progress | None = None) -> Row:
-        """Compute one loop; arguments as those of :func:`run_task`.
+        """Compute one loop, independently of ranks and files.
 
+        ``progress`` is called after each load step; it may raise an exception to give the task up.
         The times in the row are those of this call: the time of a shared loading branch counts
         once, in the first loop that needs it.
         """

@@ -24,7 +24,7 @@ from adhesis.solver.loading.zero_range import (
 # Numbers of a row from which beyond_zero_range decides, in the order of beyond_limit.
 _OF_LIMIT = (
     *("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction"),
-    *("opening_strength", "barrier", "edge_range", "touch_range"),
+    *("opening_strength", "barrier", "edge_range", "touch_range", "gamma_open"),
 )
 OF_DOUBT = ("audit_residual", "loss_error", *_OF_LIMIT)
 """Numbers of a row from which its loss is judged."""

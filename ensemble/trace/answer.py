@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -16,36 +17,20 @@ from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
+from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.variants import Cycle, Plan, Run, default_tables, make_plan
-from adhesis.solver import views
-from adhesis.solver.checks import (
-    ACCURACY,
-    FULL_PENETRATION,
-    Bounds,
-    choice,
-    counted,
-    flag,
-    function,
-    instance,
-    number_of,
-    real,
-    row,
-    whole,
-)
-from adhesis.solver.loading.loop import check_cycle, check_preload
+from adhesis.ensemble.trace.variants import Plan, Run, default_tables, make_plan
+from adhesis.solver import checks, views
+from adhesis.solver.loading.loop import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.registry import METHOD_NAMES, MethodName
+from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
 from adhesis.solver.values import ByValue, finite
 
-QUANTITIES = {
-    "loss": "J/m²",
-    "pull_off_stress": "Pa",
-    "contact_fraction": "",
-}
+QUANTITIES = ("loss", "pull_off_stress", "contact_fraction")
+"""Numbers of the answer that have doubts, in J/m², in Pa, and dimensionless."""
 
 # A doubt counts with the root mean square change of its variants; the interval is so many times
 # the root of their sum of squares. Measured on profiles of known loss: docs/measured-profile.md.
@@ -54,7 +39,7 @@ COVERAGE = 2.0
 LEAST = 0.02
 
 _NOT_CONVERGED = 0.10
-_PROCESSES = Bounds(0, 4096, whole=True)
+_PROCESSES = checks.Bounds(0, 4096, whole=True)
 DOUBTS = {
     "cut-off": "the shortest wave kept",
     "continuation": "how the period is closed",
@@ -94,7 +79,7 @@ class NoAnswer(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Uncertain:
     """A number of the answer.
 
     Attributes
@@ -143,7 +128,7 @@ class Answer(ByValue):
 
     Attributes
     ----------
-    loss, pull_off_stress, contact_fraction : Quantity
+    loss, pull_off_stress, contact_fraction : Uncertain
     results : dict
         Numbers of each loop by name (:func:`adhesis.ensemble.trace.job.run`); a text if it
         failed.
@@ -156,9 +141,9 @@ class Answer(ByValue):
     cycle: Cycle
     plan: Plan
     results: dict[str, Result | str]
-    loss: Quantity
-    pull_off_stress: Quantity
-    contact_fraction: Quantity
+    loss: Uncertain
+    pull_off_stress: Uncertain
+    contact_fraction: Uncertain
     warnings: tuple[str, ...]
     seconds: float = field(compare=False)
 
@@ -166,7 +151,8 @@ class Answer(ByValue):
         """One line: the loss with its uncertainty, and the warnings counted."""
         return (
             f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty, 0.0)} J/m², "
-            f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
+            f"{checks.counted(len(self.plan.runs), 'loop')}, "
+            f"{checks.counted(len(self.warnings), 'warning')})"
         )
 
     def __str__(self) -> str:
@@ -275,14 +261,24 @@ class Answer(ByValue):
             return (changes[0], *others[:1])
         return tuple(changes[:1])
 
-    def group(self, name: str) -> list[tuple[str, str, Result]]:
-        """Name, words and numbers of the loops of one doubt or table that came to their end."""
-        rows = []
-        for run in self.plan.runs:
-            found = self.result(run.name)
-            if run.group == name and found is not None:
-                rows.append((run.name, run.description, found))
-        return rows
+    def group(self, name: str) -> list[tuple[Run, Result]]:
+        """Loops of one doubt or table that came to their end, and their numbers."""
+        found = ((run, self.result(run.name)) for run in self.plan.runs if run.group == name)
+        return [(run, numbers) for run, numbers in found if numbers is not None]
+
+    @property
+    def works_of_adhesion(self) -> list[tuple[float, Result]]:
+        """Works of adhesion in J/m², ascending, and the numbers of their loops."""
+        first = (self.cycle.works_of_adhesion[0], self.main)
+        others = [(run.work_of_adhesion or 0.0, r) for run, r in self.group("work of adhesion")]
+        return sorted([first, *others], key=itemgetter(0))
+
+    @property
+    def turning_points(self) -> list[tuple[float, Result]]:
+        """Turning points, ascending, and the numbers of their loops."""
+        first = (self.cycle.turning_points[0], self.main)
+        others = [(run.turning_point or 0.0, r) for run, r in self.group("turning point")]
+        return sorted([first, *others], key=itemgetter(0))
 
     def change(self, name: str, quantity: str = "loss") -> float | None:
         """Relative change of a quantity in one loop against the loop that it is compared with."""
@@ -307,6 +303,7 @@ def loss_of_trace(
     accuracy: float = 1e-3,
     adhesion_range: float | None = None,
     strength: float | None = None,
+    work_of_adhesion_open: float | None = None,
     quick: bool = False,
     processes: int | None = None,
     progress: bool = False,
@@ -339,6 +336,9 @@ def loss_of_trace(
     adhesion_range, strength : float, optional
         Range δ of adhesion in m, or instead the strength in Pa at which patches open from inside
         (:class:`~adhesis.Problem`).
+    work_of_adhesion_open : float, optional
+        Work of adhesion in J/m² where an edge recedes, beside a single γ; in the table of works of
+        adhesion both keep their ratio.
     quick : bool
         Without the two tables.
     processes : int, optional
@@ -362,19 +362,20 @@ def loss_of_trace(
     docs/measured-profile.md, "The answer and its doubts"
     """
     control = Control() if control is None else control
-    instance("control", control, Control, "Control(stiffness), for a load Control(0)")
+    checks.instance("control", control, Control, "Control(stiffness), for a load Control(0)")
+    turns: Any = preload
     latest = None
     if preload is None:
-        turns = _turns(control, max_penetration, max_stress)
-    else:
-        turns = preload
-        if max_stress is not None:
-            raise ValueError(
-                "preload and max_stress are given: a machine turns at a preload, a weight "
-                "(control=Control(0)) at max_stress"
-            )
-        if max_penetration is not None:
-            latest = real("max_penetration", max_penetration)
+        if max_penetration is None and max_stress is None and not control.is_load:
+            max_penetration = MAX_PENETRATION
+        turns = turning_of(control, max_penetration, max_stress)
+    elif max_stress is not None:
+        raise ValueError(
+            "preload and max_stress are given: a machine turns at a preload, a weight "
+            "(control=Control(0)) at max_stress"
+        )
+    elif max_penetration is not None:
+        latest = checks.real("max_penetration", max_penetration)
     cycle = make_cycle(
         half_space,
         work_of_adhesion,
@@ -387,14 +388,15 @@ def loss_of_trace(
         strength,
         at_preload=preload is not None,
         latest=latest,
+        work_of_adhesion_open=work_of_adhesion_open,
     )
     check(prepared, cycle)
-    flag("quick", quick)
-    function("watch", watch)
+    checks.flag("quick", quick)
+    checks.function("watch", watch)
     if processes is not None:
-        processes = whole("processes", processes, _PROCESSES)
+        processes = checks.whole("processes", processes, _PROCESSES)
     plan = make_plan(prepared, cycle, quick=quick, processes=processes)
-    if not flag("progress", progress):
+    if not checks.flag("progress", progress):
         return run_plan(prepared, cycle, plan, watch)
     with bar("loops") as shown:
 
@@ -405,25 +407,6 @@ def loss_of_trace(
                 watch(loops)
 
         return run_plan(prepared, cycle, plan, both)
-
-
-def _turns(
-    control: Control, max_penetration: Several | None, max_stress: Several | None
-) -> Several:
-    """Return the turning points that belong to a control."""
-    if control.is_load:
-        if max_penetration is not None:
-            raise ValueError("max_penetration is given: a path under a load turns at max_stress")
-        if max_stress is None:
-            raise ValueError("max_stress is missing: a path under a load must have it, in Pa")
-        return max_stress
-    if max_stress is not None:
-        raise ValueError(
-            "max_stress is given: it belongs to a load, that of a weight: a weight or a machine? "
-            "For a weight give control=Control(0); for a machine, which turns at that mean stress, "
-            "give preload instead of max_stress"
-        )
-    return MAX_PENETRATION if max_penetration is None else max_penetration
 
 
 def make_cycle(
@@ -439,6 +422,7 @@ def make_cycle(
     *,
     at_preload: bool = False,
     latest: float | None = None,
+    work_of_adhesion_open: float | None = None,
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -447,25 +431,29 @@ def make_cycle(
     TypeError, ValueError
         What the solver would refuse of them.
     """
-    choice("method", method, METHOD_NAMES)
-    real("accuracy", accuracy, ACCURACY)
+    checks.choice("method", method, METHOD_NAMES)
+    checks.real("accuracy", accuracy, checks.ACCURACY)
     control = control or Control()
     turning = "max_stress" if control.is_load else "max_penetration"
     turning = "preload" if at_preload else turning
-    gammas, turns = default_tables(
-        _several("work_of_adhesion", work_of_adhesion), _several(turning, turning_points)
-    )
+    given = _several("work_of_adhesion", work_of_adhesion)
+    if work_of_adhesion_open is not None and len(given) > 1:
+        raise ValueError(
+            f"work_of_adhesion_open is {work_of_adhesion_open!r} beside {len(given)} works of "
+            "adhesion: give one of each (in the table both keep their ratio)"
+        )
+    gammas, turns = default_tables(given, _several(turning, turning_points))
     for name, values in (("work_of_adhesion", gammas), (turning, turns)):
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
     for point in turns:
         if at_preload:
             check_preload(point, control)
-            point = FULL_PENETRATION if latest is None else latest
+            point = checks.FULL_PENETRATION if latest is None else latest
         check_cycle(point, load_steps, control)
     cycle = Cycle(
         half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength,
-        at_preload, latest,
+        at_preload, latest, work_of_adhesion_open,
     )  # fmt: skip
     for gamma in gammas:
         cycle.strength_at(gamma)
@@ -474,11 +462,15 @@ def make_cycle(
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
     """Refuse a prepared trace that the solver would refuse, before any work."""
-    instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
+    checks.instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        strength = cycle.strength_at(gamma)
-        Problem(profile, cycle.half_space, gamma, strength=strength)
+        strength, open_ = cycle.strength_at(gamma), cycle.open_at(gamma)
+        problem = Problem(
+            profile, cycle.half_space, gamma, strength=strength, work_of_adhesion_open=open_
+        )
+        if problem.pinning > 0:
+            check_pinning(cycle.method, None)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
@@ -491,7 +483,7 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
     main = results.get("answer")
     if not isinstance(main, dict):
         raise NoAnswer(f"the loop could not be run to its end: {main}")
-    bare = {name: Quantity(float(main[name]), 0.0, {}) for name in QUANTITIES}
+    bare = {name: Uncertain(float(main[name]), 0.0, {}) for name in QUANTITIES}
     draft = Answer(prepared, cycle, plan, results, warnings=(), seconds=0.0, **bare)
     quantities = {name: _quantity(draft, name) for name in QUANTITIES}
     return Answer(
@@ -507,15 +499,15 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
 
 def _several(name: str, value: Several) -> Sequence[float]:
     """Return one number as a row of one; its bounds are checked later."""
-    if number_of(value) is not None:
-        return (real(name, value),)
-    return tuple(row(name, value, entry="value").tolist())
+    if checks.number_of(value) is not None:
+        return (checks.real(name, value),)
+    return tuple(checks.row(name, value, entry="value").tolist())
 
 
 # ---------------------------------------------------------------------- doubts
 
 
-def _quantity(answer: Answer, name: str) -> Quantity:
+def _quantity(answer: Answer, name: str) -> Uncertain:
     value = float(answer.main[name])
     doubts = {}
     neighbours = _neighbours(answer)
@@ -534,14 +526,14 @@ def _quantity(answer: Answer, name: str) -> Quantity:
         numerics = abs(answer.main["audit_residual"]) if error is None else abs(error) / abs(value)
         doubts["numerics"] = float(numerics)
     spread = float(np.sqrt(sum(d * d for d in doubts.values())))
-    return Quantity(value, abs(value) * max(LEAST, COVERAGE * spread), doubts)
+    return Uncertain(value, abs(value) * max(LEAST, COVERAGE * spread), doubts)
 
 
 def _cut_offs(answer: Answer) -> dict[float, str]:
     """Return the names of the loops that ended by their shortest wave over the answer's."""
-    names = [run.name for run in answer.plan.runs if run.group == "cut-off"]
-    ended = [name for name in names if answer.result(name) is not None]
-    return {1.0: "answer"} | {float(name.split("×")[1]): name for name in ended}
+    ended = [run for run, _ in answer.group("cut-off")]
+    at = answer.prepared.cut_off
+    return {1.0: "answer"} | {run.changes["cut_off"] / at: run.name for run in ended}
 
 
 def _neighbours(answer: Answer) -> list[str]:
@@ -554,7 +546,7 @@ def _neighbours(answer: Answer) -> list[str]:
     return [name for factor, name in names.items() if factor < 1 or factor in longer]
 
 
-def _warnings(answer: Answer, loss: Quantity) -> list[str]:
+def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     """Return what is doubtful: what changes the answer most first, loops that failed last."""
     found = [*answer.main["preload_warnings"], *_one_patch(answer), *_not_converged(answer)]
     if loss.relative > 0.5:
@@ -568,13 +560,16 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     races = answer.main["races"]
     if races:
         found.append(
-            f"{counted(round(races), 'jump')} would have ended elsewhere under another rule of "
-            f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
+            f"{checks.counted(round(races), 'jump')} would have ended elsewhere under another rule "
+            f"of descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
-    for run in answer.plan.runs:
-        of_run = answer.result(run.name) if run.name != "answer" else None
-        for text in of_run["preload_warnings"] if of_run is not None else ():
-            found.append(f"the loop “{run.name}”: {text}")
+    others = [(r.name, answer.result(r.name)) for r in answer.plan.runs if r.name != "answer"]
+    short = [f"“{name}”" for name, of in others if of is not None and of["preload_warnings"]]
+    if short:
+        found.append(
+            f"{len(short)} of {checks.counted(len(others), 'other loop')} did not turn at the "
+            f"preload: {', '.join(short)}; their turning points are in trace.json"
+        )
     failed = []
     for run in answer.plan.runs:
         text = answer.results.get(run.name)
@@ -631,15 +626,16 @@ def run_rows(answer: Answer) -> list[dict[str, Any]]:
     runs = []
     for run in plan.runs:
         found = answer.results.get(run.name)
-        row: dict[str, Any] = {"name": run.name, "group": run.group, "said": run.description}
-        row["reference"] = run.reference
-        row["expected_seconds"] = plan.seconds[run.name]
+        entry: dict[str, Any] = {
+            **{"name": run.name, "group": run.group, "said": run.description},
+            **{"reference": run.reference, "expected_seconds": plan.seconds[run.name]},
+        }
         if isinstance(found, dict):
-            row |= {key: value for key, value in found.items() if key != "states"}
-            row["loss_change"] = answer.change(run.name)
+            entry |= {key: value for key, value in found.items() if key != "states"}
+            entry["loss_change"] = answer.change(run.name)
         else:
-            row["failed"] = found
-        runs.append(row)
+            entry["failed"] = found
+        runs.append(entry)
     return runs
 
 
@@ -676,16 +672,18 @@ def document(answer: Answer) -> dict[str, Any]:
         "young": cycle.half_space.young,
         "poisson": cycle.half_space.poisson,
         "work_of_adhesion": cycle.works_of_adhesion[0],
+        "work_of_adhesion_open": answer.main["work_of_adhesion_open"],
         "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
         "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
         "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
         "preload": cycle.turning_points[0] if cycle.at_preload else None,
         "load_steps": cycle.load_steps,
-        "loss": _plain(answer.loss),
+        "loss": asdict(answer.loss),
         "loss_over_work_of_adhesion": answer.main["loss_over_work_of_adhesion"],
-        "pull_off_stress": _plain(answer.pull_off_stress),
-        "contact_fraction": _plain(answer.contact_fraction),
+        "friction": answer.main["friction"],
+        "pull_off_stress": asdict(answer.pull_off_stress),
+        "contact_fraction": asdict(answer.contact_fraction),
         "valid_range": answer.valid_range,
         "edge_range": answer.edge_range,
         "touch_range": answer.touch_range,
@@ -705,12 +703,4 @@ def document(answer: Answer) -> dict[str, Any]:
         ],
         "warnings": list(answer.warnings),
         "seconds": answer.seconds,
-    }
-
-
-def _plain(quantity: Quantity) -> dict[str, Any]:
-    return {
-        "value": quantity.value,
-        "uncertainty": quantity.uncertainty,
-        "doubts": quantity.doubts,
     }

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from adhesis.ensemble.quantities import shown_unit
 from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     ONE_COLUMN,
@@ -22,10 +23,10 @@ from adhesis.ensemble.report.figures.style import (
     style,
 )
 from adhesis.ensemble.trace.answer import Answer
+from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.page_files import FIGURES
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
-from adhesis.ensemble.trace.variants import Cycle
 from adhesis.solver.model.measured_profile import trace_spectrum
 from adhesis.solver.model.profile import Array
 
@@ -58,12 +59,10 @@ def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
     return drawn
 
 
-def _scale(size: float) -> tuple[float, str]:
-    """Return the unit for a length of this size: its factor and name."""
-    for factor, name in ((1e3, "mm"), (1e6, "µm"), (1e9, "nm")):
-        if size * factor >= 1:
-            return factor, name
-    return 1e9, "nm"
+def _scale(name: str, size: float) -> tuple[float, str]:
+    """Return the unit of a quantity of this size: its factor and name."""
+    unit, in_si = shown_unit(name, size)
+    return 1 / in_si, unit
 
 
 def _thinned(x: Any, y: Any) -> tuple[Array, Array]:
@@ -83,10 +82,10 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     heights = prepared.trace.heights
     level, profile = prepared.level(), prepared.profile()
     x = prepared.start + prepared.step * np.arange(level.size)
-    by_x, unit_x = _scale(prepared.trace.length)
+    by_x, unit_x = _scale("length", prepared.trace.length)
     figure = new_figure(2, 1, TWO_COLUMNS, 3.3, sharex=True)
     above, below = figure.axes
-    by_z, unit_z = _scale(prepared.trace.height_range)
+    by_z, unit_z = _scale("height_range", prepared.trace.height_range)
     measured = prepared.step * np.arange(heights.size)
     above.plot(by_x * measured, by_z * heights, color=_GREY, lw=0.7)
     fit = prepared.filled - level
@@ -105,7 +104,7 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     marked = _mark(figure.axes, by_x, prepared)
     above.set(ylabel=f"measured ({unit_z})")
     above.legend(loc="best")
-    by_z, unit_z = _scale(float(np.ptp(level)))
+    by_z, unit_z = _scale("height_range", float(np.ptp(level)))
     below.plot(*_thinned(by_x * x, by_z * level), color=_GREY, lw=0.7, label="level")
     n = max(4 * profile.highest_harmonic, 2000) + 1
     used = profile.heights(n)
@@ -189,14 +188,13 @@ def _loop(answer: Answer) -> tuple[Figure, str]:
     depth = np.array(states["penetration"])
     stress = np.array(states["mean_stress"])
     contact = np.array(states["contact_fraction"])
-    big = float(np.abs(stress).max())
-    by, unit = (1e-6, "MPa") if big > 2e6 else (1e-3, "kPa") if big > 2e2 else (1.0, "Pa")
+    unit, size = shown_unit("mean_stress", float(np.abs(stress).max()))
     figure = new_figure(1, 2, TWO_COLUMNS, 2.5)
     left, right = figure.axes
     for name, colour in (("loading", _BLUE), ("unloading", _ORANGE)):
         rows = branch == name
         line = LINE_OF_BRANCH[name]
-        left.plot(depth[rows], by * stress[rows], ls=line, color=colour, label=name)
+        left.plot(depth[rows], stress[rows] / size, ls=line, color=colour, label=name)
         right.plot(depth[rows], contact[rows], ls=line, color=colour, label=name)
     left.axhline(0, color="0.5", lw=0.5)
     left.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel=rf"mean stress $\bar p$ ({unit})")
@@ -209,8 +207,7 @@ def _loop(answer: Answer) -> tuple[Figure, str]:
 def _cut_off(answer: Answer) -> tuple[Figure, str] | None:
     prepared = answer.prepared
     rows = [(prepared.cut_off, answer.main["loss"])]
-    for name, _, found in answer.group("cut-off"):
-        rows.append((float(name.split("×")[1]) * prepared.cut_off, found["loss"]))
+    rows += [(run.changes["cut_off"], found["loss"]) for run, found in answer.group("cut-off")]
     if len(rows) < 3:
         return None
     rows.sort()
@@ -246,10 +243,11 @@ def _plain_log(axes: Axes) -> None:
 
 def _tables(answer: Answer) -> tuple[Figure, str] | None:
     cycle = answer.cycle
-    gammas = [(cycle.works_of_adhesion[0], answer.main)]
-    gammas += [(float(n.split()[1]), r) for n, _, r in answer.group("work of adhesion")]
-    turns = [(cycle.turning_points[0], answer.main)]
-    turns += [(float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    gammas, turns = answer.works_of_adhesion, answer.turning_points
+    unit, size = "", 1.0
+    if cycle.at_preload or cycle.control.is_load:
+        unit, size = shown_unit("preload", cycle.turning_points[0])
+        turns = [(turn / size, row) for turn, row in turns]
     if len(gammas) + len(turns) < 4:
         return None
     figure = new_figure(3, 2, TWO_COLUMNS, 4.4, sharex="col")
@@ -261,7 +259,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
     )
     for line, (key, by, label, quantity) in enumerate(rows):
         top = 0.0
-        for column, points in enumerate((sorted(gammas, key=_first), sorted(turns, key=_first))):
+        for column, points in enumerate((gammas, turns)):
             axes: Axes = panels[line, column]
             x = [point[0] for point in points]
             y = np.array([by * point[1][key] for point in points])
@@ -273,20 +271,16 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             axes.set_ylim(0, top)
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    panels[2, 1].set_xlabel("turning point " + _turn_label(cycle))
+    panels[2, 1].set_xlabel("turning point: " + _turn_label(cycle, unit))
     return figure, (
         "Bars: the relative uncertainty of the answer; at the other points it is assumed to be "
         "the same."
     )
 
 
-def _turn_label(cycle: Cycle) -> str:
+def _turn_label(cycle: Cycle, unit: str) -> str:
     if cycle.at_preload:
-        return "preload (Pa)"
+        return f"preload ({unit})"
     if cycle.control.is_load:
-        return r"$\bar p$ (Pa)"
+        return rf"$\bar p$ ({unit})"
     return r"$\Delta/h_{\max}$" if cycle.control.is_fixed else r"$u_\mathrm{tot}/h_{\max}$"
-
-
-def _first(point: tuple[float, Any]) -> float:
-    return point[0]

@@ -2,38 +2,89 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from adhesis.ensemble.quantities import stress_text
+from adhesis.solver.loading.loop import run_loop, turn_arguments
+from adhesis.solver.loading.loop_result import strain_warnings
+from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
+from adhesis.solver.method import Branch, ContactState
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem, strength_of
+from adhesis.solver.model.profile import Profile
+from adhesis.solver.registry import MethodName, make_method
 
-from adhesis.solver.values import ByValue
 
-if TYPE_CHECKING:
-    from adhesis.solver.registry import MethodName
+@dataclass(frozen=True)
+class Cycle:
+    """Contact and cycle in SI units; the answer has the first value of each tuple.
 
+    Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load; preloads in Pa
+    if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload.
+    """
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Job(ByValue):
-    """Arguments of one loop, in SI units."""
-
-    name: str
-    period: float
-    coefficients: NDArray[np.complex128]
-    young: float
-    poisson: float
-    work_of_adhesion: float
-    turning_point: float
-    load_steps: int
-    method: MethodName
-    accuracy: float
-    stiffness: float = math.inf
-    strength: float = math.inf
+    half_space: HalfSpace
+    works_of_adhesion: tuple[float, ...]
+    turning_points: tuple[float, ...]
+    load_steps: int = 40
+    method: MethodName = "auto"
+    accuracy: float = 1e-3
+    control: Control = field(default_factory=Control)
+    adhesion_range: float | None = None
+    strength: float | None = None
     at_preload: bool = False
     latest: float | None = None
+    work_of_adhesion_open: float | None = None
+
+    @property
+    def turn_sign(self) -> str:
+        """Return the sign of the turning points, with their unit if they have one."""
+        if self.at_preload:
+            return "preload, Pa"
+        if self.control.is_load:
+            return "p̄, Pa"
+        return "Δ/h_max" if self.control.is_fixed else "u_tot/h_max"
+
+    def turn(self, point: float) -> str:
+        """Describe a turning point: "Δ/h_max = 0.9"."""
+        if self.at_preload:
+            held = "a fixed separation"
+            if not self.control.is_fixed:
+                held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
+            return f"a preload of {stress_text(point, 4)} at {held}"
+        if self.control.is_load:
+            return f"p̄ = {stress_text(point, 4)}"
+        if self.control.is_fixed:
+            return f"Δ/h_max = {point:g}"
+        return f"u_tot/h_max = {point:g} of a stiffness of {self.control.stiffness:.4g} Pa/m"
+
+    def strength_at(self, work_of_adhesion: float) -> float:
+        """Return the strength of the interface in Pa at a work of adhesion in J/m²."""
+        return strength_of(work_of_adhesion, self.adhesion_range, self.strength)
+
+    def open_at(self, work_of_adhesion: float) -> float | None:
+        """Return the work of adhesion of receding edges at one of advancing edges, in J/m².
+
+        It is given for that of the answer; at others both keep their ratio.
+        """
+        first, given = self.works_of_adhesion[0], self.work_of_adhesion_open
+        if given is None or work_of_adhesion == first:
+            return given
+        return given / first * work_of_adhesion
+
+
+@dataclass(frozen=True)
+class Job:
+    """Arguments of one loop: of the cycle, its own work of adhesion and turning point."""
+
+    name: str
+    profile: Profile
+    cycle: Cycle
+    work_of_adhesion: float
+    turning_point: float
 
 
 def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> dict[str, Any]:
@@ -45,26 +96,19 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     report : callable, optional
         Called after each load step with the branch and the prescribed value that is reached.
     """
-    from adhesis.solver.loading.loop import run_loop, turn_arguments
-    from adhesis.solver.loading.loop_result import strain_warnings
-    from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
-    from adhesis.solver.method import Branch, ContactState
-    from adhesis.solver.model.control import Control
-    from adhesis.solver.model.half_space import HalfSpace
-    from adhesis.solver.model.problem import Problem
-    from adhesis.solver.model.profile import Profile
-    from adhesis.solver.registry import make_method
 
     def progress(branch: Branch, penetration: float, state: ContactState) -> None:
         if report is not None:
             report((branch, penetration))
 
-    profile = Profile(job.period, job.coefficients)
-    half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
-    problem = Problem(profile, half_space, job.work_of_adhesion, control, strength=job.strength)
-    method = make_method(job.method, problem, accuracy=job.accuracy)
-    turn = turn_arguments(control, job.turning_point, job.at_preload, job.latest)
-    loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)
+    profile, cycle, gamma = job.profile, job.cycle, job.work_of_adhesion
+    problem = Problem(
+        profile, cycle.half_space, gamma, cycle.control, strength=cycle.strength_at(gamma),
+        work_of_adhesion_open=cycle.open_at(gamma),
+    )  # fmt: skip
+    method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
+    turn = turn_arguments(cycle.control, job.turning_point, cycle.at_preload, cycle.latest)
+    loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
     return loop.numbers() | {
         "range_warnings": range_warnings(

@@ -11,7 +11,7 @@ from typing import Any
 
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
 from adhesis.ensemble.run.dispatch import Channel, Limits, Master, OwnWorker
-from adhesis.ensemble.run.processes import Processes, Work
+from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.trace.job import Job, run
 
@@ -104,9 +104,7 @@ class Loops:
             if self.processes == 0:
                 channel = OwnWorker(computing, lambda outcome: outcome, limits)
             else:
-                channel = started = Processes(
-                    self.processes, Work(computing, report_interval=every)
-                )
+                channel = started = Processes(self.processes, computing, report_interval=every)
                 stack.enter_context(started)
                 self.pids = started.pids
             tasks = range(len(self._jobs))

@@ -12,10 +12,9 @@ from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.reading.printed_numbers import DELIMITERS
 
-_NAMES = (
-    *("unit", "step", "columns", "delimiter", "decimal", "row", "channel", "degree", "cut_off"),
-    *("tip_radius", "longest_gap", "keep_outliers", "invert", "exclude"),
-)
+_OF_READING = ("unit", "step", "decimal", "row", "channel")
+_OF_PREPARING = ("degree", "cut_off", "tip_radius", "longest_gap", "keep_outliers", "invert")
+_NAMES = (*_OF_READING, "columns", "delimiter", *_OF_PREPARING, "exclude")
 
 
 def trace_of(args: argparse.Namespace, path: Path) -> Trace:
@@ -28,16 +27,8 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
             raise InputError(
                 f"--columns is {args.columns!r}: it must be two whole numbers, as in 1,3"
             ) from None
-    return read_trace(
-        path,
-        unit=args.unit,
-        step=args.step,
-        columns=columns,
-        row=args.row,
-        channel=args.channel,
-        delimiter=delimiter_of(args),
-        decimal=args.decimal,
-    )
+    same = {name: getattr(args, name) for name in _OF_READING}
+    return read_trace(path, columns=columns, delimiter=delimiter_of(args), **same)
 
 
 def delimiter_of(args: argparse.Namespace) -> str | None:
@@ -52,16 +43,8 @@ def delimiter_of(args: argparse.Namespace) -> str | None:
 
 def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:
     """Prepare the trace by the options."""
-    return prepare_trace(
-        trace,
-        degree=args.degree,
-        cut_off=args.cut_off,
-        tip_radius=args.tip_radius,
-        longest_gap=args.longest_gap,
-        keep_outliers=args.keep_outliers,
-        invert=args.invert,
-        exclude=[_range(text) for text in args.exclude or ()],
-    )
+    same = {name: getattr(args, name) for name in _OF_PREPARING}
+    return prepare_trace(trace, exclude=[_range(text) for text in args.exclude or ()], **same)
 
 
 def _range(text: str) -> tuple[float, float]:

@@ -59,6 +59,19 @@ class Step:
     numbers: dict[str, float] = field(default_factory=dict)
 
 
+@dataclass
+class _Work:
+    """A preparation under way: its trace, the steps that were taken, and what is doubtful."""
+
+    trace: Trace
+    steps: list[Step] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def note(self, name: str, description: str, **numbers: float) -> None:
+        """Take note of a step."""
+        self.steps.append(Step(name, description, numbers))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Prepared(ByValue):
     """Trace that is ready for the loop, with all decisions of its preparation.
@@ -94,7 +107,6 @@ class Prepared(ByValue):
     start: float
     excluded: tuple[tuple[float, float], ...]
     features: tuple[Feature, ...]
-    outliers: int
     degree: int
     form_is_sure: bool
     cut_off: float
@@ -206,30 +218,28 @@ def prepare_trace(
         tip_radius = _length("tip_radius", tip_radius, _LENGTH_OR_NONE)
         longest_gap = _length("longest_gap", longest_gap, _LENGTH_OR_NONE)
     ranges = _ranges(exclude)
-    steps: list[Step] = []
-    warnings: list[str] = []
+    work = _Work(trace)
     heights = -trace.heights if invert else trace.heights.copy()
     if invert:
-        steps.append(Step("turned over", "heights turned over: z pointed into the sample"))
-    excluded = _excluded(heights, ranges, trace, steps)
+        work.note("turned over", "heights turned over: z pointed into the sample")
+    excluded = _excluded(work, heights, ranges)
     heights[excluded] = np.nan
-    heights, first = _without_ends(heights, trace, steps)
+    heights, first = _without_ends(work, heights)
     excluded, start = excluded[first : first + heights.size], first * trace.step
-    count = 0
     if not keep_outliers:
-        heights, count = _without_outliers(heights, steps, warnings)
-    filled, gaps = _filled(heights, excluded, trace, start, longest_gap, steps)
-    chosen = _degree(filled, degree, steps, warnings)
+        heights = _without_outliers(work, heights)
+    filled, gaps = _filled(work, heights, excluded, start, longest_gap)
+    chosen = _degree(work, filled, degree)
     level = filled - polynomial_form(filled, chosen)
     rms = float(np.sqrt(np.mean(level**2)))
-    steps[-1].numbers["rms_level"] = rms
+    work.steps[-1].numbers["rms_level"] = rms
     if rms <= 1e-12 * float(np.ptp(filled)):
         raise InputError(f"{trace.source} is flat when level: nothing is left but rounding")
     spectrum = trace_spectrum(level, trace.step)
-    radius = trace.tip_radius if tip_radius is None else tip_radius
-    limits = trusted_wavelength(spectrum, trace.step, radius or 0.0)
-    shortest = _cut_off(trace, filled.size, rms, cut_off, limits, radius, spectrum, steps, warnings)
-    _long_waves(spectrum, rms, warnings)
+    radius = (trace.tip_radius if tip_radius is None else tip_radius) or 0.0
+    limits = trusted_wavelength(spectrum, trace.step, radius)
+    shortest = _cut_off(work, filled.size * trace.step, rms, cut_off, limits, radius, spectrum)
+    _long_waves(work, spectrum, rms)
     features = single_features(level, trace.step, start)
     return Prepared(
         trace=trace,
@@ -238,14 +248,13 @@ def prepare_trace(
         start=start,
         excluded=ranges,
         features=features,
-        outliers=count,
         degree=chosen,
         form_is_sure=_prominence(form_shares(filled), chosen) > _SURE_FORM,
         cut_off=shortest,
         limits=limits,
         spectrum=spectrum,
-        steps=tuple(steps),
-        warnings=(*(feature.warning for feature in features), *warnings),
+        steps=tuple(work.steps),
+        warnings=(*(feature.warning for feature in features), *work.warnings),
     )
 
 
@@ -284,10 +293,9 @@ def _within(begin: float, end: float, start: float, step: float, size: int) -> M
     return np.asarray((position >= begin - rounding) & (position <= end + rounding))
 
 
-def _excluded(
-    heights: Array, ranges: Sequence[tuple[float, float]], trace: Trace, steps: list[Step]
-) -> Mask:
+def _excluded(work: _Work, heights: Array, ranges: Sequence[tuple[float, float]]) -> Mask:
     """Return which heights are excluded."""
+    trace = work.trace
     excluded = np.zeros(heights.size, dtype=bool)
     for begin, end in ranges:
         inside = _within(begin, end, 0.0, trace.step, heights.size)
@@ -299,13 +307,11 @@ def _excluded(
                 f"of {length_text(trace.step)}"
             )
         count = int(inside.sum())
-        steps.append(
-            Step(
-                "excluded",
-                f"{words}, as given: {counted(count, 'height')} treated as "
-                f"{'a drop-out' if count == 1 else 'drop-outs'}",
-                {"begin": begin, "end": end, "points": count},
-            )
+        work.note(
+            "excluded",
+            f"{words}, as given: {counted(count, 'height')} treated as "
+            f"{'a drop-out' if count == 1 else 'drop-outs'}",
+            **{"begin": begin, "end": end, "points": count},
         )
         excluded |= inside
     left = int(np.isfinite(heights[~excluded]).sum())
@@ -317,7 +323,7 @@ def _excluded(
     return excluded
 
 
-def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> tuple[Array, int]:
+def _without_ends(work: _Work, heights: Array) -> tuple[Array, int]:
     """Cut missing heights off both ends, where interpolation is impossible.
 
     Returns the others, and the index of the first of them.
@@ -326,17 +332,12 @@ def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> tuple[Arra
     first, last = int(good[0]), int(good[-1]) + 1
     lost = heights.size - (last - first)
     if lost:
-        steps.append(
-            Step(
-                "ends",
-                f"cut off where heights are missing: {lost}",
-                {"points": lost, "length": lost * trace.step},
-            )
-        )
+        described = f"cut off where heights are missing: {lost}"
+        work.note("ends", described, points=lost, length=lost * work.trace.step)
     return heights[first:last], first
 
 
-def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) -> tuple[Array, int]:
+def _without_outliers(work: _Work, heights: Array) -> Array:
     known = np.isfinite(heights)
     row = heights[known]
     around = sliding_window_view(np.pad(row, _SIDE, mode="edge"), 2 * _SIDE + 1)
@@ -350,40 +351,34 @@ def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) ->
     spikes = rest > _SPIKE * spread
     count = int(spikes.sum())
     if not count:
-        return heights, 0
+        return heights
     if count > max(3, _MAX_SPIKES * row.size):
-        warnings.append(
+        work.warnings.append(
             f"{count} heights stand {_SPIKE:g} standard deviations out of their surroundings: too "
             "many for outliers, so they stay; is the surface made of steps, or the trace faulty?"
         )
-        return heights, 0
+        return heights
     found = heights.copy()
     found[np.flatnonzero(known)[spikes]] = np.nan
     highest = float(rest[spikes].max())
-    steps.append(
-        Step(
-            "outliers",
-            f"{counted(count, 'outlier')} ({'' if count == 1 else 'up to '}{length_text(highest)}) "
-            f"removed and treated as {'a drop-out' if count == 1 else 'drop-outs'}",
-            {"points": count, "highest": highest},
-        )
+    work.note(
+        "outliers",
+        f"{counted(count, 'outlier')} ({'' if count == 1 else 'up to '}{length_text(highest)}) "
+        f"removed and treated as {'a drop-out' if count == 1 else 'drop-outs'}",
+        points=count,
+        highest=highest,
     )
-    return found, count
+    return found
 
 
 def _filled(
-    heights: Array,
-    excluded: Mask,
-    trace: Trace,
-    start: float,
-    longest: float | None,
-    steps: list[Step],
+    work: _Work, heights: Array, excluded: Mask, start: float, longest: float | None
 ) -> tuple[Array, Array]:
     """Fill gaps by straight lines; return heights, and which of them were filled.
 
     What was excluded does not count in the length of a gap.
     """
-    gaps = ~np.isfinite(heights)
+    trace, gaps = work.trace, ~np.isfinite(heights)
     if not gaps.any():
         return heights, gaps
     edges = np.flatnonzero(np.diff(np.concatenate([[False], gaps, [False]]).astype(int)))
@@ -391,11 +386,8 @@ def _filled(
     missing = np.add.reduceat((gaps & ~excluded).astype(int), starts)
     worst = int(np.argmax(missing))
     longest_here = float(missing[worst] + 1) * trace.step
-    allowed = (
-        max(_GAP_STEPS * trace.step, _GAP_SHARE * heights.size * trace.step)
-        if longest is None
-        else longest
-    )
+    allowed = max(_GAP_STEPS, _GAP_SHARE * heights.size) * trace.step
+    allowed = allowed if longest is None else longest
     if missing[worst] and longest_here > allowed * (1 + 1e-9):
         at = start + int(starts[worst]) * trace.step
         raise InputError(
@@ -414,14 +406,12 @@ def _filled(
     filled = heights.copy()
     filled[gaps] = np.interp(index[gaps], index[~gaps], heights[~gaps])
     longest_filled = float((ends - starts).max() + 1) * trace.step
-    steps.append(
-        Step(
-            "drop-outs",
-            f"{counted(int(gaps.sum()), 'height')} ({percent(share)}) in "
-            f"{counted(starts.size, 'gap')} interpolated by "
-            f"straight lines, the longest over {length_text(longest_filled)}",
-            {"points": int(gaps.sum()), "gaps": starts.size, "longest": longest_filled},
-        )
+    count = int(gaps.sum())
+    work.note(
+        "drop-outs",
+        f"{counted(count, 'height')} ({percent(share)}) in {counted(starts.size, 'gap')} "
+        f"interpolated by straight lines, the longest over {length_text(longest_filled)}",
+        **{"points": count, "gaps": starts.size, "longest": longest_filled},
     )
     return filled, gaps
 
@@ -435,7 +425,7 @@ def _why_missing(trace: Trace) -> str:
 # ---------------------------------------------------------------------- form
 
 
-def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list[str]) -> int:
+def _degree(work: _Work, filled: Array, wanted: int | None) -> int:
     """Choose the degree of the form, unless given; warn of a form that is not subtracted."""
     shares = form_shares(filled)
     stands_out = [d for d in range(2, _FORM_TO + 1) if _is_form(shares, d)]
@@ -458,15 +448,15 @@ def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list
     if bow > 0:
         said += f": {length_text(bow)} from lowest to highest beside the tilt"
         numbers["form_height"] = bow
-    steps.append(Step("form", said, numbers))
+    work.note("form", said, **numbers)
     if wanted is not None and found > wanted:
         left = float(np.sqrt(shares[wanted + 1 : found + 1].sum()))
-        warnings.append(
+        work.warnings.append(
             f"a form of degree {found} remains ({length_text(left)} rms, as of a curved sample "
             f"or guide): it counts as roughness with {parameter('degree')} {wanted}"
         )
     elif degree < found + 1 <= _FORM_TO and wanted is None and _is_form(shares, found + 1):
-        warnings.append("a form of a higher degree may remain")
+        work.warnings.append("a form of a higher degree may remain")
     return degree
 
 
@@ -480,12 +470,12 @@ def _prominence(shares: Array, degree: int) -> float:
     return float(shares[degree] / above.max()) if above.size and above.max() > 0 else 0.0
 
 
-def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> None:
+def _long_waves(work: _Work, spectrum: TraceSpectrum, rms: float) -> None:
     q, power = spectrum.wave_number, spectrum.power
     # The first bands hold one wave each, q0 apart: the mean square of a wave is 2 C q0/2π.
     share = float(2 * power[:2].sum() * q[0] / (2 * np.pi) / rms**2)
     if share > _LONG_WAVES:
-        warnings.append(
+        work.warnings.append(
             f"waves longer than a third of the trace hold {100 * min(share, 1.0):.0f} % of the "
             "mean square height: they decide the loss, and one trace has only one or two of them; "
             "measure a longer one, or several, or take the form off "
@@ -497,23 +487,21 @@ def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> Non
 
 
 def _cut_off(
-    trace: Trace,
-    points: int,
+    work: _Work,
+    length: float,
     rms: float,
     wanted: float | None,
     limits: dict[str, float],
-    radius: float | None,
+    radius: float,
     spectrum: TraceSpectrum,
-    steps: list[Step],
-    warnings: list[str],
 ) -> float:
-    length = points * trace.step
+    trace = work.trace
     by = max(limits, key=lambda name: limits[name])
     shortest = limits[by]
     reasons = {
         "step": "five steps",
         "noise": "below it the noise of the instrument",
-        "tip": f"what a tip of radius {length_text(radius or 0)} follows",
+        "tip": f"what a tip of radius {length_text(radius)} follows",
     }
     if wanted is not None:
         if not 2.2 * trace.step <= wanted <= length / 2:
@@ -522,7 +510,7 @@ def _cut_off(
                 f"({length_text(2.2 * trace.step)}) and half the length ({length_text(length / 2)})"
             )
         if wanted < shortest * (1 - 1e-9):
-            warnings.append(
+            work.warnings.append(
                 f"the cut-off {length_text(wanted)} is shorter than what the trace can be trusted "
                 f"with, {length_text(shortest)} ({reasons[by]})"
             )
@@ -543,15 +531,11 @@ def _cut_off(
                 f"(give {parameter('cut_off')} to go on)"
             )
     noise = f"; white noise of {length_text(spectrum.noise)} rms" if spectrum.floor > 0 else ""
-    steps.append(
-        Step(
-            "cut-off",
-            f"waves shorter than {length_text(shortest, 4)} dropped ({why}){noise}",
-            {
-                "cut_off": shortest,
-                "noise_rms": spectrum.noise,
-                **{f"limit_{k}": v for k, v in limits.items()},
-            },
-        )
+    work.note(
+        "cut-off",
+        f"waves shorter than {length_text(shortest, 4)} dropped ({why}){noise}",
+        cut_off=shortest,
+        noise_rms=spectrum.noise,
+        **{f"limit_{name}": limit for name, limit in limits.items()},
     )
     return shortest

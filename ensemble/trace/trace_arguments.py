@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.quantities import LENGTH, STIFFNESS, STRESS
+from adhesis.ensemble.quantities import LENGTH, STIFFNESS, STRESS, WORK_OF_ADHESION
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
@@ -33,12 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--young", type=STRESS.option, required=True, metavar="E", help="in Pa, or 1MPa"
     )
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
-    add_strength_arguments(contact)
+    add_open_argument(contact)
     add_cycle_arguments(contact)
-    contact.add_argument(
-        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
-    )
-    contact.add_argument("--accuracy", type=float, default=1e-3, help="of each loop (default 1e-3)")
+    add_method_arguments(contact, "of each loop (default 1e-3)")
     add_reading_arguments(parser)
     output = parser.add_argument_group("output")
     output.add_argument("--to", type=Path, metavar="DIR", help="for the page, its figures and JSON")
@@ -51,7 +48,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare turning points and control, which ``adhesis loop`` shares."""
+    """Declare strength, turning points and control, which ``adhesis loop`` shares."""
+    group.add_argument(
+        "--adhesion-range",
+        type=LENGTH.option,
+        metavar="D",
+        help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
+        "(default: zero range, they never do)",
+    )
+    group.add_argument(
+        "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"
+    )
     group.add_argument(
         "--max-penetration",
         metavar="D[,D…]",
@@ -84,18 +91,23 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
 
 
-def add_strength_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare the strength of the interface; ``adhesis loop`` shares it."""
+def add_open_argument(group: argparse._ArgumentGroup) -> None:
+    """Declare the work of adhesion of an edge that recedes; ``adhesis loop`` shares it."""
     group.add_argument(
-        "--adhesion-range",
-        type=LENGTH.option,
-        metavar="D",
-        help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
-        "(default: zero range, they never do)",
+        "--work-of-adhesion-open",
+        type=WORK_OF_ADHESION.option,
+        metavar="G",
+        help="where an edge recedes, at least that where it advances, --work-of-adhesion; between "
+        "both it is pinned (default: the same)",
     )
+
+
+def add_method_arguments(group: argparse._ArgumentGroup, accuracy: str) -> None:
+    """Declare method and accuracy; ``adhesis loop`` shares them."""
     group.add_argument(
-        "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"
+        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
     )
+    group.add_argument("--accuracy", type=float, default=1e-3, help=accuracy)
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:

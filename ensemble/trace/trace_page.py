@@ -17,10 +17,11 @@ from adhesis.ensemble.quantities import (
     with_error,
 )
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
+from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Uncertain, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
+from adhesis.solver.loading.equilibrium_path import friction_text
 
 
 def summary(answer: Answer) -> str:
@@ -39,6 +40,7 @@ def summary(answer: Answer) -> str:
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
         f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
+        *(f"friction    {text}" for text in _friction(answer)),
         f"scope       {_scope(answer)}",
         f"range       {_range(answer)}",
         "doubts      "
@@ -66,6 +68,14 @@ def _largest_changes(answer: Answer) -> str:
             f"{of}by “{run.name}” ({run.description}{against}): × {change.factor:.3g}{beyond}"
         )
     return "; ".join(clauses) or "no other decision about the trace could be run"
+
+
+def _friction(answer: Answer) -> list[str]:
+    """Say which part of the loop's loss is friction of edges; nothing with one work of adhesion."""
+    gamma, loop = answer.cycle.work_of_adhesion_open, answer.main
+    if gamma is None or gamma == answer.cycle.works_of_adhesion[0]:
+        return []
+    return [friction_text(gamma, loop["loss"], loop["friction"])]
 
 
 def _note(answer: Answer) -> str:
@@ -121,7 +131,7 @@ def write_all(answer: Answer, folder: Path) -> Path:
 # ---------------------------------------------------------------------- content
 
 
-def _value(quantity: Quantity, by: float, unit: str, most: float = math.inf) -> str:
+def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) -> str:
     """Return a quantity that is not negative, with its interval."""
     unit = f" {unit}" if unit else ""
     known = with_error(by * quantity.value, by * quantity.uncertainty, 0.0, most)
@@ -160,6 +170,7 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         images.get("spectrum"),
         "## The loop",
         images.get("loop"),
+        *(f"Friction: {text}." for text in _friction(answer)),
         f"Scope: {_scope(answer)}.",
         f"Range: {_range(answer)} (least of the loop and its variants).",
         "## How far it can be trusted",
@@ -231,9 +242,8 @@ def _variant_rows(answer: Answer) -> list[list[str]]:
 def _sweep_rows(answer: Answer) -> list[list[str]]:
     cycle = answer.cycle
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
-    rows = [(gamma, point, answer.main)]
-    rows += [(float(n.split()[1]), point, r) for n, _, r in answer.group("work of adhesion")]
-    rows += [(gamma, float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    rows = [(g, point, numbers) for g, numbers in answer.works_of_adhesion]
+    rows += [(gamma, d, numbers) for d, numbers in answer.turning_points if d != point]
     head = ["γ, J/m²", cycle.turn_sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
     return [
         head,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,19 +12,16 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
-from adhesis.ensemble.trace.job import Job
+from adhesis.ensemble.trace.job import Cycle, Job
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.checks import counted
-from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import strength_of
 from adhesis.solver.model.profile import Profile
-from adhesis.solver.registry import MethodName
 from adhesis.solver.values import ByValue
 
 # Longer profiles are compared at a coarser cut-off when a doubt is measured.
-_MAX_WAVES_OF_VARIANTS = 8000
+_MAX_WAVES_OF_VARIANTS, _LONGEST_CUT_OFF = 8000, 16
 # A plan of more seconds gets hints, down to this number of waves.
 _SECONDS_TO_HINT, _MIN_WAVES = 120.0, 50
 
@@ -38,53 +35,6 @@ _LEVELS, _USUAL_PENETRATION = 18, 0.9
 # Loop without the crests and troughs that stand far out of all others.
 WITHOUT_FEATURES = "without single features"
 _START = 2.0  # seconds for a process to start
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """Contact and cycle in SI units; the answer has the first value of each tuple.
-
-    Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load; preloads in Pa
-    if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload.
-    """
-
-    half_space: HalfSpace
-    works_of_adhesion: tuple[float, ...]
-    turning_points: tuple[float, ...]
-    load_steps: int = 40
-    method: MethodName = "auto"
-    accuracy: float = 1e-3
-    control: Control = field(default_factory=Control)
-    adhesion_range: float | None = None
-    strength: float | None = None
-    at_preload: bool = False
-    latest: float | None = None
-
-    @property
-    def turn_sign(self) -> str:
-        """Return the sign of the turning points, with their unit if they have one."""
-        if self.at_preload:
-            return "preload, Pa"
-        if self.control.is_load:
-            return "p̄, Pa"
-        return "Δ/h_max" if self.control.is_fixed else "u_tot/h_max"
-
-    def turn(self, point: float) -> str:
-        """Describe a turning point: "Δ/h_max = 0.9"."""
-        if self.at_preload:
-            held = "a fixed separation"
-            if not self.control.is_fixed:
-                held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
-            return f"a preload of {point:g} Pa at {held}"
-        if self.control.is_load:
-            return f"p̄ = {point:g} Pa"
-        if self.control.is_fixed:
-            return f"Δ/h_max = {point:g}"
-        return f"u_tot/h_max = {point:g} of a stiffness of {self.control.stiffness:.4g} Pa/m"
-
-    def strength_at(self, work_of_adhesion: float) -> float:
-        """Return the strength of the interface in Pa at a work of adhesion in J/m²."""
-        return strength_of(work_of_adhesion, self.adhesion_range, self.strength)
 
 
 @dataclass(frozen=True)
@@ -161,9 +111,13 @@ def make_plan(
         key = repr(sorted(run.changes.items()))
         if key not in profiles:
             profiles[key] = prepared.profile(**run.changes)
-        job = _job(run, profiles[key], cycle)
-        jobs[run.name] = job
-        seconds[run.name] = expected_seconds(profiles[key], job)
+        gamma, point = run.work_of_adhesion, run.turning_point
+        job = jobs[run.name] = Job(
+            *(run.name, profiles[key], cycle),
+            cycle.works_of_adhesion[0] if gamma is None else gamma,
+            cycle.turning_points[0] if point is None else point,
+        )
+        seconds[run.name] = expected_seconds(job)
     base = profiles[repr([])]
     # The cheapest loop is first and alone, as it compiles; then the longest ones, for balance.
     first = min(runs, key=lambda run: seconds[run.name])
@@ -177,12 +131,12 @@ def make_plan(
         jobs=tuple(jobs[run.name] for run in order),
         seconds=seconds,
         waves=base.highest_harmonic,
-        patches=round(patches_of(base, jobs["answer"])),
+        patches=round(patches_of(jobs["answer"])),
         processes=processes,
         wall=wall + 2 * _START,
         hints=(),
     )
-    return Plan(**{**plan.__dict__, "hints": _hints(prepared, plan, quick)})
+    return replace(plan, hints=_hints(prepared, plan, quick))
 
 
 def _doubts(prepared: Prepared) -> list[Run]:
@@ -190,75 +144,43 @@ def _doubts(prepared: Prepared) -> list[Run]:
     cut, step = prepared.cut_off, prepared.step
     length = prepared.filled.size * step
     runs = [Run("answer", "answer", "the loop")]
-
-    def cut_off(factor: float) -> None:
-        runs.append(
-            Run(
-                f"cut-off × {factor:.3g}",
-                "cut-off",
-                f"waves down to {length_text(factor * cut)}",
-                {"cut_off": factor * cut},
-            )
-        )
-
-    for factor in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0)):
-        if factor * cut <= length / 4:
-            cut_off(factor)
-    if cut / math.sqrt(2.0) >= 2.5 * step:
-        cut_off(1 / math.sqrt(2.0))
-
     # On long traces the other doubts are measured with fewer waves, all else being equal.
     factor = 1.0
-    while length / (factor * cut) > _MAX_WAVES_OF_VARIANTS and 2 * factor in (2.0, 4.0, 8.0, 16.0):
+    while length / (factor * cut) > _MAX_WAVES_OF_VARIANTS and factor < _LONGEST_CUT_OFF:
         factor *= 2
+    base = {} if factor == 1 else {"cut_off": factor * cut}
     reference = "answer" if factor == 1 else f"cut-off × {factor:.3g}"
 
     def variant(name: str, group: str, description: str, **changes: Any) -> None:
-        kept = {} if factor == 1 else {"cut_off": factor * cut}
-        runs.append(Run(name, group, description, kept | changes, reference))
+        runs.append(Run(name, group, description, base | changes, reference))
 
+    for longer in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0), 1 / math.sqrt(2.0)):
+        if longer * cut <= length / 4 if longer > 1 else longer * cut >= 2.5 * step:
+            name, described = (
+                f"cut-off × {longer:.3g}",
+                f"waves down to {length_text(longer * cut)}",
+            )
+            runs.append(Run(name, "cut-off", described, {"cut_off": longer * cut}))
     variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
     for part in (0.05, 0.1):
-        variant(
-            f"taper {100 * part:.0f} %",
-            "continuation",
-            f"both ends faded to the mean over {100 * part:.0f} %",
-            continuation="taper",
-            part=part,
-        )
+        faded = f"both ends faded to the mean over {100 * part:.0f} %"
+        name = f"taper {100 * part:.0f} %"
+        variant(name, "continuation", faded, continuation="taper", part=part)
     if 2 * factor * cut <= length / 4:
-        runs.append(
-            Run(
-                "mirror",
-                "mirror",
-                "trace and mirror image, twice as long a period",
-                {"continuation": "mirror", "cut_off": 2 * factor * cut},
-                f"cut-off × {2 * factor:.3g}",
-            )
-        )
-    variant(
-        f"degree {prepared.degree + 1}", "form", "one degree more off", degree=prepared.degree + 1
-    )
-    if prepared.degree > 1 and not prepared.form_is_sure:
-        less = prepared.degree - 1
-        variant(f"degree {less}", "form", "one degree less off", degree=less)
+        described = "trace and mirror image, twice as long a period"
+        changes = {"continuation": "mirror", "cut_off": 2 * factor * cut}
+        runs.append(Run("mirror", "mirror", described, changes, f"cut-off × {2 * factor:.3g}"))
+    degree = prepared.degree
+    variant(f"degree {degree + 1}", "form", "one degree more off", degree=degree + 1)
+    if degree > 1 and not prepared.form_is_sure:
+        variant(f"degree {degree - 1}", "form", "one degree less off", degree=degree - 1)
     if prepared.features:
-        variant(
-            WITHOUT_FEATURES,
-            "single features",
-            f"{single_features_text(prepared.features)} bridged by straight lines",
-            without_features=True,
-        )
+        bridged = f"{single_features_text(prepared.features)} bridged by straight lines"
+        variant(WITHOUT_FEATURES, "single features", bridged, without_features=True)
     if prepared.spectrum.noise > 0:
+        described = "white noise of the instrument's size added"
         for seed in (1, 2) if factor == 1 else (1,):
-            runs.append(
-                Run(
-                    f"noise {seed}",
-                    "noise",
-                    "white noise of the instrument's size added",
-                    {"noise_seed": seed},
-                )
-            )
+            runs.append(Run(f"noise {seed}", "noise", described, {"noise_seed": seed}))
     return runs
 
 
@@ -268,40 +190,12 @@ def _tables(cycle: Cycle) -> list[Run]:
     sign = "p̄" if cycle.control.is_load else "Δ" if cycle.control.is_fixed else "u"
     sign = "preload" if cycle.at_preload else sign
     for gamma in gammas[1:]:
-        runs.append(
-            Run(f"γ {gamma:g}", "work of adhesion", f"γ = {gamma:g} J/m²", work_of_adhesion=gamma)
-        )
+        name, described = f"γ {gamma:g}", f"γ = {gamma:g} J/m²"
+        runs.append(Run(name, "work of adhesion", described, work_of_adhesion=gamma))
     for point in turns[1:]:
-        runs.append(
-            Run(
-                f"{sign} {point:g}",
-                "turning point",
-                f"turning at {cycle.turn(point)}",
-                turning_point=point,
-            )
-        )
+        name, described = f"{sign} {point:g}", f"turning at {cycle.turn(point)}"
+        runs.append(Run(name, "turning point", described, turning_point=point))
     return runs
-
-
-def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
-    gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
-    gamma = gamma if run.work_of_adhesion is None else run.work_of_adhesion
-    return Job(
-        name=run.name,
-        period=profile.period,
-        coefficients=profile.coefficients,
-        young=cycle.half_space.young,
-        poisson=cycle.half_space.poisson,
-        work_of_adhesion=gamma,
-        turning_point=point if run.turning_point is None else run.turning_point,
-        stiffness=cycle.control.stiffness,
-        load_steps=cycle.load_steps,
-        method=cycle.method,
-        accuracy=cycle.accuracy,
-        strength=cycle.strength_at(gamma),
-        at_preload=cycle.at_preload,
-        latest=cycle.latest,
-    )
 
 
 # ---------------------------------------------------------------------- cost
@@ -331,24 +225,23 @@ def crests_reached(profile: Profile, penetration: float) -> int:
     return most
 
 
-def patches_of(profile: Profile, job: Job) -> float:
+def patches_of(job: Job) -> float:
     """Estimate the largest number of patches at a time of one loop.
 
     It is limited by the number of crests that are reached. Where the separation at the turning
     point is not known, those of the usual one count.
     """
-    half_space = HalfSpace(job.young, job.poisson)
-    is_known = math.isinf(job.stiffness) and not job.at_preload
+    is_known = job.cycle.control.is_fixed and not job.cycle.at_preload
     penetration = job.turning_point if is_known else _USUAL_PENETRATION
-    by_adhesion = expected_patches(profile, half_space, job.work_of_adhesion)
-    return min(by_adhesion, float(crests_reached(profile, penetration)))
+    by_adhesion = expected_patches(job.profile, job.cycle.half_space, job.work_of_adhesion)
+    return min(by_adhesion, float(crests_reached(job.profile, penetration)))
 
 
-def expected_seconds(profile: Profile, job: Job) -> float:
+def expected_seconds(job: Job) -> float:
     """Estimate the CPU seconds of one loop."""
-    waves, patches = float(profile.highest_harmonic), patches_of(profile, job)
+    waves, patches = float(job.profile.highest_harmonic), patches_of(job)
     of_patches = _SECONDS_OF_PATCH * waves**_WAVES_POWER * patches**_PATCHES_POWER
-    steps = max(job.load_steps / 40, 0.5)
+    steps = max(job.cycle.load_steps / 40, 0.5)
     return float(_LEAST_SECONDS + _SECONDS_OF_WAVE * waves + of_patches) * steps
 
 
@@ -359,8 +252,8 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
     hints = []
     factor = 2.0
     while plan.waves / factor >= _MIN_WAVES:
-        coarser = prepared.profile(cut_off=factor * prepared.cut_off)
-        wall = plan.wall * expected_seconds(coarser, answer) / plan.seconds["answer"]
+        coarser = replace(answer, profile=prepared.profile(cut_off=factor * prepared.cut_off))
+        wall = plan.wall * expected_seconds(coarser) / plan.seconds["answer"]
         if wall < _SECONDS_TO_HINT / 2 or plan.waves / factor < 2 * _MIN_WAVES:
             hints.append(
                 f"{parameter('cut_off')} {factor * prepared.cut_off * 1e6:.2g}um "

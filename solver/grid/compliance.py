@@ -16,8 +16,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from adhesis.solver._kernels import inverse_form
 
+from adhesis.solver._kernels import inverse_form
 from adhesis.solver.model.profile import Array
 
 # Number of one-node blocks at the end of a patch beside the node, and growth of the next blocks.

@@ -14,6 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from adhesis.solver._kernels import (
     advance,
     dot,
@@ -22,8 +24,6 @@ from adhesis.solver._kernels import (
     total,
     update_direction,
 )
-from numpy.typing import NDArray
-
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from adhesis.solver._kernels import dot, total
 from numpy.typing import NDArray
 
+from adhesis.solver._kernels import dot, total
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import EDGE_COMPLIANCE, Contact
 from adhesis.solver.grid.elasticity import ElasticGrid
@@ -55,7 +55,7 @@ class Lattice:
             elastic,
             EdgeCompliance(elastic.kernel()),
             profile.heights(n),
-            problem.work_of_adhesion * np.sqrt(1 + profile.slopes(n) ** 2),
+            problem.toughness(profile.slopes(n)),
             problem.control,
             profile.h_max,
             round(profile.highest_point[0] / elastic.dx) % n,

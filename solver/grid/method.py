@@ -163,9 +163,8 @@ class GridMethod(Method):
         """Compute the openings from the gaps at nodes, and Griffith's criterion at the edges."""
         if not state.patches:
             return []
-        profile, gamma = self.problem.profile, self.problem.work_of_adhesion
-        slope = profile.at(state.edges, derivative=1)
-        toughness = gamma * np.sqrt(1 + slope**2)
+        profile = self.problem.profile
+        toughness = self.problem.toughness(profile.at(state.edges, derivative=1))
         coefficient = 4 * np.sqrt(toughness / (np.pi * self.problem.half_space.modulus))
         fields = self.fields(state, self.nodes)
         return openings_between(state.edges, fields, coefficient, profile.period)

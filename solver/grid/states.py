@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from adhesis.solver._kernels import total
 from numpy.typing import NDArray
 
+from adhesis.solver._kernels import total
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.edges import Indices
 from adhesis.solver.grid.lattice import Lattice

@@ -158,8 +158,9 @@ Searched unpack(const Array& packed) {
   return out;
 }
 
-std::shared_ptr<LinearResponse> keep(NewResponse&& made) {
-  return made.has_field ? std::make_shared<LinearResponse>(std::move(made.response)) : nullptr;
+std::optional<LinearResponse> keep(NewResponse&& made) {
+  if (!made.has_field) return std::nullopt;
+  return std::move(made.response);
 }
 
 using Openings = std::tuple<Values, Values, Values, Values>;
@@ -242,12 +243,13 @@ void bind_model(nb::module_& m) {
       .def("__init__",
            [](EdgeLaw* law, double critical, double newton_tolerance, double field_error,
               double rest_step, double longest_step, double smallest, double overlap_limit,
-              double force_error) {
+              double force_error, double pinning) {
              new (law) EdgeLaw{critical, newton_tolerance, field_error, rest_step,
-                               longest_step, smallest, overlap_limit, force_error};
+                               longest_step, smallest, overlap_limit, force_error,
+                               pinning};
            },
            nb::kw_only(), "critical"_a, "newton_tolerance"_a, "field_error"_a, "rest_step"_a,
-           "longest_step"_a, "smallest"_a, "overlap_limit"_a, "force_error"_a)
+           "longest_step"_a, "smallest"_a, "overlap_limit"_a, "force_error"_a, "pinning"_a)
       .def(nb::init<const EdgeLaw&>())
       .def_rw("critical", &EdgeLaw::critical)
       .def_rw("newton_tolerance", &EdgeLaw::newton_tolerance)
@@ -257,6 +259,7 @@ void bind_model(nb::module_& m) {
       .def_rw("smallest", &EdgeLaw::smallest)
       .def_rw("overlap_limit", &EdgeLaw::overlap_limit)
       .def_rw("force_error", &EdgeLaw::force_error)
+      .def_rw("pinning", &EdgeLaw::pinning)
       .def("critical_openings",
            [](const EdgeLaw& law, const Array& theta, const Panels& panels) {
              return evaluate_at(theta,
@@ -272,17 +275,17 @@ void bind_model(nb::module_& m) {
 void bind_field(nb::module_& m) {
   nb::class_<Field>(m, "Field", "Solution of equation (1) of gap_field for given gaps.")
       .def_ro("pressure", &Field::pressure, "p = 2p̄/E*; NaN if there is no solution.")
-      .def_ro("separation", &Field::separation, "q0 s")
-      .def_ro("unit_mean", &Field::unit_mean, "Xᵀ (B + G)⁻¹ X")
+      .def_ro("separation", &Field::separation, "q0 s.")
+      .def_ro("unit_mean", &Field::unit_mean, "Xᵀ (B + G)⁻¹ X.")
       .def_ro("resistance", &Field::resistance, "-2π/resistance is ∂p/∂d at fixed edges.")
-      .def_prop_ro("opening", [](const Field& f) { return array_of(f.opening); }, new_array, "C at each edge")
+      .def_prop_ro("opening", [](const Field& f) { return array_of(f.opening); }, new_array, "C at each edge.")
       .def_prop_ro("scaled_opening", [](const Field& f) { return array_of(f.scaled_opening); }, new_array,
-                   "f: the openings over sqrt(1-η²), at all nodes")
+                   "f: the openings over sqrt(1-η²), at all nodes.")
       .def_prop_ro("orders", [](const Field& f) { return array_of(f.nodes.orders); }, new_array)
       .def_prop_ro("offset", [](const Field& f) { return array_of(f.nodes.offset); }, new_array)
       .def_prop_ro("theta", [](const Field& f) { return array_of(f.nodes.theta); }, new_array)
-      .def_prop_ro("weight", [](const Field& f) { return array_of(f.nodes.weight); }, new_array, "X")
-      .def_prop_ro("load", [](const Field& f) { return array_of(f.equations.load); }, new_array, "S~")
+      .def_prop_ro("weight", [](const Field& f) { return array_of(f.nodes.weight); }, new_array, "X.")
+      .def_prop_ro("load", [](const Field& f) { return array_of(f.equations.load); }, new_array, "S~.")
       .def("block",
            [](const Field& f, int k) {
              const auto first = f.equations.blocks.begin() + f.nodes.square[k];

@@ -19,11 +19,12 @@ struct EdgeLaw {
   double smallest;          // narrower patches and gaps are removed
   double overlap_limit;     // an opening this far below zero is one that descent cannot weigh
   double force_error;       // a force C_c² - C² this small is that of rounding
+  double pinning;           // sqrt(γ_open/γ) - 1, by which C_c of a receding edge is larger
 };
 
 inline double outwards(int edge) { return edge % 2 == 0 ? 1 : -1; }
 
-// C_c at θ, and its derivative.
+// C_c at θ of an edge that advances, and its derivative.
 inline ValueAndSlope critical_opening(double theta, const EdgeLaw& law, const Panels& panels) {
   auto [measure, slope] = measure_at(theta, panels);
   double root = std::sqrt(measure);

@@ -66,7 +66,11 @@ class EquilibriumPath(ByValue, ResultViews):
         In J/m, per period.
     jumps : tuple of Jump
     loss_from_drops : float
-        Sum of the energy drops at the jumps, in J/m² of nominal area.
+        Sum of the energy drops at the jumps, in J/m² of nominal area; with two works of adhesion
+        also the friction of the edges between the jumps.
+    receded : array or None
+        Length along the profile, in m, over which edges have receded on the way to each state;
+        None with one work of adhesion.
     loss_error : float
         Estimated numerical error of the loss or work, in J/m² (docs/methods.md, "Error of the
         loss").
@@ -108,6 +112,7 @@ class EquilibriumPath(ByValue, ResultViews):
     method: MethodReport = field(compare=False)
     contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
     new_method: Callable[[], Method] | None = field(default=None, compare=False)
+    receded: Array | None = None
     interior: InteriorTension | None = None
     narrowest_length: float = float("nan")
 
@@ -119,6 +124,17 @@ class EquilibriumPath(ByValue, ResultViews):
     def energy(self) -> Array:
         """U in J/m, per period, shape (states,)."""
         return self.elastic_energy + self.adhesion_energy
+
+    @property
+    def friction(self) -> float:
+        """Energy that edges dissipate as they recede, in J/m² of nominal area.
+
+        By so much do the two works of adhesion differ, within jumps and between them; 0 for one.
+        """
+        if self.receded is None:
+            return 0.0
+        pinning, period = self.problem.pinning, self.problem.profile.period
+        return float(pinning / period * (self.receded[-1] - self.receded[0]))
 
     @property
     def largest_contact_fraction(self) -> float:
@@ -217,6 +233,11 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return the index of the state before each jump; the next one is that after it."""
         return states_before_jumps(self.jumps, self.branch, self.separation, self.contact_fraction)
 
+    def friction_summary(self) -> str:
+        """Return in one line what is friction of edges; empty with one work of adhesion."""
+        gamma = self.problem.work_of_adhesion_open
+        return "" if gamma is None else friction_text(gamma, self.lost, self.friction)
+
     def range_summary(self) -> str:
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""
         interior = self.interior
@@ -251,12 +272,13 @@ class EquilibriumPath(ByValue, ResultViews):
     def numbers(self) -> dict[str, Any]:
         """Return the single numbers of the problem and the result by name, in SI units.
 
-        None stands for infinity, and for the stiffness of a fixed separation.
+        None stands for infinity, and for the stiffness of a fixed separation. With one work of
+        adhesion ``work_of_adhesion_open`` is that one.
         ``pandas.DataFrame([loop.numbers() for loop in loops])`` compares loops.
         """
         problem, half_space = self.problem, self.problem.half_space
         own = (*self._numbers, "loss_from_drops", "audit_residual", "loss_error", "races")
-        own = (*own, "energy_at_stake", "openings", "barrier")
+        own = (*own, "friction", "energy_at_stake", "openings", "barrier")
         more = ("largest_contact_fraction", "largest_interior_tension")
         values = {name: getattr(self, name) for name in (*own, *more)}
         gamma = problem.work_of_adhesion
@@ -265,8 +287,10 @@ class EquilibriumPath(ByValue, ResultViews):
             "young": half_space.young,
             "poisson": half_space.poisson,
             "work_of_adhesion": gamma,
+            "work_of_adhesion_open": problem.gamma_open,
             "stiffness": finite(problem.control.stiffness),
             "strength": finite(problem.strength),
+            "measure": problem.measure,
             "full_contact_energy": problem.full_contact_energy,
             "load_steps": self.load_steps,
             **values,
@@ -280,17 +304,26 @@ class EquilibriumPath(ByValue, ResultViews):
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the values of every state by name, arrays of shape (states,) in SI units."""
-        names = (
+        names: tuple[str, ...] = (
             *("branch", "load_step", "penetration", "separation", "mean_stress"),
             *("contact_fraction", "patches", "energy", "elastic_energy", "adhesion_energy"),
             *self._columns,
         )
+        names += ("receded",) if self.receded is not None else ()
         return {name: getattr(self, name) for name in names}
 
     def jump_rows(self) -> list[dict[str, Any]]:
         """Return the jumps with their penetration Δ/h_max, a dictionary for each, in SI units."""
         penetration = self.problem.penetration
         return [asdict(jump) | {"penetration": penetration(jump.separation)} for jump in self.jumps]
+
+
+def friction_text(work_of_adhesion_open: float, lost: float, friction: float) -> str:
+    """Return in one line which part of a loss is friction of edges; values in J/m²."""
+    return (
+        f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²; "
+        f"{lost - friction:.6g} J/m² lost by instability"
+    )
 
 
 def path_fields(method: Method, record: Record, started: float) -> dict[str, Any]:
@@ -310,7 +343,8 @@ def path_fields(method: Method, record: Record, started: float) -> dict[str, Any
         **{name: record.column(name) for name in arrays},
         "patches": record.column("patches").astype(np.int64),
         "jumps": tuple(record.jumps),
-        "loss_from_drops": float(sum(jump.energy_drop for jump in record.jumps)),
+        "loss_from_drops": record.dissipated(problem),
+        "receded": record.column("receded") if problem.pinning else None,
         "seconds": process_time() - started,
         "method": report,
         "contact_states": tuple(record.states),

@@ -139,7 +139,7 @@ def run_loop(
     """
     control = instance("method", method, Method, HOW_METHOD).problem.control
     if preload is None:
-        turning_point = turning_of(method.problem, max_penetration, max_stress)
+        turning_point = turning_of(control, max_penetration, max_stress)
     else:
         turning_point = latest_turn(method.problem, preload, max_penetration, max_stress)
     turning_point, load_steps = check_cycle(turning_point, load_steps, control)
@@ -162,7 +162,7 @@ def run_loop(
     return result_of(method, record, turn, i if reached else load_steps, started, preload)
 
 
-def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None) -> T:
+def turning_of(control: Control, max_penetration: T | None, max_stress: T | None) -> T:
     """Select the turning point, or points, of the control.
 
     Raises
@@ -171,7 +171,7 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
         If the argument of another control is given, or none.
     """
     wanted, other = ("max_penetration", max_penetration), ("max_stress", max_stress)
-    if problem.control.is_load:
+    if control.is_load:
         wanted, other = other, wanted
     elif max_stress is not None:
         raise ValueError(
@@ -181,10 +181,10 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
             "instead of max_stress"
         )
     if wanted[1] is None or other[1] is not None:
-        control = "a load" if problem.control.is_load else "a separation or a stiffness"
+        under = "a load" if control.is_load else "a separation or a stiffness"
         raise ValueError(
-            f"a path under {control} turns at {wanted[0]}: give that, and no {other[0]}"
-            + ("" if problem.control.is_load else " (or give preload, in Pa)")
+            f"a path under {under} turns at {wanted[0]}: give that, and no {other[0]}"
+            + ("" if control.is_load else " (or give preload, in Pa)")
         )
     return wanted[1]
 

@@ -130,6 +130,12 @@ class LoopResult(EquilibriumPath):
         return last - 1 in self.states_before_jumps()
 
     @property
+    def _opening_text(self) -> str:
+        """Work of adhesion at which edges recede, for a message; empty if there is one alone."""
+        found = self.problem.work_of_adhesion_open
+        return "" if found is None else f"γ_open = {found:.4g} J/m², "
+
+    @property
     def _where(self) -> str:
         """Turning point as prescribed, for a message."""
         control, point = self.problem.control, self.turning_point
@@ -207,6 +213,14 @@ class LoopResult(EquilibriumPath):
             *(self.edge_range, self.touch_range),
         )
         found += opening_warnings(self.jumps, self.loss)
+        profile = self.problem.profile
+        alike = profile.equal_parts > 1 or profile.mirror_axes.size > 0
+        if self.problem.pinning > 0 and alike and self.patches.max() > 1:
+            found.append(
+                "parts of the profile are alike, and with two works of adhesion it is not settled "
+                "at which separation one of equal patches recedes before the other: the loss may "
+                "be wrong by a per cent; take a profile whose parts differ a little"
+            )
         return tuple(found)
 
     @property
@@ -242,12 +256,14 @@ class LoopResult(EquilibriumPath):
                 f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
                 f"period {profile.period:.4g} m",
                 f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
+                f"{self._opening_text}"
                 f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²"
                 f"{f' ({self.loss_note})' if self.loss_note else ''}",
+                *(f"friction   {text}" for text in (self.friction_summary(),) if text),
                 f"range      {self.range_summary()}",
                 f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
                 f"pull-off   {self.pull_off_stress:.4g} Pa, "

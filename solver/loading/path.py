@@ -5,10 +5,10 @@ turn, and ends at the last one or out of contact. A leg that comes back to the s
 leg closes a minor loop. Whether the state is then the earlier one (return-point memory) is not
 assumed but measured, and every part is audited,
 
-    -∫ Y dx = ΔW/λ + sum of the drops,
+    -∫ Y dx = ΔW/λ + sum of the drops + friction of edges between jumps,
 
 with ΔW the change of the potential from its start to its end (:mod:`adhesis.solver.model.control`),
-0 for a part that closes.
+0 for a part that closes. Edges have friction where two works of adhesion differ.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from adhesis.solver.views import NotebookDisplay
 
 _SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # least change of stress or contact, relative to its range on the loop, that counts
+_ROUNDING = 1e-9  # of the largest contact: what it changes by where all edges are pinned
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class MinorLoop(NotebookDisplay):
     loss : float
         Work -∫ Y dx, in J/m² of nominal area.
     loss_from_drops : float
-        Sum of the energy drops at its jumps, in J/m².
+        Sum of the energy drops at its jumps, in J/m², and of the friction of edges between them.
     energy_change : float
         (W at its end - W at its start) per nominal area, in J/m²: 0 if it closes.
     stress_change : float
@@ -281,10 +282,14 @@ def run_path(
 
 @dataclass
 class _OpenTurn:
-    """A turning point that a later leg may come back to, with the index of its state."""
+    """A turning point that a later leg may come back to, with the index of its state.
+
+    ``jumps`` is the number of jumps before it.
+    """
 
     drive: float
     state: int
+    jumps: int
 
 
 class _PathRunner:
@@ -297,7 +302,6 @@ class _PathRunner:
         self.axis, self.record, self.progress = axis, record, progress
         self.legs: list[int] = []  # of the states
         self.jump_legs: list[int] = []
-        self.jump_steps: list[int] = []  # for each jump, the states before its load step
         self.minor: list[MinorLoop] = []
         self.open_turns: list[_OpenTurn] = []
         self.leg = -1
@@ -339,14 +343,15 @@ class _PathRunner:
         """Start a leg with the state at the turning point, which belongs to both legs."""
         self.leg += 1
         if self.record.states:
-            self.open_turns.append(_OpenTurn(self.drive, len(self.record.states)))
+            self.open_turns.append(
+                _OpenTurn(self.drive, len(self.record.states), len(self.record.jumps))
+            )
         self.record.visit(branch, self.leg > 0, self.state)
         self.legs.append(self.leg)
 
     def _step(self, branch: Branch, drive: float) -> ContactState:
         """Follow one load step, and record the minor loops that it closes."""
         path = self.method.follow(self.state, self.problem.prescribed(drive))
-        self.jump_steps += [len(self.record.states)] * len(path.jumps)
         self.jump_legs += [self.leg] * len(path.jumps)
         self.state = self.record.extend(branch, path)
         self.legs += [self.leg] * len(path.states)
@@ -360,13 +365,8 @@ class _PathRunner:
     def _close(self, start: _OpenTurn, turn: _OpenTurn) -> None:
         """Record the minor loop from ``start`` over ``turn`` to the last state."""
         record, period = self.record, self.problem.profile.period
-        part = record.slice(start.state)
+        part = record.slice(start.state, jumps=record.jumps[start.jumps :])
         begin, end = part.states[0], part.states[-1]
-        drops = sum(
-            jump.energy_drop
-            for jump, step in zip(record.jumps, self.jump_steps, strict=True)
-            if step > start.state
-        )
         stress, contact = part.column("mean_stress"), part.column("contact_fraction")
         stress_change = float(stress[-1] - stress[0])
         contact_change = float(contact[-1] - contact[0])
@@ -376,13 +376,14 @@ class _PathRunner:
                 turn=turn.drive,
                 branch="loading" if turn.drive > start.drive else "unloading",
                 loss=part.work(self.problem),
-                loss_from_drops=float(drops),
+                loss_from_drops=part.dissipated(self.problem),
                 energy_change=(end.potential - begin.potential) / period,
                 stress_change=stress_change,
                 contact_change=contact_change,
                 closes=bool(
                     abs(stress_change) <= _SAME * np.ptp(stress)
-                    and abs(contact_change) <= _SAME * np.ptp(contact)
+                    and abs(contact_change)
+                    <= max(_SAME * np.ptp(contact), _ROUNDING * contact.max())
                 ),
             )
         )

@@ -107,13 +107,14 @@ class Record:
         separation, contact = self.column("separation"), self.column("contact_fraction")
         return states_before_jumps(self.jumps, self.branches, separation, contact)
 
-    def slice(self, first: int, stop: int | None = None) -> Record:
-        """Return a record of the states from index ``first`` up to ``stop``, without jumps."""
+    def slice(self, first: int, stop: int | None = None, jumps: Sequence[Jump] = ()) -> Record:
+        """Return a record of the states from index ``first`` up to ``stop``, and of their jumps."""
         part = slice(first, stop)
         return Record(
             branches=self.branches[part],
             on_axis=self.on_axis[part],
             states=self.states[part],
+            jumps=list(jumps),
         )
 
     def copy(self) -> Record:
@@ -121,6 +122,12 @@ class Record:
         copied = replace(self, branches=[*self.branches], on_axis=[*self.on_axis])
         copied.states, copied.jumps = [*self.states], [*self.jumps]
         return copied
+
+    def dissipated(self, problem: Problem) -> float:
+        """Sum the energy drops at the jumps, and the friction of edges between them, in J/m²."""
+        if problem.pinning == 0:
+            return dissipated(problem, self.jumps, (), None)
+        return dissipated(problem, self.jumps, self.before_jumps(), self.column("receded"))
 
     def work(self, problem: Problem) -> float:
         """Compute the work of the driving device, -∫ Y dx over the states, in J/m².
@@ -168,6 +175,31 @@ def states_before_jumps(
             next((k for k in range(found[-1], len(pairs)) if pairs[k] == wanted), len(pairs) - 1)
         )
     return found[1:]
+
+
+def dissipated(
+    problem: Problem,
+    jumps: Sequence[Jump],
+    before: Sequence[int],
+    receded: Array | None,
+) -> float:
+    """Sum the energy drops at jumps, and the friction of edges between them, in J/m².
+
+    Parameters
+    ----------
+    problem : Problem
+    jumps : sequence of Jump
+    before : sequence of int
+        Index of the state before each jump; not needed with one work of adhesion.
+    receded : array, shape (states,), optional
+        Length in m over which edges have receded; None with one work of adhesion.
+    """
+    drops = float(sum(jump.energy_drop for jump in jumps))
+    if receded is None:
+        return drops
+    in_jumps = sum(receded[i + 1] - receded[i] for i in before)
+    between = float(receded[-1] - receded[0] - in_jumps)
+    return drops + problem.pinning / problem.profile.period * between
 
 
 def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:

@@ -241,7 +241,7 @@ def run_loops(
     problem, latest = method.problem, None
     if preload is None:
         name = "max_stress" if problem.control.is_load else "max_penetration"
-        given = turning_of(problem, max_penetration, max_stress)
+        given = turning_of(problem.control, max_penetration, max_stress)
         points = row(name, given, entry="turning point").tolist()
     else:
         points = row("preload", preload, entry="preload").tolist()

@@ -263,19 +263,21 @@ def beyond_limit(
     barrier: Any = 0.0,
     edge_range: Any = math.inf,
     touch_range: Any = math.inf,
+    work_of_adhesion_open: Any = 0.0,
 ) -> NDArray[np.bool_]:
     """Mark the losses that an adhesion of finite range may not have; values or arrays of one shape.
 
     The least of their ranges is below :data:`DOUBTFUL_RANGE`, or they are more than
-    :data:`DOUBTFUL_LOSS` times the work of adhesion of the largest contact. At a finite strength it
-    is those whose own range of adhesion, γ over the strength, is longer than the edges or the
-    touches allow, those at which the tension inside patches exceeds the strength
-    :data:`DOUBTFUL_EXCESS` times, or whose barriers are more than :data:`DOUBTFUL_BARRIER` of them.
-    None is where the strength is unknown (NaN).
+    :data:`DOUBTFUL_LOSS` times the work of adhesion of the largest contact, at which its edges
+    recede. At a finite strength it is those whose own range of adhesion, γ over the strength, is
+    longer than the edges or the touches allow, those at which the tension inside patches exceeds
+    the strength :data:`DOUBTFUL_EXCESS` times, or whose barriers are more than
+    :data:`DOUBTFUL_BARRIER` of them. None is where the strength is unknown (NaN).
     """
     loss, gamma = np.asarray(loss), np.asarray(work_of_adhesion)
     valid_range, strength = np.asarray(valid_range), np.asarray(strength)
-    most = DOUBTFUL_LOSS * gamma * np.asarray(largest_contact_fraction)
+    spent = np.fmax(gamma, work_of_adhesion_open)
+    most = DOUBTFUL_LOSS * spent * np.asarray(largest_contact_fraction)
     short = least_range(valid_range, edge_range, touch_range) < DOUBTFUL_RANGE
     closed = (short | (loss > most)) & (gamma > 0)
     exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
@@ -335,8 +337,9 @@ def range_warnings(
             f"one, so {_WHAT_A_LONGER_RANGE_DOES[least]} (docs/zero-range.md)"
         )
     largest = float(np.max(contact_fraction, initial=0.0))
-    if beyond_limit(math.inf, loss, gamma, largest):
-        ratio = loss / (gamma * largest)
+    spent = problem.gamma_open
+    if beyond_limit(math.inf, loss, spent, largest):
+        ratio = loss / (spent * largest)
         out.append(
             f"the loss is {ratio:.3g} times the work of adhesion of the largest contact, more "
             f"than the {DOUBTFUL_LOSS:g} that adhesion explains: it is elastic energy of valleys "

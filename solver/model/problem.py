@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import InitVar, dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from adhesis.solver.checks import (
     RMS_SLOPE,
     STRENGTH,
     WORK_OF_ADHESION,
+    choice,
     instance,
     plain,
     real,
@@ -22,8 +23,11 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.control import Control, Value
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.jump import Branch
-from adhesis.solver.model.profile import Profile
+from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
+
+Measure = Literal["arc", "flat"]
+"""Length on which adhesion acts: that of the profile, or its projection."""
 
 LONGEST_GRIFFITH_CRACK = 0.25
 """Length of the longest Griffith crack that may open a patch, in shortest waves."""
@@ -80,7 +84,7 @@ def strength_of(
 class Problem(ByValue):
     """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
 
-    Immutable; two problems are equal if all five parts are.
+    Immutable; two problems are equal if all parts are.
 
     Parameters
     ----------
@@ -96,6 +100,12 @@ class Problem(ByValue):
         Infinite by default, that of adhesion of zero range (docs/zero-range.md).
     adhesion_range : float, optional
         Instead of the strength, the range δ of adhesion in m: σ_th = γ/δ.
+    work_of_adhesion_open : float, optional
+        Work of adhesion in J/m² where an edge recedes, at least γ, which then holds where it
+        advances; between both it is pinned. None stands for γ.
+    measure : {"arc", "flat"}
+        γ counts for each length sqrt(1 + h'²) dx along the profile, or for each projected length
+        dx. By keyword only.
 
     Raises
     ------
@@ -118,6 +128,8 @@ class Problem(ByValue):
     control: Control = field(default_factory=Control)
     strength: float = math.inf
     adhesion_range: InitVar[float | None] = None
+    work_of_adhesion_open: float | None = None
+    measure: Measure = field(default="arc", kw_only=True)
 
     def __post_init__(self, adhesion_range: float | None) -> None:
         instance("profile", self.profile, Profile, "single_wave or profile_from_heights")
@@ -125,9 +137,38 @@ class Problem(ByValue):
         gamma = real("work_of_adhesion", self.work_of_adhesion, WORK_OF_ADHESION)
         object.__setattr__(self, "work_of_adhesion", gamma)
         instance("control", self.control, Control, "Control(stiffness), for a load Control(0)")
+        choice("measure", self.measure, get_args(Measure))
         check_slope(float(np.sqrt(self.profile.m2)))
         object.__setattr__(self, "strength", strength_of(gamma, adhesion_range, self.strength))
         self._check_strength(adhesion_range)
+        self._check_open()
+
+    @property
+    def gamma_open(self) -> float:
+        """Work of adhesion of an edge that recedes, in J/m²: γ, unless another is given."""
+        found = self.work_of_adhesion_open
+        return self.work_of_adhesion if found is None else found
+
+    @property
+    def pinning(self) -> float:
+        """Work of adhesion of an edge that recedes less that of one that advances, in J/m²."""
+        return self.gamma_open - self.work_of_adhesion
+
+    def _check_open(self) -> None:
+        """Refuse a work of adhesion on opening that is the smaller one, or beside a strength."""
+        if self.work_of_adhesion_open is None:
+            return
+        gamma = self.work_of_adhesion
+        found = real("work_of_adhesion_open", self.work_of_adhesion_open, WORK_OF_ADHESION)
+        if found < gamma or gamma == 0 < found:
+            rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
+            raise ValueError(f"work_of_adhesion_open is {found:g} J/m²: it must be {rule}")
+        if found > gamma and math.isfinite(self.strength):
+            raise ValueError(
+                f"work_of_adhesion_open is {found:g} J/m² beside a strength of {self.strength:g} "
+                "Pa: give one of them, edges of two works of adhesion have no range"
+            )
+        object.__setattr__(self, "work_of_adhesion_open", found if found > gamma else None)
 
     def _check_strength(self, adhesion_range: float | None) -> None:
         """Refuse a strength at which a crack as long as the waves would have to be put."""
@@ -145,6 +186,11 @@ class Problem(ByValue):
             f"{self.critical_crack:.3g} m long, exceeds a quarter of the shortest wave, and edges "
             "of zero range do not describe it"
         )
+
+    def toughness(self, slope: Array) -> Array:
+        """Compute the work of adhesion for each projected length, in J/m², at slopes h'."""
+        stretch = np.sqrt(1 + slope**2) if self.measure == "arc" else np.ones_like(slope)
+        return np.asarray(self.work_of_adhesion * stretch)
 
     @property
     def critical_crack(self) -> float:

@@ -65,7 +65,7 @@ class ExactWave(Method):
             problem.profile.period,
             problem.half_space.modulus,
             problem.work_of_adhesion,
-            measure="arc",
+            measure=problem.measure,
         )
 
     def follow(self, state: ContactState, prescribed: float) -> Path:

@@ -41,16 +41,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import ellipeinc
 
+from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import Array
-
-Measure = Literal["flat", "arc"]
 
 
 def _root(function: Callable[[float], Array], low: float, high: float) -> float:

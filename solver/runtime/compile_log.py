@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 
 from adhesis.solver.runtime.jit import Compilation, processor, watch_compilation
@@ -49,6 +49,8 @@ class _CompileLogger:
 
 
 @cache
-def log_compilation() -> None:
-    """Log compilation from now on until the process ends."""
-    watch_compilation(_CompileLogger()).__enter__()
+def log_compilation() -> AbstractContextManager[Compilation]:
+    """Log compilation until the process ends; return the context, which the cache keeps open."""
+    context = watch_compilation(_CompileLogger())
+    context.__enter__()
+    return context

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+
 from adhesis.solver._kernels import (
     Descent,
     DescentEvent,
@@ -17,7 +18,6 @@ from adhesis.solver._kernels import (
     shortest_length,
     solve_field,
 )
-
 from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.descent.saddle import leaving_step, positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point

@@ -146,8 +146,10 @@ class SharpMethod(Method):
             work = share * accuracy * problem.work_of_adhesion
             exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
             tolerance = min(tolerance, exact)
-        source = StressSource(profile, tolerance)
-        self.edges = EdgeMechanics(source, critical, tolerance, loading_device(problem))
+        source = StressSource(profile, tolerance, problem.measure)
+        pinning = math.sqrt(1 + problem.pinning / problem.work_of_adhesion) - 1 if critical else 0.0
+        device = loading_device(problem)
+        self.edges = EdgeMechanics(source, critical, tolerance, device, pinning)
         self.states = States(problem, source, self.edges.count)
         finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)
         self.resolution = Resolution(
@@ -220,7 +222,10 @@ class SharpMethod(Method):
                 f"method 'sharp' finds no state at {where}: {failed}; the method 'grid', another "
                 "accuracy or other load steps may get past it"
             ) from failed
-        return Path(tuple(history.states), tuple(history.jumps), self._error(history))
+        states = history.states
+        if self.edges.pins:
+            states = self.states.with_receded(state, states)
+        return Path(tuple(states), tuple(history.jumps), self._error(history))
 
     def _error(self, history: History) -> float:
         """Estimate the error of the loss, in J/m²: of the location of jumps, and of the field."""

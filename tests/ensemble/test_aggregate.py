@@ -18,6 +18,7 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import estimates, interval, interval_method, untransformed
 from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.fields import field_plan
 from adhesis.solver.model.jump import JUMP_KINDS
 from tests.support.synthetic_results import campaign, rows, sign, write
@@ -155,7 +156,9 @@ def test_spectra_leave_out_realisations_without_contact(tmp_path):
     np.testing.assert_allclose(data.fields.psd_displacement[0, 1, 0], expected, rtol=1e-6)
     slope, _ = fitted_slope(field_plan(plan), data.fields.psd_displacement[0, 0, 2])
     assert slope == pytest.approx(-2.8, abs=1e-3)
-    assert data.fields.shapes[0].row == 0
+    with Results(tmp_path / "r.h5") as results:
+        first = results.column("field_height", slice(0, 1))[0]
+    np.testing.assert_array_equal(data.fields.shapes[0].height, first)
 
 
 def test_a_fitted_slope_knows_its_error():

@@ -12,15 +12,13 @@ import pytest
 import adhesis.ensemble.bench.equal_error as benchmarking
 import adhesis.ensemble.bench.tamaas as peer
 from adhesis.ensemble.bench.bench_figure import draw
-from adhesis.ensemble.bench.bench_page import page, record
-from adhesis.ensemble.bench.equal_error import Line, Reference, benchmark, exponents, growth, ratios
+from adhesis.ensemble.bench.bench_page import page
+from adhesis.ensemble.bench.equal_error import Line, Reference, benchmark, exponents, ratios
 from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
 from adhesis.ensemble.bench.scenes import (
-    FULL,
     GROWTH,
     ONE_WAVE,
     PAPER,
-    QUICK,
     SMALL_ROUGH,
     TWO_WAVES,
 )
@@ -97,21 +95,6 @@ def test_exponents_are_those_of_the_times():
     assert waves.of_solution == pytest.approx(0, abs=1e-9)
 
 
-def test_ratios_need_both_methods_of_one_scene():
-    other = line("sharp", 1e-3, 1.0, 0.3, scene=TWO_WAVES)
-    assert ratios([*GRID, other, failed("sharp", 1e-4)]) == []
-
-
-@pytest.mark.parametrize("scene", [*QUICK, *FULL], ids=lambda scene: scene.name)
-def test_scenes_are_the_paper_s_material_and_period(scene):
-    problem = scene.problem()
-    assert problem.half_space.modulus == pytest.approx(4e6 / 3)
-    assert problem.profile.period == pytest.approx(2e-3 * np.pi)
-    assert (scene.exact_loss is None) == bool(scene.tightest)
-    # The reference must be more exact than what is measured against it.
-    assert all(scene.tightest[0] < accuracy for accuracy in scene.accuracies if scene.tightest)
-
-
 def test_paper_scale_is_the_paper_s():
     profile = PAPER.problem().profile
     assert profile.highest_harmonic == 1000
@@ -120,13 +103,10 @@ def test_paper_scale_is_the_paper_s():
     assert max(scene.n0 * scene.ratio for scene in GROWTH) == 100_000
 
 
-@pytest.mark.parametrize(
-    ("method", "setting", "error"), [("grid", 256, 5e-3), ("sharp", 1e-3, 1e-3)]
-)
-def test_one_wave_is_measured_against_its_exact_loss(method, setting, error):
+def test_one_wave_is_measured_against_its_exact_loss():
     """In a process of its own: the memory of this one does not count."""
-    ballast = np.ones(80_000_000)  # 610 MB, touched
-    measured = measure(Run(ONE_WAVE, method, setting, ONE_WAVE.load_steps, 60.0))
+    ballast, error = np.ones(80_000_000), 1e-3  # 610 MB, touched
+    measured = measure(Run(ONE_WAVE, "sharp", error, ONE_WAVE.load_steps, 60.0))
     assert measured.note == ""
     assert measured.loss == pytest.approx(ONE_WAVE.exact_loss, rel=error)
     assert abs(measured.audit_residual) < error
@@ -192,14 +172,6 @@ def test_without_tamaas_there_is_no_line_for_it(no_runs, monkeypatch):
     assert "tamaas" not in {line.run.method for line in benchmark([ONE_WAVE])}
 
 
-def test_nodes_of_tamaas_resolve_zone_and_profile():
-    problem = ONE_WAVE.problem()
-    h_max = problem.profile.h_max
-    coarse, fine = (peer.nodes_for(problem, reach * h_max) for reach in (0.02, 0.01))
-    assert fine == 4 * coarse  # the zone shrinks as the square of the range
-    assert peer.nodes_for(PAPER.problem(), 1e-3) == 8192  # 8 per shortest wave, a power of two
-
-
 @pytest.mark.skipif(not peer.has_tamaas(), reason="tamaas is not installed")
 def test_tamaas_approaches_the_exact_loss_from_below():
     problem = ONE_WAVE.problem()
@@ -224,12 +196,6 @@ def test_page_has_every_run_and_says_what_did_not_finish():
     assert {row.count("|") for row in rows} == {9}
 
 
-def test_record_leaves_out_what_is_not_known():
-    fields = record(failed("sharp", 1e-6))
-    assert fields["note"] == "given up after 60 s"
-    assert fields["cpu_seconds"] == fields["error"] == ""
-
-
 def test_figure_has_a_panel_for_each_scene_even_if_nothing_finished():
     lines = [*GRID, line("sharp", 1e-6, 1.0, 0.0), failed("sharp", 1e-3, scene=TWO_WAVES)]
     figure = draw(lines)
@@ -250,13 +216,6 @@ def test_command_writes_table_records_and_figure(no_runs, tmp_path, capsys):
     assert float(rows[0]["error"]) == pytest.approx(1 / 64)
     assert "adhesis bench --quick" in (tmp_path / "new" / "benchmark.md").read_text()
     assert "How the cost grows" not in capsys.readouterr().out
-
-
-def test_full_benchmark_adds_the_growth(no_runs, tmp_path, capsys):
-    assert main(["bench", "--to", str(tmp_path)]) == 0
-    assert "m = 10 … 10000, γ = 0.01" in capsys.readouterr().out
-    assert "### How the cost grows" in (tmp_path / "benchmark.md").read_text()
-    assert len(growth()) == sum(1 + len(scene.grids) for scene in GROWTH)
 
 
 @pytest.mark.parametrize(

@@ -107,13 +107,6 @@ def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any])
         assert one == other or one["name"] == "compiled code"
 
 
-def test_unwritable_folder_is_one_sentence() -> None:
-    done = run_doctor("--in", "/nowhere")
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "/nowhere" in done.stderr
-
-
 def test_versions_are_texts_and_do_not_start_mpi() -> None:
     code = (
         "import json, sys; from adhesis.ensemble.versions import installed; v = installed(); "

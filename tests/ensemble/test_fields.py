@@ -11,7 +11,7 @@ from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DATASETS
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.task.compute import make_problem, run_task
+from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan
 from adhesis.solver.loading.loop import run_loop
@@ -102,7 +102,7 @@ def test_reductions_agree_with_the_states_of_the_loop():
 
 def test_states_without_contact_are_not_a_number():
     campaign = campaign_with("field_penetrations = [-2.5, -0.15, 0.45]\n")
-    result = run_task(campaign, campaign.tasks()[0])
+    result = Runner()(campaign, campaign.tasks()[0])
     missing = np.isnan(result["gap_density"]).all(axis=-1)
     assert missing[0].tolist() == [True, True, False]  # loading starts at zero
     assert missing[1, 2] == False  # noqa: E712
@@ -138,7 +138,7 @@ def test_a_campaign_can_keep_no_fields_at_all(tmp_path):
     path = tmp_path / "r.h5"
     campaign = campaign_with("field_penetrations = []\nfield_realisations = 0\n")
     create(path, campaign)
-    result = run_task(campaign, campaign.tasks()[0])
+    result = Runner()(campaign, campaign.tasks()[0])
     with Writer(path) as writer:
         writer.write_result(0, result)
     with Results(path) as results:

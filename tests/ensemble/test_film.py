@@ -32,7 +32,7 @@ from adhesis import (
 )
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.loop.film import Film, film_of
-from adhesis.ensemble.loop.film_scenes import jump_places, scenes_of
+from adhesis.ensemble.loop.film_scenes import scenes_of
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.references.exact_wave import ExactWave
 
@@ -68,7 +68,7 @@ def test_every_jump_has_a_frame_before_and_one_after_it_that_announces_its_drop(
     assert list(scenes) == sorted(scenes)
     assert {0, len(loop.separation) - 1} <= set(scenes)
     assert len(scenes) >= 30
-    for jump, place in zip(loop.jumps, jump_places(loop), strict=True):
+    for jump, place in zip(loop.jumps, loop.states_before_jumps(), strict=True):
         assert loop.contact_fraction[place + 1] == jump.contact_after
         assert place in scenes
         announced = scenes[place + 1].announcement
@@ -92,7 +92,7 @@ def test_of_more_jumps_than_frames_those_with_the_largest_drops_are_shown(loop, 
     assert len(film) <= 12
     assert 0 < shown < len(loop.jumps)
     states = {scene.state for scene in film._scenes.scenes}
-    places = dict(zip(jump_places(loop), loop.jumps, strict=True))
+    places = dict(zip(loop.states_before_jumps(), loop.jumps, strict=True))
     drops = sorted((jump.energy_drop for jump in loop.jumps), reverse=True)
     for place, jump in places.items():
         if jump.energy_drop >= drops[shown - 1]:

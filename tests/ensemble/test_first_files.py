@@ -111,12 +111,6 @@ def test_the_sample_is_what_its_program_makes_and_a_trace(
     assert "FILE is t.csv, which exists" in capsys.readouterr().err
 
 
-def test_the_sample_is_part_of_the_package() -> None:
-    """``make check-package`` compares the wheel with these; here: they are declared as its data."""
-    project = (ROOT / "pyproject.toml").read_text()
-    assert f'"adhesis.ensemble.command" = ["{SAMPLE.name}"]' in project
-
-
 # ---------------------------------------------------------------------- a shell's completion
 
 

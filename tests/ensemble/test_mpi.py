@@ -21,9 +21,7 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Options, Summary, run_campaign
-from benchmarks import endurance
 from tests.support.campaign_support import (
-    MPIRUN,
     adhesis,
     adhesis_here,
     campaign_text,
@@ -54,22 +52,13 @@ def whole(tmp_path_factory):
     return folder / "whole.h5"
 
 
-def test_real_loops_have_the_same_bits_for_any_number_of_ranks(tmp_path):
-    """No worker and three; two workers, and the other method, are those of the next test."""
-    path, alone = tmp_path / "c.toml", tmp_path / "alone.h5"
-    text = campaign_text(realisations="1", method='"sharp"')
-    path.write_text(text.replace("nodes_per_wave = 16\n", ""))
-    assert run_campaign(load_campaign(path), alone).done == 4
-    process = adhesis("run", path, "--out", tmp_path / "ranks.h5", ranks=4)
-    assert process.returncode == 0, process.stderr
-    assert differences(alone, tmp_path / "ranks.h5") == []
-
-
-def test_turning_points_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
+def test_loops_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
     """Also where some loops that share a loading branch are there already, and others not."""
     some = {"hurst": "[0.8]", "work_of_adhesion": "[0.04]", "load_steps": "8"}
-    path = write_campaign(tmp_path, max_penetration="[0.3, 0.45, 0.6]", **some)
-    campaign, whole = load_campaign(path), tmp_path / "whole.h5"
+    text = campaign_text(max_penetration="[0.3, 0.45, 0.6]", method='"sharp"', **some)
+    path, whole = tmp_path / "c.toml", tmp_path / "whole.h5"
+    path.write_text(text.replace("nodes_per_wave = 16\n", ""))
+    campaign = load_campaign(path)
     assert run_campaign(campaign, whole).done == 6
     process = adhesis("run", path, "--out", tmp_path / "ranks.h5", ranks=3)
     assert process.returncode == 0, process.stderr
@@ -114,13 +103,6 @@ def test_a_run_starts_its_own_ranks(tmp_path, whole):
     assert differences(out, whole) == []
     with Results(out) as results:
         assert set(results.column("rank").tolist()) <= {1, 2}  # rank 0 only handed out
-    for words, sentence in (
-        (("--ranks", "0"), "--ranks is '0': it must be a whole number of at least 1"),
-        (("--ranks", "many"), "--ranks is 'many': it must be a whole number of at least 1"),
-    ):
-        process = adhesis_here("run", path, "--out", out, *words)
-        assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)
-        assert sentence in process.stderr
 
 
 @pytest.fixture
@@ -285,28 +267,6 @@ def test_an_error_that_is_not_a_tasks_ends_the_job(tmp_path):
     assert "TypeError" in process.stderr
 
 
-def test_a_run_that_is_complete_does_not_say_why_it_stopped(tmp_path):
-    """The last task ends although the run was asked to stop: nothing is left to resume."""
-    path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
-    words = ("run", path, "--out", tmp_path / "r.h5", "--max-failures", "1")
-    # the failing task takes so long that the other one has surely begun
-    process = adhesis(*words, ranks=3, fake="fail=0.7:0.01:0 deaf=0.7:0.04:0 step=0.1")
-    assert "1 of 2 tasks done, 1 failed" in process.stderr
-    assert "stopped early" not in process.stderr
-    assert process.returncode == 1
-
-
-def test_failures_and_growth_under_mpirun(tmp_path, whole):
-    out = tmp_path / "r.h5"
-    assert here(write_campaign(tmp_path, realisations="1"), out, "fail=0.7:0.01:0").failed == 1
-    log = tmp_path / "log"
-    words = ("run", write_campaign(tmp_path), "--out", out, "--redo", "failed")
-    process = adhesis(*words, ranks=3, fake=f"log={log}")
-    assert process.returncode == 0, process.stderr
-    assert len(log.read_text().splitlines()) == 5
-    assert differences(out, whole) == []
-
-
 def test_growing_from_10_to_20_realisations_computes_exactly_the_new_ones(tmp_path):
     out, log = tmp_path / "r.h5", tmp_path / "log"
     assert here(write_campaign(tmp_path, realisations="10"), out).done == 40
@@ -352,9 +312,7 @@ def test_the_rank_0_writer_writes_the_same_file(tmp_path, whole):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("run", "c.toml", "--speed", "3"), "adhesis run: unrecognized arguments: --speed 3"),
         (("run", "c.toml", "--out", "r.h5"), "hurst is [1.5]: it must be a list"),
-        (("speed",), "adhesis: COMMAND is 'speed'"),
         (("status", "none.h5"), "adhesis status: none.h5"),
     ],
 )
@@ -386,29 +344,6 @@ def test_a_run_that_starts_its_ranks_ends_without_words_of_the_launcher(tmp_path
     last = process.stderr.splitlines()[-1]
     assert "could not be written" in last
     assert last.endswith("; what was done is kept")
-
-
-def test_the_endurance_benchmark_runs(tmp_path, capsys, monkeypatch):
-    """Its figures are for a quiet machine; here only that there are some."""
-
-    def table(*words) -> dict[str, str]:
-        monkeypatch.setattr("sys.argv", ["endurance.py", *map(str, words)])
-        endurance.main()
-        rows = (line.strip().split("  ", 1) for line in capsys.readouterr().out.splitlines()[1:])
-        return {row[0]: row[1].strip() for row in rows if len(row) == 2}
-
-    monkeypatch.setenv("MPIRUN", MPIRUN)
-    monkeypatch.chdir(tmp_path)
-    path = write_campaign(tmp_path, realisations="1")
-    words = ("empty", "--campaign", path, "--tasks", 40, "--seconds", 0.05, "--workers", 1)
-    words = (*words, "--dir", tmp_path)
-    shown = table(*words)
-    assert float(shown["tasks a second"].split()[0]) > 0
-    assert shown["master, of a core"].endswith("under 2 %")
-    shown = table("campaign", path, "--out", "r.h5", "--workers", 1)
-    assert float(shown["makespan / ideal"].split()[0]) >= 1
-    assert done_rows(tmp_path / "r.h5") == 4
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "r.h5"]
 
 
 def test_waiting_costs_the_master_next_to_nothing(tmp_path):

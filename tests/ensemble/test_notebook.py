@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 import doctest
 import html
@@ -169,9 +170,9 @@ def test_other_files_are_refused(tmp_path, result):
         (lambda: result.save("loop.h5"), InputError, "the name must end in .nc"),
         (lambda: result.save(3), TypeError, "path is 3"),
         (
-            lambda: result.save("/nonexistent/x.nc"),
+            lambda: result.save(tmp_path / "none" / "x.nc"),
             InputError,
-            "^path is /nonexistent/x.nc: there is no directory /nonexistent$",
+            f"^path is {tmp_path}/none/x.nc: there is no directory {tmp_path}/none$",
         ),
     ):
         with pytest.raises(error, match=message):
@@ -257,6 +258,7 @@ def test_a_film_shows_a_bar_and_is_the_same(capsys):
     assert "frames" in shown.err
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_path):
     step = 1e-3 / 400
     x = step * np.arange(400)
@@ -324,22 +326,6 @@ def test_a_campaign_is_the_same_from_a_dictionary_a_text_and_a_file(campaign, tm
     assert pickle.loads(pickle.dumps(campaign)) == campaign
     assert repr(campaign) == "<Campaign: 4 cells, 4 tasks>"
     assert "young = 1000000.0" in campaign._repr_html_()
-
-
-@pytest.mark.parametrize(
-    ("source", "error", "text"),
-    [
-        ({"profil": {}}, InputError, "'profil' is unknown; the tables are"),
-        ({**TABLES, "cycle": {"load_steps": 4}}, InputError, "max_penetration is missing"),
-        ({**TABLES, "cycle": 3}, InputError, "cycle is 3: it must be a table"),
-        ({**TABLES, "a b": {"c\nd": None}}, InputError, "'a b' is unknown"),
-        ("no.toml", InputError, "no.toml cannot be read"),
-        (3, TypeError, "source is a int: it must be a dictionary of tables, TOML "),
-    ],
-)
-def test_what_is_no_campaign_is_refused(source, error, text):
-    with pytest.raises(error, match=text):
-        adhesis.Campaign(source)
 
 
 def test_units_are_asked_for_on_every_way_in(tmp_path):
@@ -461,13 +447,15 @@ def test_failed_tasks_are_loud(tmp_path):
     text = " ".join(findings.missing(results.averages))
     assert "WARNING: all tasks failed for H = 0.8, γ = 1 J/m²" in text
     assert "yet" not in text
-    below = results.plot.contact_against_stress()[0].figure.get_supxlabel()
+    below = results.plot.contact_against_stress().get_supxlabel()
     assert below == "missing, as all tasks failed: H = 0.8, γ = 1 J/m²"
 
 
 @pytest.mark.mpi
 def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
-    alone, ranks = campaign.run(tmp_path / "1.h5"), campaign.run(tmp_path / "2.h5", ranks=2)
+    """Started from another thread, as a server does."""
+    alone = campaign.run(tmp_path / "1.h5")
+    ranks = asyncio.run(asyncio.to_thread(campaign.run, tmp_path / "2.h5", ranks=2))
     assert not any("tasks" in text for text in capfd.readouterr())
     shown = io.StringIO()  # what a notebook has as stderr is not the process's own
     monkeypatch.setattr("sys.stderr", shown)
@@ -502,5 +490,7 @@ def test_a_loop_is_drawn_into_axes_that_are_given():
     assert loop.plot(ax=alone) is alone.figure
     assert len(alone.get_lines()) == 3  # two branches, and a line at 0
     for bad in ("ax", [alone, 1], [], 3):
-        with pytest.raises(TypeError, match="it must be one Axes of matplotlib, or two of them"):
+        with pytest.raises(
+            TypeError, match="it must be one Axes of matplotlib, or several of them"
+        ):
             loop.plot(ax=bad)

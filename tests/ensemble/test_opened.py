@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import adhesis
 from adhesis.ensemble.campaign.tasks import Part
@@ -111,20 +112,44 @@ def test_fields_have_branch_penetration_and_position(file, results):
     assert results.curves.loading_mean_stress_mean.attrs["units"] == "Pa"
 
 
-def test_every_figure_of_the_report_has_a_method_that_returns_its_axes(results):
+def test_every_figure_of_the_report_has_a_method_that_returns_it(results):
     figures = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
     methods = {method.__name__ for _, method in inspect.getmembers(Plots, inspect.isfunction)}
     assert {item.draw.__name__ for item in figures} == {
         *(m for m in methods if m[0] != "_" and m != "loss_along")
     }
     for name in ("loop_against_penetration", "height_density"):
-        axes = getattr(results.plot, name)()
-        assert axes[0].figure.axes == axes
-        assert axes.figure is axes[0].figure
-        assert "data:image/png;base64," in axes._repr_html_()  # what a notebook displays
-        assert axes[0].lines
-    axes = results.plot.loss_against_hurst()
-    assert axes[-1].get_xlabel() == "Hurst exponent $H$"
+        figure = getattr(results.plot, name)()
+        assert figure._repr_png_().startswith(b"\x89PNG")  # what a notebook displays
+        assert figure.axes[0].lines
+    assert results.plot.loss_against_hurst().axes[-1].get_xlabel() == "Hurst exponent $H$"
+
+
+def test_every_figure_is_drawn_into_axes_that_are_given(results):
+    """A figure of a user's own has the curves, scales and labels of the one of the report."""
+    names = [name for name in vars(Plots) if name[0] != "_" and name != "loss_along"]
+    for name in names:
+        draw = getattr(results.plot, name)
+        alone = draw()
+        mine = Figure()
+        given = mine.subplots(len(alone.axes), 1, squeeze=False)
+        assert draw(ax=given) is mine
+        for panel, own in zip(given[:, 0], alone.axes, strict=True):
+            assert len(panel.collections) == len(own.collections), name
+            assert (panel.get_xscale(), panel.get_yscale()) == (
+                own.get_xscale(),
+                own.get_yscale(),
+            ), name
+            assert panel.get_xlabel(), name
+        assert given[0, 0].get_legend() is not None, name
+        first = Figure().subplots()
+        draw(ax=first)
+        assert len(first.collections) == len(alone.axes[0].collections), name
+        assert first.get_xlabel(), name
+        with pytest.raises(ValueError, match=rf"ax holds {len(alone.axes) + 1} Axes: this figure"):
+            draw(ax=Figure().subplots(1, len(alone.axes) + 1))
+        with pytest.raises(TypeError, match="ax is 3: it must be one Axes of matplotlib"):
+            draw(ax=3)
 
 
 def test_bad_files_are_refused(tmp_path):

@@ -33,6 +33,7 @@ from tests.support import synthetic_results
 from tests.support.campaign_support import (
     MPIRUN,
     adhesis,
+    adhesis_here,
     campaign_text,
     differences,
     done_rows,
@@ -67,7 +68,11 @@ def test_the_rule_goes_by_the_interval_that_tables_print():
     (printed,) = estimates(values)
     furthest = max(printed.high - printed.mean, printed.mean - printed.low)
     known = precision(values, 0.2)
-    assert (known.mean, known.low, known.high) == (printed.mean, printed.low, printed.high)
+    assert (known.estimate.mean, known.estimate.low, known.estimate.high) == (
+        printed.mean,
+        printed.low,
+        printed.high,
+    )
     assert known.relative_error == printed.relative_error
     assert known.relative_error == pytest.approx(furthest / printed.mean, rel=1e-14)
     assert precision(values, 1.001 * known.relative_error).narrow
@@ -88,8 +93,8 @@ def test_a_cell_is_described_with_quantity_both_ends_and_verdict():
         assert known.met is {"met": True, "not finished": None}.get(verdict, False)
         error = f"{100 * known.relative_error:.3g}"
         assert str(known) == (
-            f"loss {known.low:.4g} to {known.high:.4g} (± {error} %) of {count} realisations, "
-            f"wanted ± {100 * wanted:g} %: {verdict}"
+            f"loss {known.estimate.low:.4g} to {known.estimate.high:.4g} (± {error} %) of {count} "
+            f"realisations, wanted ± {100 * wanted:g} %: {verdict}"
         )
     unknown = precision([np.nan, 1.0], 0.05, "loss")
     assert str(unknown).startswith("loss: interval unknown of 1 realisation, wanted ± 5 %: not met")
@@ -232,13 +237,13 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity)
         assert known.met
         assert known.relative_error <= 0.2
         low, high = interval(values_of[: group["done"]])
-        assert (known.low, known.high) == (low, high)
+        assert (known.estimate.low, known.estimate.high) == (low, high)
         assert (group["interval_low"], group["interval_high"]) == (low, high)
         assert group["relative_error"] == known.relative_error
         assert (group["quantity"], group["met"]) == (steered, True)
         assert str(known) in shown
     before = out.read_bytes()
-    again = adhesis("run", path, "--out", out, fake="")
+    again = adhesis_here("run", path, "--out", out, fake="")
     assert out.read_bytes() == before
     assert precision_lines(summary.precisions)[1] in again.stderr.splitlines()
 
@@ -342,6 +347,6 @@ def test_what_a_stop_may_be(tmp_path):
     assert phrase == "stop.quantity is 'loss' here and 'loss_dimensionless' there"
     path = tmp_path / "c.toml"
     path.write_text(text())
-    process = adhesis("run", path, "--part", "1/2", "--out", tmp_path / "p.h5")
+    process = adhesis_here("run", path, "--part", "1/2", "--out", tmp_path / "p.h5")
     assert process.returncode == 2
     assert "its batches are decided on whole cells" in process.stderr

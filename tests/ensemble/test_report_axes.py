@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
+import pickle
+import re
 
 import numpy as np
 import pytest
@@ -14,7 +16,9 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.catalogue import along_axes
+from adhesis.ensemble.report.figures.loops import _bands
 from adhesis.ensemble.report.figures.style import style
+from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.report.tables.works import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
@@ -200,7 +204,7 @@ def test_opened_tables_and_figures_have_every_axis(file):
     names = ["hurst", "work_of_adhesion", "ratio", "max_penetration"]
     assert results.losses.index.names == names
     assert results.mechanisms.index.names == [*names, "kind"]
-    assert len(results.plot.loss_along("ratio")) == 4
+    assert len(results.plot.loss_along("ratio").axes) == 4
     with pytest.raises(ValueError, match="there are ratio, max_penetration"):
         results.plot.loss_along("young")
 
@@ -219,3 +223,46 @@ def test_works_are_told_per_nominal_and_per_contact_area(data):
         assert approach == pytest.approx((gained / contact).mean())
         low = reported["loss_per_contact_ci_low [J/m^2]"]
         assert low <= (cell.values["loss"] / contact).mean()
+
+
+def test_units_are_those_in_which_the_campaign_was_written(tmp_path):
+    """0.5 µm is shown so, and not as 500 nm; in figures, tables and names of cells."""
+    text = campaign(hurst=(0.8,), gamma=(0.01, 0.02), realisations=3).text
+    text = text.replace("[0.01, 0.02]", '["10 mJ/m2", "20 mJ/m2"]')
+    plan = parse_campaign(re.sub(r"h_rms = .*", 'h_rms = ["0.5 um", "1 um"]', text))
+    assert pickle.loads(pickle.dumps(plan)) == plan
+    assert plan.tasks()[0].cell_name == "H = 0.8, γ = 10 mJ/m², h_rms = 0.5 µm"
+    path = write(tmp_path / "r.h5", plan, rows(plan))
+    plot = adhesis.open(path).plot
+    figure = plot.loss_along("h_rms")
+    assert figure.axes[-1].get_xlabel().endswith("(µm)")
+    assert figure.axes[-1].get_xticks().tolist() == [0.5, 1.0]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        r"$\gamma$ = 10 mJ/m²",
+        r"$\gamma$ = 20 mJ/m²",
+    ]
+    assert plot.pull_off().axes[0].get_xlabel() == r"work of adhesion $\gamma$ (mJ/m²)"
+    assert plot.pull_off().get_supxlabel() == r"$h_\mathrm{rms}$ = 1 µm"
+    heading, _, first, *_ = losses(aggregate(path)).markdown().splitlines()
+    assert [cell.strip() for cell in heading.split("|")[2:4]] == ["γ (mJ/m²)", "h_rms (µm)"]
+    assert [cell.strip() for cell in first.split("|")[2:4]] == ["10", "0.5"]
+
+
+def test_a_curve_that_ends_early_has_its_shading():
+    """A loop that turns at a stress has no states beyond: its curve is NaN there."""
+    x = np.array([0.0, 1.0, 2.0, np.nan])
+    ((middle, low, high),) = _bands(x, x + 1, x + 2)
+    assert middle[0] < 0.1
+    assert middle[-1] > 1.9
+    assert high - low == pytest.approx(np.ones(low.size), abs=0.1)
+    assert _bands(x[3:], x[3:], x[3:]) == []
+
+
+def test_spectra_are_of_cells_that_have_fields(tmp_path):
+    """A loop short of its preload has no state at a part of it: its panel would be empty."""
+    plan = campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=2)
+    values = rows(plan)
+    values["psd_displacement"][2:] = 0  # none of the second work of adhesion
+    plot = adhesis.open(write(tmp_path / "r.h5", plan, values)).plot
+    (panel,) = plot.spectra_of_branches().axes
+    assert "0.01 J/m²" in panel.get_title(loc="left")

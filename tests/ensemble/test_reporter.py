@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import io
+import sys
 import time
 
-import pytest
-
-from adhesis.ensemble.reporter import StatusLine, ticking
+from adhesis.ensemble.reporter import following, ticking
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 
 
@@ -22,9 +21,20 @@ def test_what_takes_long_is_told_and_what_is_over_is_not() -> None:
     assert said[0] == "0 of 2 (0 s)"
     assert said[1].startswith("1 of 2")
     reported = len(said)
-    with ticking("no sooner than it is due", said.append, every=60.0):
+    with ticking(lambda: "no sooner than it is due", said.append, every=60.0):
         pass
     assert len(said) == reported
+
+
+def test_what_is_printed_beside_a_bar_goes_to_stdout(capsys, monkeypatch) -> None:
+    terminal = _Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    with following("claims") as show:
+        show(1, 2, "the first claim")
+        print("the first claim holds")
+    assert capsys.readouterr().out == "the first claim holds\n"
+    assert "the first claim" in terminal.getvalue()
 
 
 def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(monkeypatch) -> None:
@@ -41,7 +51,7 @@ def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(mo
 
     now, log = [0.0], Log()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    progress = ProgressLine(Counts(total=10, done_before=0), lambda: None, log)
+    progress = ProgressLine(Counts(total=10), lambda: None, log)
     while now[0] < 36000.0:
         progress.tick()
         now[0] += 0.5
@@ -56,45 +66,20 @@ class _Terminal(io.StringIO):
         return True
 
 
-@pytest.mark.parametrize(
-    ("stream", "expected"),
-    [
-        (
-            _Terminal(),
-            ["", "\x1b[Kstep 0", "\x1b[Kstep 1", "\x1b[Kstep 2", "\x1b[K" + 79 * "x" + "\n"],
-        ),
-        (io.StringIO(), ["step 2\n" + 200 * "x" + "\n"]),
-    ],
-    ids=["terminal", "file"],
-)
-def test_a_line_is_rewritten_on_a_terminal_and_written_anew_elsewhere(
-    stream: io.StringIO, expected: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr("sys.stderr", stream)
-    monkeypatch.setenv("COLUMNS", "80")
-    line = StatusLine(every=5.0)
-    for step in range(3):
-        now[0] = 2.6 * step
-        line.show(lambda step=step: f"step {step}")  # type: ignore[misc]
-    line.show(lambda: 200 * "x", last=True)
-    assert line.seconds == 5.2
-    assert stream.getvalue().split("\r") == expected
-
-
 def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> None:
     now, stream = [0.0], _Terminal()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    counts = Counts(total=3, done_before=1)
+    counts = Counts(total=3, done=1)
     progress = ProgressLine(counts, lambda: None, stream)
     progress.tick()
     progress.tick()  # too early
     progress.failure("H = 0.8", "diverged")
-    counts.done, counts.failed, now[0] = 1, 1, 2.0
+    counts.done = 2
+    counts.computed = counts.failed = counts.failed_now = 1
+    now[0] = 2.0
     progress.tick()
-    progress.close()
-    progress.close()
+    progress.end()
+    progress.end()
     first, last = "1 of 3 tasks done", "2 of 3 tasks done, 1 failed, 2.0 s so far"
     shown = stream.getvalue().replace("\r\x1b[K", "|")
     assert shown == f"|{first}|failed: H = 0.8: diverged\n|{last}|{last}\n"

@@ -6,8 +6,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from dataclasses import replace
 
@@ -18,15 +16,12 @@ import xarray
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import launch, session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
 from adhesis.ensemble.task.compute import check_task
 from tests.support.campaign_support import (
-    TESTS,
     adhesis,
     adhesis_here,
     differences,
@@ -36,7 +31,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.fake_run import fake_engine, fake_result
+from tests.support.fake_run import fake_engine
 
 
 def run(folder, *words, fake="", **changes):
@@ -76,15 +71,10 @@ def test_where_there_is_no_mpi_processes_compute_what_ranks_would(tmp_path, monk
         assert set(file["rank"][:]) == {1, 2}
 
 
-def test_the_version_is_told():
-    process = adhesis_here("--version")
-    assert process.returncode == 0
-    assert process.stdout.startswith("adhesis 0.")
-
-
-def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path):
+def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     write_campaign(tmp_path, "mine.toml")
-    assert adhesis("run", "mine.toml", fake="", cwd=tmp_path).returncode == 0
+    assert adhesis_here("run", "mine.toml", fake="").returncode == 0
     assert (tmp_path / "mine.h5").exists()
 
 
@@ -98,40 +88,29 @@ def test_a_finished_campaign_computes_nothing_again(tmp_path):
     assert out.read_bytes() == before
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The fake campaign, run to its end at once."""
+    return run(tmp_path_factory.mktemp("whole"))[1]
+
+
 @pytest.mark.parametrize(
-    ("number", "name"), [(signal.SIGUSR1, "SIGUSR1"), (signal.SIGINT, "Ctrl-C (SIGINT)")]
+    ("number", "name"),
+    [(signal.SIGUSR1, "SIGUSR1"), (signal.SIGINT, "Ctrl-C (SIGINT)"), (signal.SIGKILL, "")],
 )
-def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, number, name):
+def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, whole, number, name):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = start("run", path, "--out", out, fake="hold=2")
     wait_until(lambda: done_rows(out) >= 2)
     process.send_signal(number)
     _, errors = process.communicate(timeout=150)  # the task would go on for ever
-    assert process.returncode == 75
-    assert f"stopped early: {name} received" in errors
+    assert process.returncode == (75 if name else -signal.SIGKILL)
+    assert not name or f"stopped early: {name} received" in errors
     kept = done_rows(out)
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}")
     assert process.returncode == 0
     assert len(log.read_text().splitlines()) == 8 - kept
-    (tmp_path / "whole").mkdir()
-    _, whole = run(tmp_path / "whole")
-    assert differences(out, whole) == []
-
-
-def test_a_killed_run_resumes_with_the_same_bits(tmp_path):
-    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, fake="hold=3")
-    wait_until(lambda: done_rows(out) >= 3)
-    process.kill()
-    process.communicate()
-    kept = done_rows(out)
-    log = tmp_path / "log"
-    process, _ = run(tmp_path, fake=f"log={log}")
-    assert process.returncode == 0
-    assert len(log.read_text().splitlines()) == 8 - kept
-    (tmp_path / "whole").mkdir()
-    _, whole = run(tmp_path / "whole")
     assert differences(out, whole) == []
 
 
@@ -182,7 +161,7 @@ def test_a_campaign_on_further_axes(tmp_path):
     assert "cannot grow by profile.ratio: the bins of its spectra would change" in process.stderr
 
 
-def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path):
+def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path, whole):
     process, out = run(tmp_path, fake="fail=0.7:*:1")
     assert process.returncode == 1
     assert "failed: H = 0.7, γ = 0.01 J/m², realisation 1: FloatingPointError" in process.stderr
@@ -198,8 +177,6 @@ def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path):
     assert log.read_text() == "0.7:0.04:1\n"
     process, _ = run(tmp_path, "--redo", "failed")
     assert process.returncode == 0
-    (tmp_path / "whole").mkdir()
-    _, whole = run(tmp_path / "whole")
     assert differences(out, whole) == []
 
 
@@ -288,14 +265,6 @@ def refused(folder, *words, **changes):
     return process.stderr
 
 
-def test_bad_campaigns_leave_nothing_behind(tmp_path):
-    assert "[profile] period is -1.0: it must be a positive" in refused(tmp_path, period="-1.0")
-    assert "realisations is 0: it must be" in refused(tmp_path, realisations="0")
-    assert "speed is unknown" in refused(tmp_path, jumps="8\nspeed = 3")
-    assert "nodes_per_wave is 4: it must be" in refused(tmp_path, nodes_per_wave="4")
-    assert "cannot be computed" in refused(tmp_path, method='"sharp"')  # it has no nodes
-
-
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
@@ -335,10 +304,7 @@ def test_a_cell_that_is_new_is_tried_before_the_file_grows(tmp_path):
 
 
 def test_bad_options(tmp_path):
-    assert "--redo is 'some'" in refused(tmp_path, "--redo", "some")
-    assert "--hurst needs --redo" in refused(tmp_path, "--hurst", "0.7")
-    assert "walltime is '3 weeks'" in refused(tmp_path, "--walltime", "3 weeks")
-    assert "--max-failures is '-1'" in refused(tmp_path, "--max-failures", "-1")
+    """Of single options: test_command_line.py."""
     assert "no folder" in refused(tmp_path, "--out", tmp_path / "none" / "r.h5")
     assert "is a directory" in refused(tmp_path, "--out", tmp_path)
     sentence = "the name of a new results file must end in .h5"
@@ -351,7 +317,7 @@ def test_an_existing_results_file_keeps_its_name(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "old.dat"
     run(tmp_path)
     (tmp_path / "r.h5").rename(out)
-    assert adhesis("run", path, "--out", out, fake="").returncode == 0
+    assert adhesis_here("run", path, "--out", out, fake="").returncode == 0
 
 
 def test_a_results_file_of_another_campaign(tmp_path):
@@ -372,7 +338,7 @@ def test_a_read_only_folder(tmp_path):
     folder = tmp_path / "locked"
     folder.mkdir(mode=0o500)
     path = write_campaign(tmp_path)
-    process = adhesis("run", path, "--out", folder / "r.h5")
+    process = adhesis_here("run", path, "--out", folder / "r.h5")
     assert process.returncode == 2
     assert "is read-only" in process.stderr
 
@@ -438,29 +404,6 @@ def test_status_tells_what_failed_and_why(tmp_path):
     assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)
 
 
-def test_status_of_a_large_file_loads_no_mpi(tmp_path):
-    path = write_campaign(tmp_path, realisations="5000", jumps="1", load_steps="1")
-    campaign = load_campaign(path)
-    create(tmp_path / "r.h5", campaign)
-    result = fake_result(campaign, campaign.tasks()[0])
-    with Writer(tmp_path / "r.h5") as writer:
-        for row in range(0, 20_000, 200):
-            writer.write_result(row, result)
-    code = (
-        "import sys; from adhesis.ensemble.command.main import main; "
-        "main(['status', sys.argv[1]]); "
-        "print([m for m in sys.modules if m.startswith('mpi4py')])"
-    )
-    process = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "r.h5")],
-        capture_output=True,
-        text=True,
-        env=environment(),
-    )
-    assert "20000 tasks, 100 done" in process.stdout
-    assert process.stdout.endswith("[]\n")
-
-
 @pytest.mark.parametrize(
     ("text", "seconds"),
     [
@@ -520,13 +463,6 @@ def test_a_hangup_stops_a_run_unless_it_is_ignored():
         assert signals.received is None
     finally:
         signal.signal(signal.SIGHUP, before)
-
-
-def test_the_fake_tasks_depend_on_nothing_but_the_task(tmp_path):
-    campaign = load_campaign(write_campaign(tmp_path))
-    one, two = (fake_result(campaign, campaign.tasks()[2]) for _ in range(2))
-    np.testing.assert_array_equal(one["loading_energy"], two["loading_energy"])
-    assert TESTS.is_dir()
 
 
 def test_watching_a_run_until_it_is_done(tmp_path):

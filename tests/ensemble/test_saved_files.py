@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import random
@@ -69,6 +70,15 @@ def test_what_was_loaded_is_saved_as_the_same_file(content: bytes, tmp_path: Pat
     assert twice == once
     assert twice.method == once.method
     assert twice.to_xarray().identical(once.to_xarray())
+
+
+def test_the_measure_is_loaded_as_it_was_saved(tmp_path: Path) -> None:
+    flat = dataclasses.replace(PROBLEM, measure="flat", adhesion_range=None)
+    loop = adhesis.run_loop(ExactWave(flat), max_penetration=0.6, load_steps=6)
+    loop.save(tmp_path / "loop.nc")
+    found = adhesis.load(tmp_path / "loop.nc")
+    assert found == loop
+    assert found.problem.measure == "flat"
 
 
 def test_a_bit_that_is_flipped_is_found(content: bytes, tmp_path: Path) -> None:
@@ -171,76 +181,6 @@ def a_group_in_place(file: h5py.File, _: Path) -> None:
 
 
 @crafted
-def a_factor(file: h5py.File, _: Path) -> None:
-    file["mean_stress"].attrs["scale_factor"] = 2.0
-
-
-@crafted
-def an_offset(file: h5py.File, _: Path) -> None:
-    file["mean_stress"].attrs["add_offset"] = 2.0
-
-
-@crafted
-def a_fill_value(file: h5py.File, _: Path) -> None:
-    file["mean_stress"].attrs["_FillValue"] = file["mean_stress"][3]
-
-
-@crafted
-def another_type(file: h5py.File, _: Path) -> None:
-    file["mean_stress"].attrs["dtype"] = "bool"
-
-
-@crafted
-def another_unit(file: h5py.File, _: Path) -> None:
-    file["mean_stress"].attrs["units"] = "kPa"
-
-
-@crafted
-def a_date(file: h5py.File, _: Path) -> None:
-    file["mean_stress"].attrs["units"] = "days since 2000-01-01"
-
-
-@crafted
-def coordinates(file: h5py.File, _: Path) -> None:
-    file["mean_stress"].attrs["coordinates"] = "penetration jump_kind"
-
-
-@crafted
-def a_curve_that_contradicts_its_loss(file: h5py.File, _: Path) -> None:
-    file["mean_stress"][...] *= 2
-
-
-@crafted
-def one_state_of_the_curve(file: h5py.File, _: Path) -> None:
-    file["mean_stress"][3] *= 1.001
-
-
-@crafted
-def no_numbers(file: h5py.File, _: Path) -> None:
-    file["mean_stress"][...] = np.nan
-
-
-@crafted
-def a_penetration(file: h5py.File, _: Path) -> None:
-    file["penetration"][2] += 1e-3
-
-
-@crafted
-def a_drop(file: h5py.File, _: Path) -> None:
-    file["jump_energy_drop"][0] *= 2
-
-
-@crafted
-def heights(file: h5py.File, _: Path) -> None:
-    file["coefficient_real"][...] *= 2
-
-
-@crafted
-def infinite_heights(file: h5py.File, _: Path) -> None:
-    file["coefficient_real"][...] = np.inf
-
-
-@crafted
 def no_dimension(file: h5py.File, _: Path) -> None:
     values = file["mean_stress"][...]
     del file["mean_stress"]
@@ -261,6 +201,24 @@ def fewer_jumps(file: h5py.File, _: Path) -> None:
     file["jump_energy_drop"] = values
 
 
+# Attributes of the mean stress, and numbers of datasets that are multiplied by a factor.
+OF_STRESS: dict[str, object] = {
+    "scale_factor": 2.0,
+    "add_offset": 2.0,
+    "_FillValue": 0.0,
+    "dtype": "bool",
+    "units": "kPa",
+    "coordinates": "penetration jump_kind",
+}
+FACTORS: dict[str, tuple[str, object, float]] = {
+    "a curve that contradicts its loss": ("mean_stress", ..., 2.0),
+    "one state of the curve": ("mean_stress", 3, 1.001),
+    "no numbers": ("mean_stress", ..., np.nan),
+    "a penetration": ("penetration", 3, 1.01),
+    "a drop": ("jump_energy_drop", 0, 2.0),
+    "heights": ("coefficient_real", ..., 2.0),
+    "infinite heights": ("coefficient_real", 1, np.inf),
+}
 ATTRIBUTES: dict[str, object] = {
     "loss": 1.0,
     "loss_error": -1.0,
@@ -282,7 +240,7 @@ ATTRIBUTES: dict[str, object] = {
 }
 
 
-@pytest.mark.parametrize("name", [*CRAFTED, *ATTRIBUTES])
+@pytest.mark.parametrize("name", [*CRAFTED, *OF_STRESS, *FACTORS, *ATTRIBUTES])
 def test_a_crafted_file_is_refused(name: str, content: bytes, tmp_path: Path) -> None:
     path, pipe = tmp_path / "loop.nc", tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -290,6 +248,11 @@ def test_a_crafted_file_is_refused(name: str, content: bytes, tmp_path: Path) ->
     with h5py.File(path, "r+") as file:
         if name in CRAFTED:
             CRAFTED[name](file, tmp_path)
+        elif name in OF_STRESS:
+            file["mean_stress"].attrs[name] = OF_STRESS[name]
+        elif name in FACTORS:
+            dataset, where, factor = FACTORS[name]
+            file[dataset][where] *= factor
         else:
             file.attrs[name] = ATTRIBUTES[name]
     path.write_bytes(sealed(path.read_bytes()))

@@ -266,7 +266,8 @@ def cuts(before: bytes, after: bytes):
 def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
     """Each write is recorded; a kill after each, and within each flush, must not cost a row.
 
-    A killed process leaves behind what it has handed to the system: the file as it is then.
+    A killed process leaves behind what it has handed to the system: the file as it is then. A row
+    with its checksum is whole; of which result it is, the loss says.
     """
     small = {"hurst": "[0.8]", "realisations": "1", "load_steps": "1", "jumps": "1"}
     campaign = parse_campaign(campaign_text(**small) + "field_penetrations = []\n")
@@ -291,6 +292,9 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
         writer.reset([0, 1])
         writer.write_result(0, second)
         writer.write_result(1, fake_result(campaign, tasks[1]))
+    Results(path).close()
+    # the bytes beside the rows have their checksum at every moment: attributes are compared once
+    monkeypatch.setattr(Results, "_check_attributes", lambda _: None)
     copy, seen, states = tmp_path / "copy.h5", set(), set()
     for before, after in itertools.pairwise(moments):
         for content in cuts(before, after):
@@ -301,12 +305,9 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
             with Results(copy) as results:
                 status = results.status()
                 states.add(tuple(status[:2].tolist()))
+                assert not results.damaged().size
                 if status[0] == DONE:
-                    kept = results.column("loss")[0]
-                    whole = {first["loss"]: first, 2.0: second}[kept]
-                    for dataset in RESULT_DATASETS:
-                        value = np.asarray(whole[dataset.name], dataset.dtype)
-                        assert results.column(dataset.name)[0].tobytes() == value.tobytes()
+                    assert results.column("loss")[0] in (first["loss"], 2.0)
                 if status[1] == FAILED:
                     assert results.errors(np.array([1])) == ["ValueError: no"]
                     assert results.column("wall_time")[1] == 2.5
@@ -387,7 +388,7 @@ def test_a_disk_that_is_too_small_is_met_before_the_first_task(tmp_path, campaig
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_leaves_nothing(campaign):
+def test_a_full_disk_leaves_nothing(tmp_path):
     """/dev/full cannot hold a file; a limit on file size fails writes in the same place."""
     code = (
         "import sys, resource, signal; sys.path[:0] = sys.argv[2:]\n"
@@ -400,18 +401,13 @@ def test_a_full_disk_leaves_nothing(campaign):
         "try:\n    create(sys.argv[1], parse_campaign(campaign_text()))\n"
         "except WriteError as error:\n    print(error, flush=True)\n"
     )
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder:
-        target = f"{folder}/r.h5"
-        run = subprocess.run(
-            [sys.executable, "-c", code, target, str(ROOT)],
-            capture_output=True,
-            text=True,
-        )
-        assert run.stdout == f"{target} cannot be written: File too large\n"
-        assert (run.returncode, run.stderr) == (0, "")  # HDF5 would crash it at its end
-        assert not os.listdir(folder)
+    target = tmp_path / "r.h5"
+    run = subprocess.run(
+        [sys.executable, "-c", code, target, str(ROOT)], capture_output=True, text=True
+    )
+    assert run.stdout == f"{target} cannot be written: File too large\n"
+    assert (run.returncode, run.stderr) == (0, "")  # HDF5 would crash it at its end
+    assert not list(tmp_path.iterdir())
 
 
 # ---------------------------------------------------------------- scale and lock

@@ -10,7 +10,7 @@ import pytest
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.run.attempt import TimeLimit
-from adhesis.ensemble.task.compute import Runner, make_problem, run_task
+from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
@@ -130,12 +130,12 @@ def test_a_task_on_further_axes_has_the_bits_of_a_campaign_of_its_values():
     several = parse_campaign(campaign_text(**axes))
     task = several.tasks()[-1]
     alone = parse_campaign(campaign_text(young="2e6"))
-    one, two = run_task(several, task), run_task(alone, alone.tasks()[-1])
+    one, two = Runner()(several, task), Runner()(alone, alone.tasks()[-1])
     for name in ("loss", "loss_from_drops", "loading_mean_stress", "jump_penetration", "h_max"):
         assert np.asarray(one[name]).tobytes() == np.asarray(two[name]).tobytes(), name
     coarse = several.tasks()[0]
     assert several.at(coarse).profile.ratio == 2
-    small = run_task(several, coarse)
+    small = Runner()(several, coarse)
     assert small["psd_height"].shape == one["psd_height"].shape
 
 
@@ -154,7 +154,7 @@ def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_compute
     first = campaign.tasks()[0]
     tasks = campaign.sharing(first)
     assert [campaign.at(task).cycle.max_penetration for task in tasks] == [0.3, 0.45, 0.6]
-    alone = [bits(run_task(campaign, task)) for task in tasks]
+    alone = [bits(Runner()(campaign, task)) for task in tasks]
     together = Runner()
     assert [bits(together(campaign, task)) for task in tasks] == alone
     for order in ([0, 2], [2, 0, 1]):
@@ -171,7 +171,7 @@ def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_compute
         stopped(campaign, tasks[1], give_up)
     assert bits(stopped(campaign, tasks[1])) == alone[1]
     other = campaign.sharing(campaign.tasks()[1])
-    assert bits(stopped(campaign, other[2])) == bits(run_task(campaign, other[2]))
+    assert bits(stopped(campaign, other[2])) == bits(Runner()(campaign, other[2]))
 
 
 @pytest.mark.parametrize("moment", [1, 2, 5])
@@ -193,7 +193,7 @@ def test_a_loading_branch_that_was_interrupted_is_not_gone_on_with(monkeypatch, 
         patch.setattr(Record, "visit", interrupted)
         with pytest.raises(TimeLimit):
             runner(campaign, tasks[1])
-    assert bits(runner(campaign, tasks[2])) == bits(run_task(campaign, tasks[2]))
+    assert bits(runner(campaign, tasks[2])) == bits(Runner()(campaign, tasks[2]))
 
 
 def test_loops_that_share_a_loading_branch_are_those_of_campaigns_of_their_own():
@@ -208,7 +208,7 @@ def test_loops_that_share_a_loading_branch_are_those_of_campaigns_of_their_own()
     for task in campaign.sharing(campaign.tasks()[0]):
         turn = campaign.at(task).cycle.max_penetration
         own = sharp(str(turn))
-        one, two = runner(campaign, task), run_task(own, own.tasks()[0])
+        one, two = runner(campaign, task), Runner()(own, own.tasks()[0])
         assert one["loss"] == pytest.approx(two["loss"], rel=1e-4)
         for name in ("loading_mean_stress", "unloading_mean_stress", "unloading_contact_fraction"):
             shared, separate = one[name], two[name]
@@ -236,7 +236,7 @@ def test_a_loop_under_a_load_is_that_of_the_library_on_axes_of_penetration():
     """A jump is a line at its load; nothing is reported beyond the turning point."""
     campaign = parse_campaign(under_load("300"))
     task = campaign.tasks()[0]
-    row = run_task(campaign, task)
+    row = Runner()(campaign, task)
     problem = make_problem(campaign, task)
     assert problem.control.is_load
     loop = run_loop(make_method("sharp", problem), max_stress=300.0, load_steps=8)
@@ -261,7 +261,7 @@ def test_loads_share_a_loading_branch_and_what_runs_away_is_told():
     first, second, third = campaign.sharing(campaign.tasks()[0])
     runner = Runner()
     together = [bits(runner(campaign, task)) for task in (first, second)]
-    assert together == [bits(run_task(campaign, task)) for task in (first, second)]
+    assert together == [bits(Runner()(campaign, task)) for task in (first, second)]
     with pytest.raises(PathError, match=r"full contact before a mean stress of .* Pa"):
         runner(campaign, third)
 
@@ -293,8 +293,8 @@ def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
     campaign = parse_campaign(campaign_text())
     task = campaign.tasks()[0]
     steps = []
-    one = run_task(campaign, task, lambda *step: steps.append(step[:2]))
-    two = run_task(campaign, task)
+    one = Runner()(campaign, task, lambda *step: steps.append(step[:2]))
+    two = Runner()(campaign, task)
     sizes = sizes_of(row_scales(campaign))
     assert one.keys() == {d.name for d in RESULT_DATASETS}  # realisation 0 keeps its fields
     for dataset in RESULT_DATASETS:
@@ -303,7 +303,7 @@ def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
         if dataset.name not in ("wall_time", "cpu_time"):
             again = np.asarray(two[dataset.name], dataset.dtype)
             assert value.tobytes() == again.tobytes(), dataset.name
-    later = run_task(campaign, campaign.tasks()[1])
+    later = Runner()(campaign, campaign.tasks()[1])
     assert later.keys() == {d.name for d in RESULT_DATASETS if d.dims[0] != KEPT}
     assert len(steps) > campaign.cycle.load_steps
     assert one["loss"] > 0

@@ -27,12 +27,16 @@ def said(found: Prepared, name: str) -> str:
     return " ".join(step.description for step in found.steps if step.name == name)
 
 
+def outliers(found: Prepared) -> float:
+    return sum(step.numbers["points"] for step in found.steps if step.name == "outliers")
+
+
 def test_a_tilt_goes_and_a_clean_trace_stays() -> None:
     found = prepared(Z + 3e-3 * X)
     assert found.degree == 1
     assert found.warnings == ()
     np.testing.assert_allclose(found.level(), prepared(Z).level(), atol=1e-17)
-    assert found.outliers == 0
+    assert outliers(found) == 0
     assert not found.gaps.any()
 
 
@@ -87,18 +91,19 @@ def test_dust_is_taken_out_and_crests_are_not() -> None:
     heights[[333, 700, 701]] += 15e-6
     heights[900] -= 10e-6
     found = prepared(heights)
-    assert found.outliers == 4
+    assert outliers(found) == 4
     assert np.flatnonzero(found.gaps).tolist() == [333, 700, 701, 900]
     assert np.abs(found.filled - Z).max() < 2e-7
-    assert prepared(heights, keep_outliers=True).outliers == 0
+    assert outliers(prepared(heights, keep_outliers=True)) == 0
     # Sharp crests of a saw, and edges of steps, are the surface's own.
     saw = 1e-6 * np.abs((X / 50e-6) % 2 - 1)
-    assert prepared(saw).outliers == 0
+    assert outliers(prepared(saw)) == 0
     steps = 1e-6 * np.sign(np.sin(2 * np.pi * X / 80e-6 + 0.1))
-    assert prepared(steps + 1e-9 * np.random.default_rng(0).standard_normal(N)).outliers == 0
+    noise = 1e-9 * np.random.default_rng(0).standard_normal(N)
+    assert outliers(prepared(steps + noise)) == 0
     spiky = Z + 20e-6 * (np.random.default_rng(0).random(N) < 0.04)
     many = prepared(spiky, cut_off=20e-6)
-    assert many.outliers == 0
+    assert outliers(many) == 0
     assert any("too many for outliers" in warning for warning in many.warnings)
 
 

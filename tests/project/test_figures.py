@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import shutil
 import sys
@@ -13,8 +12,6 @@ import pytest
 from matplotlib.image import imread
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-# Folders that exchange data without one importing the other: through Method, and EdgeSystem.
-THROUGH_AN_INTERFACE = {("loading", "sharp"), ("grid", "loading"), ("continuation", "system")}
 
 
 def load(name: str, path: str):
@@ -33,21 +30,6 @@ def kept() -> list[Path]:
 
 def tool():
     return load("figures", "tools/figures_of_docs.py")
-
-
-def imported_folders(top: str) -> set[tuple[str, str]]:
-    """Return pairs of folders, by name, of which one imports the other."""
-    pairs = set()
-    for path in (ROOT / top).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            module = getattr(node, "module", None) or ""
-            if isinstance(node, ast.ImportFrom) and module.startswith(f"adhesis.{top}."):
-                place = ROOT.joinpath(*module.split(".")[1:])
-                other = place if place.is_dir() else place.parent
-                # A folder stands for those inside it, but for those of sharp, which are drawn.
-                for one in (path.parent, *path.parent.parents):
-                    pairs |= {tuple(sorted((one.name, o.name))) for o in (other, other.parent)}
-    return pairs
 
 
 def test_every_figure_of_the_documentation_has_a_command():
@@ -91,19 +73,6 @@ def test_a_figure_that_is_no_longer_made_is_removed(tmp_path, monkeypatch):
     assert [path.name for path in folder.iterdir()] == ["fig5a.png"]
     assert figures.stamped(folder / "fig5a.png").endswith("ARGS=paper")
     assert [path.name for path in (tmp_path / "numbers").iterdir()] == ["fig5a.csv"]
-
-
-def test_the_picture_of_the_folders_shows_what_the_code_does():
-    """Arrows join folders of which one imports the other; each folder but runtime has one."""
-    picture = load("structure", "docs/figures/structure.py")
-    for top, boxes, arrows in (
-        ("ensemble", picture.CAMPAIGN, picture.CAMPAIGN_ARROWS),
-        ("solver", picture.LOOP, picture.LOOP_ARROWS),
-    ):
-        known = imported_folders(top) | THROUGH_AN_INTERFACE
-        assert {tuple(sorted(arrow[:2])) for arrow in arrows} - known == set()
-        joined = {name for arrow in arrows for name in arrow[:2]}
-        assert set(boxes) - joined - {"runtime"} == set()
 
 
 @pytest.mark.parametrize("path", kept(), ids=lambda path: path.stem)

@@ -10,19 +10,20 @@ import signal
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from adhesis.ensemble.doctor import examine
 from adhesis.ensemble.run import launch
-from adhesis.ensemble.run.processes import Work
-from adhesis.ensemble.trace.job import Job
+from adhesis.ensemble.trace.job import Cycle, Job
 from adhesis.ensemble.trace.loops import Loops
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.profile import single_wave
 from tests.support.campaign_support import ROOT, environment, has_ended, wait_until
 from tests.support.launchers import MPIRUN
 
-# A job that the solver refuses: a profile needs a wave.
-IMPOSSIBLE = Job("only", 1.0, np.zeros(3, complex), 1.0, 0.5, 1.0, 0.5, 4, "grid", 1e-3)
+# A job that the solver refuses: no loop turns below full penetration.
+CYCLE = Cycle(HalfSpace(1.0, 0.5), (1.0,), (2.0,), 4, "grid")
+IMPOSSIBLE = Job("only", single_wave(0.01, 1.0), CYCLE, 1.0, 2.0)
 STRAY = ("numpy", "mpi4py", "solver", "ensemble", "h5py", "json", "pickle", "ctypes")
 
 
@@ -105,7 +106,7 @@ def test_a_worker_ends_with_its_parent_even_if_that_is_killed():
     try:
         worker = json.loads(parent.stdout.readline())
         with os.fdopen(os.dup(ours), "wb") as jobs:
-            pickle.dump(Work(divmod), jobs)
+            pickle.dump((divmod, None, 10.0), jobs)
             pickle.dump((False, ("task", 0)), jobs)
         while (message := pickle.load(parent.stdout))[0] == "alive":
             pass

@@ -105,29 +105,6 @@ def test_lists_of_versions_leave_nothing_to_resolve() -> None:
                     assert listed[key] in other.specifier, f"{name} needs {other}"
 
 
-def test_make_help_lists_every_target() -> None:
-    done = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True)
-    for target in ("setup", "run", "test", "lint", "bench", "clean", "help"):
-        assert f"make {target} " in done.stdout
-
-
-def test_byte_code_is_kept_whatever_the_environment_says() -> None:
-    """Else every process of a test, and of a user who may not write here, compiles its imports."""
-    done = subprocess.run(
-        ["make", "--eval", "show:;@env", "show"],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "PATH=" in done.stdout
-    assert "PYTHONDONTWRITEBYTECODE" not in done.stdout
-    unset = re.search(r"^unset (.*)$", (ROOT / "tools" / "setup.sh").read_text(), re.MULTILINE)
-    assert unset is not None
-    assert "PYTHONDONTWRITEBYTECODE" in unset[1].split()
-
-
 def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
     stamp = Path(sys.prefix, "adhesis-setup")
     # Through a link to the .venv of another checkout it would be set up for this one.
@@ -186,29 +163,6 @@ def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
     )
     assert done.stderr == ""
     return done.returncode, done.stdout.splitlines()
-
-
-def test_parts_of_set_up_go_on_side_by_side_and_tell_of_themselves(tmp_path: Path) -> None:
-    # Each waits for the other: one after another they would never end.
-    code, lines = parts(
-        tmp_path,
-        """
-        meet() { touch "$1"; until [ -e "$2" ]; do sleep 0.05; done; echo "met $2"; }
-        late() { until [ "$(grep -c ' at ' said)" -ge 2 ]; do sleep 0.05; done; meet b a; }
-        part first "the first" meet a b
-        part second "the second" late
-        finish second
-        finish first
-        """,
-    )
-    assert code == 0
-    assert [re.sub(r"\d+ s", "… s", line) for line in lines if " at " in line][:2] == [
-        "setup: at … s: the first (… s); the second (… s)"
-    ] * 2
-    reported = [re.sub(r"\d+ s", "", line) for line in lines if " at " not in line]
-    assert sorted(reported) == ["setup: the first: ", "setup: the second: "]
-    assert "met b" in (tmp_path / ".setup" / "first.log").read_text()
-    assert "met a" in (tmp_path / "log").read_text()
 
 
 def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import subprocess
+import sys
 
 import pytest
 
@@ -34,3 +36,16 @@ def test_callers_that_report_silence_the_log(caplog: pytest.LogCaptureFixture) -
     with silence_compile_log():
         compiling(60)
     assert caplog.messages == []
+
+
+def test_a_first_compilation_of_the_library_is_logged() -> None:
+    program = """
+import numba
+from adhesis import HalfSpace, Problem, make_method, single_wave
+from adhesis.solver.runtime import compile_log
+compile_log._FIRST_AFTER = 0.0
+make_method("sharp", Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01))
+numba.njit(lambda x: x + 1)(1)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stderr.startswith("compiling for "), done.stderr

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from adhesis.solver.model.jump import Branch as BranchName
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.across_jump import carry_previous
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
@@ -40,6 +41,10 @@ class Curve:
     is_load: bool = False
     closing_factor: float = 1.0
     asked: int = 0
+    pins: bool = False
+
+    def recall(self, held: Array) -> None:
+        """Edges of one work of adhesion remember nothing."""
 
     def half_width(self, at: float) -> float:
         """Half of the gap's length."""

@@ -334,19 +334,6 @@ def test_number_of_nodes():
     assert (report.nodes, report.nodes_per_wave) == (2048, 2048 / 12)
 
 
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ({"nodes_per_wave": 7}, "too coarse"),
-        ({"nodes_per_wave": 8.5}, "whole number"),
-        ({"accuracy": 0.0}, "between 0 and 1"),
-    ],
-)
-def test_a_grid_that_cannot_be_is_refused(options, text):
-    with pytest.raises(ValueError, match=text):
-        GridMethod(Problem(rough_profile(), HALF_SPACE, 1e-3), **options)
-
-
 def test_a_state_of_another_method_is_refused():
     method = wave_method(0.2, nodes=256)
     foreign = ContactState(0.5 * AMPLITUDE, np.array([[0.1, 0.2]]) * PERIOD, 0.0, 0.0, 0.0, 0.1)

@@ -30,6 +30,7 @@ def patches(*edges: tuple[float, float]) -> np.ndarray:
         (patches((0.02, 0.1)), patches((0.98, 1.1)), "spreading", 0.12),
         (patches((0.02, 0.1), (0.8, 0.9)), patches((0.8, 1.1)), "merging", 0.3),
         # Several events: a new patch counts before a merger, a merger before a loss.
+        (patches((0.1, 0.2), (0.3, 0.4)), patches((0.1, 0.4), (0.6, 0.7)), "snap-in", 0.3),
         (
             patches((0.1, 0.2), (0.3, 0.4), (0.6, 0.7)),
             patches((0.1, 0.4)),

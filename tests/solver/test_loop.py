@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from adhesis import ContactState, Control, HalfSpace, Path, Problem, run_loop, single_wave
-from adhesis.solver.loading.loop import check_cycle
 from adhesis.solver.loading.loop_result import estimated_error
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
-from adhesis.solver.model.jump import Jump, classify
+from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
@@ -257,18 +256,6 @@ def test_a_contact_that_never_detaches_is_reported():
         run_loop(_Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)
 
 
-@pytest.mark.parametrize("depth", [0.0, 1.0, 1.5, -0.2, np.nan, np.inf])
-def test_depths_without_a_state_are_refused(depth):
-    with pytest.raises(ValueError, match=r"max_penetration is .* from 1e-12 to 0.999999"):
-        check_cycle(depth, 10, Control())
-
-
-@pytest.mark.parametrize("steps", [0, -3, 2.5])
-def test_impossible_load_steps_are_refused(steps):
-    with pytest.raises(ValueError, match=r"load_steps is .* whole number"):
-        check_cycle(0.5, steps, Control())
-
-
 def test_exact_wave_refuses_other_profiles():
     rough = Profile(PERIOD, np.array([0, 1e-9, 1e-9], dtype=complex))
     with pytest.raises(ValueError, match="harmonic 1"):
@@ -292,30 +279,6 @@ def test_exact_wave_fields_fulfil_the_contact_conditions():
 
 
 # ---------------------------------------------------------------------- kinds of jumps
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "kind", "length"),
-    [
-        ([[1, 2]], [], "pull-off", 1.0),
-        ([], [[1, 2.5]], "snap-in", 1.5),
-        ([[1, 2]], [[1, 2], [4, 4.5]], "snap-in", 0.5),
-        ([[1, 2], [3, 4]], [[1, 4]], "merging", 3.0),
-        ([[1, 2], [4, 4.5]], [[1, 2]], "vanishing", 0.5),
-        ([[1, 4]], [[1, 2], [3, 4]], "splitting", 3.0),
-        ([[1, 2], [4, 5]], [[1, 2.5], [4, 5]], "spreading", 1.5),
-        ([[1, 2], [4, 5]], [[1, 2], [4, 4.25]], "receding", 1.0),
-        # Across the end of the period (λ = 10): the same patch, written from either side.
-        ([[9.5, 10.5]], [[9.0, 10.5]], "spreading", 1.5),
-        ([[0.0, 0.5], [4, 5]], [[4, 5], [9.5, 10.5]], "spreading", 1.0),
-        # Events in one jump: a new patch outweighs a merger, a merger outweighs a loss.
-        ([[1, 2], [3, 4]], [[1, 4], [6, 7]], "snap-in", 3.0),
-        ([[1, 2], [3, 4], [8, 9]], [[1, 4]], "merging", 3.0),
-    ],
-)
-def test_jumps_are_called_by_what_happens_to_the_patches(before, after, kind, length):
-    edges = (np.array(e, dtype=float).reshape(-1, 2) for e in (before, after))
-    assert classify(*edges, period=10.0) == (kind, pytest.approx(length))
 
 
 def test_a_loop_prints_itself_in_a_few_lines():

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numba
 import numpy as np
-import pytest
 
 from adhesis.solver.runtime.compiler import Compiler
 
@@ -121,20 +120,12 @@ def comparable(code: str) -> list[str]:
     return code.splitlines()
 
 
-@pytest.fixture(scope="module")
-def alone() -> tuple[str, str]:
-    return printed(OWN, PRINT)
-
-
-def test_a_function_of_a_user_answers_as_without_adhesis(alone: tuple[str, str]) -> None:
-    texts, _ = alone
-    assert "cannot assign slice" in texts  # numba's own message, of any version
-    assert printed(OWN, ADHESIS, PRINT)[0] == texts
-
-
-def test_a_function_of_a_user_is_compiled_to_the_same_code(alone: tuple[str, str]) -> None:
-    """Boxing shows in the code alone: both ways give equal arrays."""
-    code = comparable(printed(OWN, ADHESIS, PRINT)[1])
+def test_a_function_of_a_user_is_as_without_adhesis() -> None:
+    """It gives the same answers by the same code; boxing shows in the code alone."""
+    alone, beside = printed(OWN, PRINT), printed(OWN, ADHESIS, PRINT)
+    assert "cannot assign slice" in alone[0]  # numba's own message, of any version
+    assert beside[0] == alone[0]
+    code = comparable(beside[1])
     assert len(code) > 500
     assert code == comparable(alone[1])
 

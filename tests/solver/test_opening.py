@@ -94,6 +94,8 @@ def test_grid_opens_a_closed_trough_there_too():
     b = exact.half_length_at(STRENGTH, TROUGHS.period / 2, 5e-5, 2e-4)
     first = next(jump for jump in loop.jumps if jump.kind == "opening")
     assert first.separation == pytest.approx(exact.separation(b), rel=5e-3)
+    length = griffith_length(STRENGTH, SOLID.modulus, GAMMA)
+    assert first.barrier * TROUGHS.period == pytest.approx(GAMMA * length / 2, rel=0.1)
 
 
 def test_the_last_gap_between_flat_surfaces_is_koiters_crack():

@@ -17,7 +17,6 @@ from adhesis import (
 )
 from adhesis.solver.loading.path_record import Axis
 from adhesis.solver.loading.turning_points import LoadingBranch
-from adhesis.solver.method import PathError
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.sharp.method import SharpMethod
 from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
@@ -143,13 +142,3 @@ def test_a_path_may_end_in_contact():
 def test_impossible_paths_are_refused(points, rule):
     with pytest.raises(ValueError, match=rule):
         run_path(make_method("sharp", problem_of()), points, load_steps=5)
-
-
-def test_contact_that_is_lost_on_the_way_ends_the_path():
-    with pytest.raises(PathError, match="contact is lost on the way to -50"):
-        run_path(make_method("sharp", problem_of()), [0.5, -50.0, 0.6], load_steps=3)
-
-
-def test_turning_points_must_differ():
-    with pytest.raises(ValueError, match="all different"):
-        run_loops(make_method("sharp", problem_of()), max_penetration=[0.5, 0.5], load_steps=5)

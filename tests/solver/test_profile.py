@@ -128,51 +128,6 @@ def test_single_wave():
     assert wave.m0 == pytest.approx(4.5e-12)
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"hurst": 0.0}, "between 0 and 1"),
-        ({"hurst": 1.0}, "between 0 and 1"),
-        ({"n0": 0}, "n0 is 0"),
-        ({"ratio": 1.5}, "ratio is 1.5"),
-        ({"seed": -1}, "seed is -1"),
-        ({"h_rms": np.nan}, "h_rms is nan"),
-        ({"m2": 1e-3}, "exactly one"),
-        ({"amplitudes": "gamma"}, "amplitudes is 'gamma'"),
-        ({"period": -1.0}, "period is -1.0"),
-    ],
-)
-def test_impossible_spectra_are_refused(change, text):
-    with pytest.raises(ValueError, match=text):
-        spectral(**{"hurst": 0.8, "h_rms": 1e-6, **ROUGH, **change})
-
-
-@pytest.mark.parametrize(
-    ("heights", "text"),
-    [
-        ([1.0], "at least 3"),
-        ([[1.0, 2.0, 3.0]], "dimensions"),
-        ([1.0, np.nan, 2.0], r"heights\[1\] is nan"),
-    ],
-)
-def test_impossible_heights_are_refused(heights, text):
-    with pytest.raises(ValueError, match=text):
-        profile_from_heights(np.array(heights), 1e-3)
-
-
-def test_coefficients_must_describe_a_profile():
-    for bad, text in (([1.0, 1.0], "zero mean"), ([0.0], "M ≥ 1"), ([0.0, np.inf], "finite")):
-        with pytest.raises(ValueError, match=text):
-            Profile(1e-3, np.array(bad, dtype=complex))
-    with pytest.raises(ValueError, match="flat"):
-        Profile(1e-3, np.zeros(3, dtype=complex))
-
-
-def test_an_absurd_spectrum_is_refused_before_it_fills_the_memory():
-    with pytest.raises(ValueError, match="must be at most 100000"):
-        spectral(0.8, period=1.0, n0=10, ratio=100_000, seed=1, h_rms=1e-6)
-
-
 def test_crests_are_the_maxima_of_the_continuous_function(rough):
     crests = rough.crests(0.5)
     fine = rough.heights(1 << 16)

@@ -201,10 +201,19 @@ def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, 
     assert records[0]["error"] is None
 
 
-# Claims that are known not to hold yet. One that holds again must be taken off this list.
 @pytest.mark.parametrize("name", METHODS)
-def test_every_claim_about_the_method_holds(name, capsys):
-    """The whole of ``adhesis validate``."""
+def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
+    """The whole of ``adhesis validate``; of grid, without --slow, a part of the long claims.
+
+    A trough that opens is in test_opening.py.
+    """
+    alphas = validation.ALPHAS
+    if name == "grid" and not request.config.getoption("--slow"):
+        alphas = (0.05, 0.3, 0.6)
+        monkeypatch.setattr(validation, "ALPHAS", alphas)
+        monkeypatch.setattr(validation, "STIFFNESSES", (1.0, 0.0))
+        kept = tuple(claim for claim in validation.CLAIMS if claim is not validation.opening)
+        monkeypatch.setattr(validation, "CLAIMS", kept)
     code = main(["validate", "--method", name, "--json"])
     records = json.loads(capsys.readouterr().out)
     assert [r["claim"] for r in records if not r["passed"]] == []
@@ -212,5 +221,5 @@ def test_every_claim_about_the_method_holds(name, capsys):
     losses = [
         r["error"] for r in records if r["claim"].startswith("loss of") and "drops" in r["claim"]
     ]
-    assert len(losses) == 7
+    assert len(losses) == len(alphas)
     assert np.max(losses) < {"grid": 5e-3, "sharp": 1e-8}[name]

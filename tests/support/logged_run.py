@@ -13,7 +13,7 @@ from pathlib import Path
 from adhesis.ensemble.command.campaigns import run
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.run.session import Engine
-from adhesis.ensemble.task.compute import run_task
+from adhesis.ensemble.task.compute import Runner
 from adhesis.solver.precompile import watch_compilation
 
 if __name__ == "__main__":
@@ -25,7 +25,7 @@ if __name__ == "__main__":
 
     def compute(campaign, task, progress=None):
         begin("computes")
-        return run_task(campaign, task, progress)
+        return Runner()(campaign, task, progress)
 
     run.execute = partial(run.execute, engine=Engine(compute=compute))
     with watch_compilation(lambda seen: begin("compiles")):

@@ -99,6 +99,8 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "loss_from_drops": drops,
         "loss_small_scale": share * drops,
         "loss_large_scale": (1 - share) * drops,
+        "friction": np.zeros(n),
+        "gamma_open": gamma,
         "audit_residual": audit,
         "loss_error": 1e-4 * loss,
         "valid_range": 1e-2 * h_max,

@@ -7,13 +7,12 @@ results file like any other: merge further parts into it, resume it, grow its ca
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import WriteError
+from adhesis.ensemble.exit_codes import WRITE_FAILED
 
-_WRITE_FAILED = 74
 EXAMPLES = (
     "adhesis merge part1.h5 part2.h5 --out all.h5",
     "adhesis merge part3.h5 --out all.h5",
@@ -38,8 +37,6 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.solver.checks import counted
 
     out = args.out
-    if not os.path.isdir(out.parent):
-        raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
     check_results_file("--out", out)
     try:
         with RunLock(out) as lock:
@@ -51,7 +48,7 @@ def execute(args: argparse.Namespace) -> int:
                 raise
     except WriteError as error:
         print(f"adhesis merge: {error}; the same command resumes", file=sys.stderr)
-        return _WRITE_FAILED
+        return WRITE_FAILED
     for doubt in merged.doubts:
         print(f"adhesis merge: {doubt}", file=sys.stderr)
     failed = f", {merged.failed} failed" if merged.failed else ""

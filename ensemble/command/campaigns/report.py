@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from adhesis.ensemble.outputs import check_output_folder
-from adhesis.ensemble.reporter import ticking
+from adhesis.ensemble.reporter import following
 
 EXAMPLES = (
     "adhesis report paper.h5 --to report",
@@ -44,12 +44,11 @@ def execute(args: argparse.Namespace) -> int:
     check_output_folder("--to", args.to, _FILES, inputs)
     from adhesis.ensemble.report.write_report import write_report
 
-    under_way = ""
-
-    def progress(part: str) -> None:
-        nonlocal under_way
-        under_way = part
-
-    with ticking(lambda: f"adhesis report: {under_way}"):
-        write_report(args.file, args.to, beside=args.beside, progress=progress)
+    with following("adhesis report") as show:
+        write_report(
+            args.file,
+            args.to,
+            beside=args.beside,
+            progress=lambda part: show(None, None, f"adhesis report: {part}"),
+        )
     return 0

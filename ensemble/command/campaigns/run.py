@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.command.streams import OutputError, write_line
 from adhesis.ensemble.errors import InputError, WriteError, lack
 from adhesis.ensemble.exit_codes import (
@@ -31,7 +31,8 @@ from adhesis.ensemble.exit_codes import (
     TOO_FEW_RESOURCES,
     WRITE_FAILED,
 )
-from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration
+from adhesis.ensemble.quantities import WORK_OF_ADHESION
+from adhesis.ensemble.reporter import log
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
+_MOST = 2**31 - 1
+_NUMBER = within(0, _MOST, "a number that is not negative")
+_WHOLE = within(0, _MOST, "a whole number that is not negative", int)
 EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
@@ -57,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--ranks",
+        type=within(1, _MOST, "a whole number of at least 1", int),
         metavar="N",
         help="start N ranks here, without MPI as processes (one more than cores is right: rank 0 "
         "only waits)",
@@ -79,8 +84,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--max-failures",
+        type=_WHOLE,
         metavar="N",
-        default="20",
+        default=20,
         help="stop after so many failed tasks; 0: never (default: 20)",
     )
     parser.add_argument(
@@ -88,16 +94,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WHICH",
         help="compute tasks again: those that failed (failed), or done ones too (all)",
     )
-    for name, text in (
-        ("--hurst", "with --redo: only tasks of this H; may be repeated"),
-        ("--work-of-adhesion", "with --redo: only tasks of this γ in J/m²; may be repeated"),
-        ("--realisation", "with --redo: only this realisation; may be repeated"),
+    gamma = WORK_OF_ADHESION.option
+    for name, kind, text in (
+        ("--hurst", _NUMBER, "with --redo: only tasks of this H; may be repeated"),
+        ("--work-of-adhesion", gamma, "with --redo: only tasks of this γ in J/m²; may be repeated"),
+        ("--realisation", _WHOLE, "with --redo: only this realisation; may be repeated"),
     ):
-        parser.add_argument(name, metavar="VALUE", action="append", default=[], help=text)
+        parser.add_argument(
+            name, type=kind, metavar="VALUE", action="append", default=[], help=text
+        )
     parser.add_argument(
         "--patience",
+        type=_NUMBER,
         metavar="SECONDS",
-        default="10",
+        default=10.0,
         help="how long to wait for another run to let go of FILE.h5 (default: 10)",
     )
 
@@ -158,11 +168,11 @@ def _ranks(args: argparse.Namespace) -> int:
     from adhesis.ensemble.run.ranks import launched
     from adhesis.solver.checks import counted
 
-    ranks = int(_number("--ranks", args.ranks, int, least=1))
+    ranks: int = args.ranks
     most = launch.largest_number_of_ranks()
     if ranks > most:
         raise InputError(
-            f"--ranks is {args.ranks!r}: at most {most} are started here, on "
+            f"--ranks is {ranks}: at most {most} are started here, on "
             f"{counted(launch.cores(), 'core')}; more ranks than cores compute no faster"
         )
     if launched()[0] > 1:
@@ -213,31 +223,27 @@ def _run(
         return _tell_price(campaign, path, args, engine) if comm.rank == 0 else DONE
     if args.part and not args.out:
         raise InputError("--part needs --out: every part has a results file of its own")
-    most = _number("--max-failures", args.max_failures, int)
     options = Options(
         part=Part.parse(args.part) if args.part else WHOLE,
         redo=_selection(args),
-        max_failures=int(most) or None,
+        max_failures=args.max_failures or None,
         deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),
-        patience=_number("--patience", args.patience),
+        patience=args.patience,
         processes=processes,
     )
 
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
     if processes:
         workers = counted(processes, "worker")
-        say(f"without MPI (mpirun and mpi4py): {workers} as processes of this machine")
+        log(f"without MPI (mpirun and mpi4py): {workers} as processes of this machine")
     try:
-        summary = run_campaign(campaign, path, comm, options, say, engine)
+        summary = run_campaign(campaign, path, comm, options, log, engine)
     except Unresponsive as error:
         # Nobody can be waited for: what is in flight is lost, the results file is sound.
         text = f"adhesis run: {error}; what was done is kept, run the same command again to resume"
         _end_job(comm, RESUME, text)
         return RESUME
     if comm.rank == 0:
-        _report_end(campaign, path, summary, say)
+        _report_end(campaign, path, summary)
     return _code(summary, options)
 
 
@@ -250,33 +256,27 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
-def _report_end(
-    campaign: Campaign, path: Path, summary: Summary, say: Callable[[str], None]
-) -> None:
+def _report_end(campaign: Campaign, path: Path, summary: Summary) -> None:
     """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
-    failed = f", {summary.failed} failed" if summary.failed else ""
-    say(
-        f"{path}: {summary.done} of {summary.total} tasks done{failed}; "
-        f"{summary.computed} computed in {duration(summary.seconds)}"
-    )
+    log(f"{path}: {summary}")
     if summary.failed:
-        say(f"why they failed, and what to do: adhesis status {path}")
+        log(f"why they failed, and what to do: adhesis status {path}")
     for line in precision_lines(summary.precisions):
-        say(line)
+        log(line)
     if summary.doubtful:
-        say(
+        log(
             f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
             f"more than {100 * campaign.solver.accuracy:g} %, the accuracy asked for "
             f"(adhesis status {path})"
         )
     if summary.beyond_limit:
         why = why_beyond(campaign.material.opens)
-        say(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
+        log(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
     if summary.stopped:
-        say(
+        log(
             f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "
             "run the same command again to resume"
         )
@@ -300,15 +300,12 @@ def _tell_price(
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
 
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
     def prepare(tasks: Tasks) -> None:
         from adhesis.ensemble.warm import warm_up  # loads the compiler
 
         for task in tasks:
             engine.check(campaign, task)
-        warm_up(engine.methods(campaign, tasks), say)
+        warm_up(engine.methods(campaign, tasks), log)
 
     heard = time.monotonic()
 
@@ -316,7 +313,7 @@ def _tell_price(
         nonlocal heard
         if time.monotonic() > heard + _PAUSE:
             heard = time.monotonic()
-            say(f"pilot loop: {task}: {seconds:.3g} s")
+            log(f"pilot loop: {task}: {seconds:.3g} s")
 
     estimate = price(
         *(campaign, path, part),
@@ -331,33 +328,12 @@ def _tell_price(
 def _selection(args: argparse.Namespace) -> Any:
     from adhesis.ensemble.run.plan import Selection
 
-    hurst = tuple(_number("--hurst", v) for v in args.hurst)
-    read = WORK_OF_ADHESION.read
-    gamma = tuple(_number("--work-of-adhesion", v, read) for v in args.work_of_adhesion)
-    realisation = tuple(int(_number("--realisation", v, int)) for v in args.realisation)
+    values = {name: getattr(args, name) for name in ("hurst", "work_of_adhesion", "realisation")}
     if args.redo is None:
-        for name in ("hurst", "work_of_adhesion", "realisation"):
-            if getattr(args, name):
-                option = "--" + name.replace("_", "-")
-                raise InputError(f"{option} needs --redo: it chooses the tasks to compute again")
+        for name in filter(values.get, values):
+            option = "--" + name.replace("_", "-")
+            raise InputError(f"{option} needs --redo: it chooses the tasks to compute again")
         return None
     if args.redo not in ("failed", "all"):
         raise InputError(f"--redo is {args.redo!r}: it must be failed or all")
-    return Selection(args.redo, hurst, gamma, realisation)
-
-
-def _number(
-    option: str, text: str, read: Callable[[str], float] = float, *, least: int = 0
-) -> float:
-    """Return the number that is given for an option."""
-    try:
-        value = read(text)
-    except InputError as error:
-        raise InputError(f"{option} {error}") from None
-    except ValueError:
-        value = -1
-    if not least <= value < 2**31:
-        kind = "whole number" if read is int else "number"
-        rule = f"of at least {least}" if least else "that is not negative"
-        raise InputError(f"{option} is {text!r}: it must be a {kind} {rule}")
-    return value
+    return Selection(args.redo, values)

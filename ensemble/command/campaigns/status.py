@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError
 
 EXAMPLES = (
@@ -23,7 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="everything, as JSON")
     parser.add_argument("--watch", action="store_true", help="repeat the status until all is done")
     parser.add_argument(
-        "--interval", metavar="SECONDS", default="2", help="with --watch: how often (default: 2)"
+        "--interval",
+        type=within(0.1, 86_400, "a number of seconds between 0.1 and 86400"),
+        metavar="SECONDS",
+        default=2.0,
+        help="with --watch: how often (default: 2)",
     )
 
 
@@ -32,29 +37,16 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.ensemble.results.status import as_text, read_status
     from adhesis.ensemble.run.lock import holder
 
-    interval = _interval(args.interval)
     if args.watch:
         if args.json:
             raise InputError("--watch and --json cannot be given together")
-        return _watch(args.file, interval)
+        return _watch(args.file, args.interval)
     status = read_status(args.file) | {"run": holder(args.file)}
     if args.json:
         print(json.dumps(status, indent=1))
     else:
         print(as_text(status, _life(status)))
     return 0
-
-
-def _interval(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not 0.1 <= seconds <= 86_400:
-        raise InputError(
-            f"--interval is {text!r}: it must be a number of seconds between 0.1 and 86400"
-        )
-    return seconds
 
 
 def _watch(path: Path | str, interval: float) -> int:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
-from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.report.figures.loss_figures import errorbar
 from adhesis.ensemble.report.figures.style import (
     MM,
@@ -19,6 +17,7 @@ from adhesis.ensemble.report.figures.style import (
     MOST_PANELS,
     ONE_COLUMN,
     TWO_COLUMNS,
+    PublishedFigure,
     gamma_label,
     label_panel,
     legend_above,
@@ -26,9 +25,11 @@ from adhesis.ensemble.report.figures.style import (
     panels,
     say_below,
     spread_out,
+    with_x_label,
 )
-from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, together
+from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, symbols, together
 
+_MOST_TICKS = 5
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
 _LOSS = ("loss", "loss (mJ/m²)", 1e-3)
@@ -50,16 +51,16 @@ def with_figure(data: Aggregate) -> list[Axis]:
     ]
 
 
-def along(axis: Axis) -> Callable[[Aggregate], Figure]:
+def along(axis: Axis) -> Callable[[Aggregate], PublishedFigure]:
     """Return the function that draws the figure of one axis."""
 
-    def loss_along(data: Aggregate) -> Figure:
+    def loss_along(data: Aggregate) -> PublishedFigure:
         return _draw(data, axis)
 
     return loss_along
 
 
-def _draw(data: Aggregate, axis: Axis) -> Figure:
+def _draw(data: Aggregate, axis: Axis) -> PublishedFigure:
     """Means with intervals against an axis, every cell of it and of one more further axis.
 
     With one more: a column for each (H, γ), a line for each of its values. Else a column for each
@@ -95,15 +96,18 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
-        if name != "pull_off_penetration":
-            row[0].set_ylim(bottom=0)  # when the panels, which share it, are all drawn
+        for axes in row if name != "pull_off_penetration" else ():
+            axes.set_ylim(bottom=0)  # when the panels, which share it, are all drawn
         row[0].set_ylabel(label)
     for axes, title in zip(grid[0], titles, strict=True):
         label_panel(axes, title)
-    for axes in grid[-1]:
+    ticks = [value / axis_unit for value in axis.values]
+    for axes in with_x_label(figure, len(titles), len(rows) * len(titles)):
         axes.set_xlabel(axis_text)
         if logarithmic:
             axes.set_xscale("log")
+        elif len(ticks) <= _MOST_TICKS:
+            axes.set_xticks(ticks)
     handles, texts = grid[0][0].get_legend_handles_labels()
     if any(texts):
         legend_above(figure, handles, 3 if second is None else 2)
@@ -139,7 +143,7 @@ def _lines(
         title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
         if second is not None:
             value = dict(cell.others)[second.name]
-            title, label = f"{title}, {label}", place([(second.name, value)])
+            title, label = f"{title}, {label}", symbols([(second.name, value)])
         lines[title, label] = line
     every = list(wanted.values())
     return [other for other in every[0] if all(other in one for one in every)], lines

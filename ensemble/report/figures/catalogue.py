@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from matplotlib.figure import Figure
-
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.along import along, with_figure
-from adhesis.ensemble.report.figures.selection import beside_paper
+from adhesis.ensemble.report.figures.selection import beside_paper, has_fields
+from adhesis.ensemble.report.figures.style import PublishedFigure
 from adhesis.ensemble.report.further_axes import together
 from adhesis.ensemble.report.paper import PaperFigure
 
@@ -43,7 +42,7 @@ class Illustration:
     name: str
     title: str
     caption: str
-    draw: Callable[[Aggregate], Figure]
+    draw: Callable[[Aggregate], PublishedFigure]
     of_paper: str = ""
     beside_paper: Callable[[Aggregate], str] | None = None
     whole: bool = False
@@ -60,6 +59,10 @@ def _several_works_of_adhesion(data: Aggregate) -> bool:
 
 def _with_shape(data: Aggregate) -> bool:
     return any(shape is not None for shape in data.fields.shapes)
+
+
+def _with_fields(data: Aggregate) -> bool:
+    return any(has_fields(data, cell) for cell in data.cells)
 
 
 def _compared_with(figure: PaperFigure, addition: str = "") -> Callable[[Aggregate], str]:
@@ -132,6 +135,7 @@ SHAPES = (
         shapes_and_spectra.spectra_of_branches,
         "Fig. 4",
         _compared_with(paper.FIGURE_4),
+        is_worth=_with_fields,
     ),
     Illustration(
         "fig5a_spectra_loading",
@@ -140,6 +144,7 @@ SHAPES = (
         shapes_and_spectra.spectra_on_loading,
         "Fig. 5(a)",
         _compared_with(paper.FIGURE_5),
+        is_worth=_with_fields,
     ),
     Illustration(
         "fig5b_spectra_unloading",
@@ -148,6 +153,7 @@ SHAPES = (
         shapes_and_spectra.spectra_on_unloading,
         "Fig. 5(b)",
         _compared_with(paper.FIGURE_5),
+        is_worth=_with_fields,
     ),
     Illustration(
         "fig8_gap_density",
@@ -161,6 +167,7 @@ SHAPES = (
         shapes_and_spectra.gap_density,
         "Fig. 8",
         _compared_with(paper.FIGURE_8),
+        is_worth=_with_fields,
     ),
 )
 HEIGHTS = (
@@ -222,9 +229,13 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
             "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
             "little."
             + (
-                " Contact: the largest of the loop; crosses: mean at the turning point. Loss per "
-                "contact: over that largest contact area."
+                " Contact: the largest of the loop; loss per contact: over that largest area."
                 if axis.name in TURNING_POINTS
+                else ""
+            )
+            + (
+                " Crosses: mean contact at the turning point."
+                if axis.name == "max_penetration"
                 else ""
             )
             + (
@@ -233,7 +244,8 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
                 else ""
             )
             + (
-                " A line for each value of the other axis; more axes: as written below the panels."
+                " All cells of two axes: a line for each value of the other one; more axes: as "
+                "written below the panels."
                 if set(data.further) - {a for a in data.further if a.name in together(data, axis)}
                 else ""
             ),

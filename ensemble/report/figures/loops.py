@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from adhesis.ensemble.aggregate.average import Aggregate
@@ -16,6 +15,7 @@ from adhesis.ensemble.report.figures.style import (
     MOST_PANELS,
     ONE_COLUMN,
     TWO_COLUMNS,
+    PublishedFigure,
     gamma_label,
     label_panel,
     legend_above,
@@ -24,6 +24,7 @@ from adhesis.ensemble.report.figures.style import (
     panels,
     shown_gammas,
     spread_out,
+    with_x_label,
 )
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
@@ -32,7 +33,7 @@ _MARKERS_PER_CURVE = 8
 _INTERVALS, _FINE = 60, 50  # of a band, and places between two points that are sorted into them
 
 
-def contact_against_stress(data: Aggregate) -> Figure:
+def contact_against_stress(data: Aggregate) -> PublishedFigure:
     """Fig. 6: A/A0 against σ~/sqrt(m2), one panel for each H, means over realisations."""
     hursts = spread_out(data.hursts, MOST_PANELS)
     figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 46 * len(hursts)) * MM, sharex=True)
@@ -57,7 +58,8 @@ def contact_against_stress(data: Aggregate) -> Figure:
         label_panel(axes, f"H = {hurst:g}")
         axes.set_ylabel("contact fraction $A/A_0$")
         axes.set_ylim(bottom=0)
-    column[-1].set_xlabel(r"mean stress $\tilde\sigma/\sqrt{m_2}$")
+    for axes in with_x_label(figure, 1, len(hursts)):
+        axes.set_xlabel(r"mean stress $\tilde\sigma/\sqrt{m_2}$")
     _legend(data, figure, 3)
     return figure
 
@@ -68,6 +70,10 @@ def _bands(x: Array, low: Array, high: Array) -> list[tuple[Array, Array, Array]
     The mean stress runs back and forth by small steps, where a band from point to point would cross
     itself: it is the envelope in narrow intervals of x.
     """
+    known = np.isfinite(x) & np.isfinite(low)  # loops end at several places
+    if not known.any():
+        return []
+    x, low, high = x[known], low[known], high[known]
     turn = int(np.argmin(x))
     return [
         _envelope(x[part], low[part], high[part])
@@ -90,7 +96,7 @@ def _envelope(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
     return middle[crossed], np.maximum(lower[crossed], 0), upper[crossed]
 
 
-def loop_against_penetration(data: Aggregate) -> Figure:
+def loop_against_penetration(data: Aggregate) -> PublishedFigure:
     """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations."""
     hursts = spread_out(data.hursts, MOST_PANELS)
     height = (13 + 46 * len(hursts)) * MM
@@ -109,7 +115,7 @@ def loop_against_penetration(data: Aggregate) -> Figure:
     label = r"penetration $\tilde\Delta = \Delta/h_\mathrm{max}$"
     if data.campaign.cycle.stiffness is not None:
         label = r"penetration of the far side $u_\mathrm{tot}/h_\mathrm{max}$"
-    for axes in grid[-1]:
+    for axes in with_x_label(figure, 2, 2 * len(hursts)):
         axes.set_xlabel(label)
     _legend(data, figure, 6)
     return figure
@@ -157,7 +163,7 @@ def _with_spread(axes: Axes, data: Aggregate, cell: Cell, branch: str, name: str
         )
 
 
-def _legend(data: Aggregate, figure: Figure, columns: int) -> None:
+def _legend(data: Aggregate, figure: PublishedFigure, columns: int) -> None:
     """One entry for each γ, one for each branch."""
     handles = [
         Line2D([], [], color=look(k).colour, marker=look(k).marker, label=gamma_label(gamma))

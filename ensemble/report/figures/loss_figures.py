@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
 
@@ -15,6 +14,7 @@ from adhesis.ensemble.aggregate.cells import Cell, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.interval import Estimate, estimates
+from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.style import (
     LINES,
@@ -23,6 +23,7 @@ from adhesis.ensemble.report.figures.style import (
     MOST_PANELS,
     ONE_COLUMN,
     TWO_COLUMNS,
+    PublishedFigure,
     gamma_label,
     label_panel,
     legend_above,
@@ -32,10 +33,12 @@ from adhesis.ensemble.report.figures.style import (
     plain_decades,
     shown_gammas,
     spread_out,
+    with_x_label,
 )
 from adhesis.ensemble.report.findings import typical_cell
 from adhesis.ensemble.report.tables.loss_tables import papers_loss
 
+_FEWEST_BARS = 4  # for which there is room
 _MOST_BARS = 9  # in one column, so that their labels do not touch
 _MOST_BESIDE = 3  # panels beside each other in one column
 _MOST_TICKS = 4
@@ -57,7 +60,7 @@ def loss_quantity(data: Aggregate) -> tuple[str, str, float]:
     return "loss", "loss (mJ/m²)", 1e-3
 
 
-def loss_against_hurst(data: Aggregate) -> Figure:
+def loss_against_hurst(data: Aggregate) -> PublishedFigure:
     """Table 1 as a figure: loss of each H with intervals and the paper's, a panel for each γ."""
     shown, (name, label, unit) = shown_gammas(data), loss_quantity(data)
     columns = min(len(shown), _MOST_BESIDE)
@@ -66,33 +69,33 @@ def loss_against_hurst(data: Aggregate) -> Figure:
     figure = new_figure(rows, columns, ONE_COLUMN, height, sharex=True, sharey=True)
     hursts = spread_out(data.hursts, MOST_CURVES)
     aside = 0.2 * min(np.diff(hursts), default=0.1)
-    for axes, (k, gamma) in zip(figure.axes, shown, strict=False):
+    for axes, (k, gamma) in zip(figure.panels, shown, strict=False):
         cells = _of_gamma(data, gamma)
         x = np.array([cell.hurst for cell in cells])
         errorbar(axes, x, [cell.estimates[name] for cell in cells], k, "_", unit=unit)
         _stars(axes, [(cell.hurst + aside, papers_loss(cell), look(k).colour) for cell in cells])
         axes.set_title(gamma_label(gamma), loc="left", pad=3)
-    for axes in figure.axes[len(shown) :]:
+    for axes in figure.panels[len(shown) :]:
         axes.set_axis_off()
-    for axes in figure.axes[-columns:]:
+    for axes in with_x_label(figure, columns, rows * columns):
         axes.set_xlabel("Hurst exponent $H$")
     for row in panels(figure, rows, columns):
         row[0].set_ylabel(label)
-    first = figure.axes[0]
-    first.set_ylim(bottom=0)
-    if len(hursts) <= _MOST_TICKS:
-        first.set_xticks(hursts)
-    first.set_xlim(min(hursts) - 2.5 * aside, max(hursts) + 2.5 * aside)
+    for axes in figure.panels[: len(shown)]:
+        axes.set_ylim(bottom=0)
+        if len(hursts) <= _MOST_TICKS:
+            axes.set_xticks(hursts)
+        axes.set_xlim(min(hursts) - 2.5 * aside, max(hursts) + 2.5 * aside)
     legend_above(figure, [_mean_handle(), *_star_handle(data)], 2)
     return figure
 
 
-def loss_against_slope(data: Aggregate) -> Figure:
+def loss_against_slope(data: Aggregate) -> PublishedFigure:
     """Loss against the mean square slope m2 with intervals, a panel for each γ."""
     shown, (name, label, unit) = shown_gammas(data), loss_quantity(data)
     figure = new_figure(len(shown), 1, ONE_COLUMN, (20 + 33 * len(shown)) * MM, sharex=True)
     hursts = spread_out(data.hursts, MOST_CURVES)
-    for axes, (_, gamma) in zip(figure.axes, shown, strict=True):
+    for axes, (_, gamma) in zip(figure.panels, shown, strict=True):
         for k, hurst in enumerate(hursts):
             cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
@@ -103,7 +106,8 @@ def loss_against_slope(data: Aggregate) -> Figure:
         axes.set_ylabel(label)
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
         label_panel(axes, gamma_label(gamma))
-    figure.axes[-1].set_xlabel("mean square slope $m_2$")
+    for axes in with_x_label(figure, 1, len(shown)):
+        axes.set_xlabel("mean square slope $m_2$")
     handles = [
         Line2D([], [], color=look(k).colour, marker=look(k).marker, ls="none", label=f"H = {h:g}")
         for k, h in enumerate(hursts)
@@ -144,13 +148,13 @@ def of_penetration(data: Aggregate) -> list[Companion]:
     return [companion for companion in data.companions if companion.kind == "penetration"]
 
 
-def loss_against_penetration(data: Aggregate) -> Figure:
+def loss_against_penetration(data: Aggregate) -> PublishedFigure:
     """Loss against the largest penetration with intervals, from the realisations that all share.
 
     One curve for each γ at the middle H; or for each H, if the campaigns have one γ in common.
     """
     figure = new_figure(1, 1, ONE_COLUMN, 65 * MM)
-    axes, (_, quantity, unit) = figure.axes[0], loss_quantity(data)
+    axes, (_, quantity, unit) = figure.panels[0], loss_quantity(data)
     typical = typical_cell(data)
     assert typical is not None  # an aggregate has finished tasks
     curves = [
@@ -213,12 +217,12 @@ def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, 
     return dict(zip(there, estimates(np.array(losses)), strict=True))
 
 
-def loss_by_mechanism(data: Aggregate) -> Figure:
+def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
     """Sum of the drops at small-scale and at large-scale jumps, for each (H, γ)."""
     cells = _cells(data)
     width = ONE_COLUMN if len(cells) <= _MOST_BARS else TWO_COLUMNS
     figure = new_figure(1, 1, width, 68 * MM)
-    axes = figure.axes[0]
+    axes = figure.panels[0]
     place = np.arange(len(cells))
     large = [cell.estimates["loss_large_scale"] for cell in cells]
     small = [cell.estimates["loss_small_scale"] for cell in cells]
@@ -263,16 +267,20 @@ def loss_by_mechanism(data: Aggregate) -> Figure:
             ha="center",
             fontsize=6,
         )
-    axes.set_xticks(place, [f"{cell.hurst:g}\n{cell.work_of_adhesion:g}" for cell in cells])
-    axes.set_xlabel(r"$H$ (upper line), $\gamma$ in J/m² (lower line)")
+    unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
+    texts = [f"{cell.hurst:g}\n{cell.work_of_adhesion / size:g}" for cell in cells]
+    axes.set_xticks(place, texts)
+    axes.set_xlabel(rf"$H$ (upper line), $\gamma$ in {unit} (lower line)")
     axes.set_ylabel("sum of drops (mJ/m²)")
     axes.set_ylim(0, 1.12 * float(reach.max(initial=0)) or 1)
+    middle, half = (len(cells) - 1) / 2, max(len(cells), _FEWEST_BARS) / 2
+    axes.set_xlim(middle - half, middle + half)
     axes.grid(False, axis="x")
     legend_above(figure, axes.get_legend_handles_labels()[0], 2)
     return figure
 
 
-def jump_energies(data: Aggregate) -> Figure:
+def jump_energies(data: Aggregate) -> PublishedFigure:
     """Jumps per loop and decade of energy drop: large scale left, small scale right."""
     hursts = spread_out(data.hursts, MOST_PANELS)
     shown = shown_gammas(data)
@@ -287,15 +295,15 @@ def jump_energies(data: Aggregate) -> Figure:
                     _jump_density(axes, data, cell, small, k)
             label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
         row[0].set_ylabel("jumps per loop and decade")
-    for axes in grid[-1]:
+    for axes in with_x_label(figure, 2, 2 * len(hursts)):
         axes.set_xlabel("energy drop of one jump (J/m²)")
-    grid[0][0].set_xscale("log")
-    grid[0][0].set_yscale("log")
+    for axes in figure.panels:
+        axes.set(xscale="log", yscale="log")
     handles = [
         Line2D([], [], color=look(k).colour, linestyle=LINES[k], label=gamma_label(gamma))
         for k, gamma in shown
     ]
-    plain_decades(figure.axes)
+    plain_decades(figure.panels)
     legend_above(figure, handles, len(handles))
     return figure
 
@@ -329,23 +337,24 @@ def _jump_density(axes: Axes, data: Aggregate, cell: Cell, small: bool, k: int) 
     )
 
 
-def pull_off(data: Aggregate) -> Figure:
+def pull_off(data: Aggregate) -> PublishedFigure:
     """Largest mean tension on unloading against γ, for each H, with intervals."""
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
-    axes = figure.axes[0]
+    axes = figure.panels[0]
     hursts = spread_out(data.hursts, MOST_CURVES)
+    unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
         errorbar(
             axes,
-            np.array([cell.work_of_adhesion for cell in cells]),
+            np.array([cell.work_of_adhesion for cell in cells]) / size,
             [cell.estimates["pull_off_stress"] for cell in cells],
             k,
             f"H = {hurst:g}",
-            offset=_apart(data, k, len(hursts)),
+            offset=_apart(data, k, len(hursts)) / size,
             unit=1e3,
         )
-    axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
+    axes.set_xlabel(rf"work of adhesion $\gamma$ ({unit})")
     axes.set_ylabel("largest tension (kPa)")
     axes.set_ylim(bottom=0)
     legend_above(figure, axes.get_legend_handles_labels()[0], 3)
@@ -386,7 +395,7 @@ def _occupied(histogram: np.ndarray) -> slice:
     if not filled.size:
         return slice(0, 1)
     stop = int(filled[-1]) + 1
-    return slice(max(int(filled[0]), stop - 8 * BINS_PER_DECADE), stop)
+    return slice(int(filled[filled >= stop - 8 * BINS_PER_DECADE][0]), stop)
 
 
 def errorbar(

@@ -12,10 +12,17 @@ from adhesis.ensemble.report.paper import PaperFigure
 from adhesis.ensemble.task.fields import FieldPlan
 
 
+def has_fields(data: Aggregate, cell: Cell) -> bool:
+    """Whether a loop of a cell was in contact at a state with fields, as short of a preload."""
+    fields = data.fields.psd_displacement
+    return bool(fields.size and np.any(fields[data.cells.index(cell)] > 0))
+
+
 def cell_of_hurst(data: Aggregate, hurst: float, figure: PaperFigure) -> Cell | None:
     """Return the cell of H with the first γ of a figure; else the typical one of H."""
-    cell = data.cell(hurst, figure.works_of_adhesion[0])
-    return cell if cell is not None and cell.done else typical_cell(data, hurst)
+    kept = [cell for cell in data.cells if has_fields(data, cell) and cell.hurst == hurst]
+    of_paper = [cell for cell in kept if cell.work_of_adhesion == figure.works_of_adhesion[0]]
+    return next(iter([*of_paper, *kept[(len(kept) - 1) // 2 :]]), typical_cell(data, hurst))
 
 
 def cells_of(data: Aggregate, figure: PaperFigure) -> list[Cell]:
@@ -24,7 +31,9 @@ def cells_of(data: Aggregate, figure: PaperFigure) -> list[Cell]:
     Where the campaign lacks its H, they are of the typical one; where it lacks all of its γ, they
     are of all γ of the campaign.
     """
-    known = {(cell.hurst, cell.work_of_adhesion): cell for cell in data.cells if cell.done}
+    kept = [cell for cell in data.cells if has_fields(data, cell)]
+    kept = kept or [cell for cell in data.cells if cell.done]
+    known = {(cell.hurst, cell.work_of_adhesion): cell for cell in kept}
     typical = typical_cell(data)
     assert typical is not None  # an aggregate has finished tasks
     for hurst in (figure.hurst, typical.hurst):

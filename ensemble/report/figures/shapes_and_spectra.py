@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -30,6 +29,8 @@ from adhesis.ensemble.report.figures.style import (
     MOST_PANELS,
     ONE_COLUMN,
     TWO_COLUMNS,
+    PublishedFigure,
+    gamma_label,
     label_panel,
     legend_above,
     look,
@@ -37,6 +38,7 @@ from adhesis.ensemble.report.figures.style import (
     panels,
     plain_decades,
     spread_out,
+    with_x_label,
 )
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
@@ -48,7 +50,7 @@ _FEWEST_NODES, _BEYOND = 1000, 4
 _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 
 
-def shapes(data: Aggregate) -> Figure:
+def shapes(data: Aggregate) -> PublishedFigure:
     """Fig. 3: rigid profile and elastic surface above it of one realisation on both branches.
 
     Heights are those of the profile: on a machine or under a load the two branches have different
@@ -89,7 +91,7 @@ def shapes(data: Aggregate) -> Figure:
         )
         label_panel(detail, "detail")
         whole.set_ylabel("height (µm)")
-    for axes in panels(figure, len(chosen), 2)[-1]:
+    for axes in with_x_label(figure, 2, 2 * len(chosen)):
         axes.set_xlabel("position $x$ (mm)")
     handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h$")]
     handles += [
@@ -106,7 +108,7 @@ def shapes(data: Aggregate) -> Figure:
     return figure
 
 
-def spectra_of_branches(data: Aggregate) -> Figure:
+def spectra_of_branches(data: Aggregate) -> PublishedFigure:
     """Fig. 4: spectral density of profile and deformed surface on both branches at one state."""
     cells = cells_of(data, paper.FIGURE_4)
     figure = new_figure(len(cells), 1, ONE_COLUMN, (16 + 52 * len(cells)) * MM, sharex=True)
@@ -130,17 +132,17 @@ def spectra_of_branches(data: Aggregate) -> Figure:
     return figure
 
 
-def spectra_on_loading(data: Aggregate) -> Figure:
+def spectra_on_loading(data: Aggregate) -> PublishedFigure:
     """Fig. 5(a): spectral density of profile and deformed surface on loading, state by state."""
     return _spectra(data, 0)
 
 
-def spectra_on_unloading(data: Aggregate) -> Figure:
+def spectra_on_unloading(data: Aggregate) -> PublishedFigure:
     """Fig. 5(b): the same on unloading."""
     return _spectra(data, 1)
 
 
-def gap_density(data: Aggregate) -> Figure:
+def gap_density(data: Aggregate) -> PublishedFigure:
     """Fig. 8: probability density of the gap on either branch, for each H."""
     hursts = spread_out(data.hursts, MOST_PANELS)
     height = (16 + 46 * len(hursts)) * MM
@@ -166,21 +168,20 @@ def gap_density(data: Aggregate) -> Figure:
                         label=f"{cell.plan.penetration[k]:.2f}",
                     )
             label_panel(axes, f"{_cell_label(cell)}, {branch}")
-    first = grid[0][0]
-    first.set_xscale("log")
-    first.set_yscale("log")
-    first.set_ylim(bottom=max(first.get_ylim()[0], _LEAST_DENSITY))
-    for axes in grid[-1]:
+    for axes in figure.panels:
+        axes.set(xscale="log", yscale="log")
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
+    for axes in with_x_label(figure, 2, 2 * len(hursts)):
         axes.set_xlabel(r"gap $t/h_\mathrm{max}$")
-    plain_decades(figure.axes)
+    plain_decades(figure.panels)
     legend_above(figure, _penetration_handles(data, chosen, markers=False), len(chosen))
     return figure
 
 
-def height_density(data: Aggregate) -> Figure:
+def height_density(data: Aggregate) -> PublishedFigure:
     """Fig. 9: probability density of the heights of the rigid profiles, and the Gaussian."""
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
-    axes = figure.axes[0]
+    axes = figure.panels[0]
     fields = data.fields
     for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES)):
         # All γ have the same profiles: the cell with most of them says all.
@@ -213,7 +214,7 @@ def shown_penetrations(fields: FieldStatistics, most: int) -> list[int]:
     return [int(k) for k in spread_out(places, most)]
 
 
-def _spectra(data: Aggregate, b: int) -> Figure:
+def _spectra(data: Aggregate, b: int) -> PublishedFigure:
     hursts = spread_out(data.hursts, MOST_PANELS)
     figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 52 * len(hursts)) * MM, sharex=True)
     fields = data.fields
@@ -265,10 +266,11 @@ def _finish_spectra(axes: Axes, data: Aggregate, cell: Cell, state: str = "") ->
     label_panel(axes, f"{_cell_label(cell)}{state}")
 
 
-def _label_spectra(figure: Figure, count: int, handles: list[Line2D]) -> None:
+def _label_spectra(figure: PublishedFigure, count: int, handles: list[Line2D]) -> None:
     """Label the wave numbers, and put the legend of all panels above them."""
-    plain_decades(figure.axes[:count])
-    figure.axes[count - 1].set_xlabel("wave number $q$ (rad/m)")
+    plain_decades(figure.panels[:count])
+    for axes in with_x_label(figure, 1, count):
+        axes.set_xlabel("wave number $q$ (rad/m)")
     handles = [
         Line2D([], [], color="0.55", linewidth=2, label="rigid profile"),
         *handles,
@@ -396,4 +398,4 @@ def _depth(data: Aggregate, cell: Cell, k: int) -> str:
 
 
 def _cell_label(cell: Cell) -> str:
-    return rf"H = {cell.hurst:g}, $\gamma$ = {cell.work_of_adhesion:g} J/m²"
+    return f"H = {cell.hurst:g}, {gamma_label(cell.work_of_adhesion)}"

@@ -7,8 +7,11 @@ figure can be read in grey and by colour-blind people.
 
 from __future__ import annotations
 
+import io
+import textwrap
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -22,10 +25,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.quantities import gamma_text
+from adhesis.solver.checks import counted, shown
 
 STYLE = Path(__file__).parent / "adhesis.mplstyle"
 
 MM = 1 / 25.4  # inches
+_DPI_OF_NOTEBOOK = 110
+_SMALL = 6  # points, and the mean width of a sign of that size in inches
+_WIDTH_OF_SIGN = 0.58 * _SMALL / 72
 ONE_COLUMN = 85 * MM
 TWO_COLUMNS = 175 * MM
 
@@ -103,11 +111,68 @@ def left_out(data: Aggregate) -> str:
     return f"{what} {' and '.join(parts)}." if parts else ""
 
 
-class PublishedFigure(Figure):
-    """A figure whose PDF has TrueType fonts, also when it is saved outside of :func:`style`.
+_given: ContextVar[tuple[Axes, ...]] = ContextVar("_given", default=())
 
-    Publishers refuse the Type 3 fonts that matplotlib writes by default.
+
+@contextmanager
+def drawn_into(ax: object) -> Iterator[None]:
+    """Let the first panels of a figure be axes that a user gives, in the user's own style.
+
+    Parameters
+    ----------
+    ax : Axes or array of Axes, or None
+        Without them, all panels are the figure's, in the style of the product.
+
+    Raises
+    ------
+    TypeError
+        If it is anything else.
     """
+    found = () if ax is None else np.ravel(np.array(ax, dtype=object))
+    given = tuple(panel for panel in found if isinstance(panel, Axes))
+    if ax is not None and (not given or len(given) < len(found)):
+        raise TypeError(f"ax is {shown(ax)}: it must be one Axes of matplotlib, or several of them")
+    token = _given.set(given)
+    try:
+        with nullcontext() if given else style():
+            yield
+    finally:
+        _given.reset(token)
+
+
+class PublishedFigure(Figure):
+    """A figure that a notebook displays, and whose PDF has TrueType fonts.
+
+    Also when it is saved outside of :func:`style`: publishers refuse the Type 3 fonts that
+    matplotlib writes by default.
+
+    Attributes
+    ----------
+    given : tuple of Axes
+        Those of :func:`drawn_into`, which take the place of its first panels.
+    """
+
+    given: tuple[Axes, ...] = ()
+
+    @property
+    def panels(self) -> list[Axes]:
+        """The axes of its panels, row by row: those given, and its own."""
+        return [*self.given, *self.axes[len(self.given) :]]
+
+    def finish(self) -> Figure:
+        """Lay it out, and return the figure that was drawn into: this one, or that of the axes."""
+        if not self.given:
+            self.canvas.draw()  # the layout is found with the style's own sizes
+            return self
+        found = self.given[0].get_figure(root=True)
+        assert found is not None
+        return found
+
+    def _repr_png_(self) -> bytes:
+        """Return the figure as a picture, for notebooks."""
+        stream = io.BytesIO()
+        self.savefig(stream, format="png", dpi=_DPI_OF_NOTEBOOK)
+        return stream.getvalue()
 
     def savefig(self, *args: Any, **options: Any) -> None:
         """Save as :meth:`matplotlib.figure.Figure.savefig` does."""
@@ -115,17 +180,36 @@ class PublishedFigure(Figure):
             super().savefig(*args, **options)
 
 
-def new_figure(rows: int, columns: int, width: float, height: float, **options: Any) -> Figure:
-    """Return a figure of the given width and height (inches) with a grid of panels."""
+def new_figure(
+    rows: int, columns: int, width: float, height: float, **options: Any
+) -> PublishedFigure:
+    """Return a figure of the given width and height (inches) with a grid of panels.
+
+    Raises
+    ------
+    ValueError
+        If more axes are given than it has panels.
+    """
+    given = _given.get()
+    if len(given) > rows * columns:
+        raise ValueError(
+            f"ax holds {len(given)} Axes: this figure has {counted(rows * columns, 'panel')}"
+        )
     figure = PublishedFigure(figsize=(width, height))
     figure.subplots(rows, columns, squeeze=False, **options)
+    figure.given = given
     return figure
 
 
-def panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
+def panels(figure: PublishedFigure, rows: int, columns: int) -> list[list[Axes]]:
     """Return the panels of :func:`new_figure`, row by row."""
-    axes = figure.axes[: rows * columns]
+    axes = figure.panels[: rows * columns]
     return [axes[k * columns : (k + 1) * columns] for k in range(rows)]
+
+
+def with_x_label(figure: PublishedFigure, columns: int, count: int) -> list[Axes]:
+    """Return the panels that have a label below: the lowest of ``count``, and all given ones."""
+    return [*figure.panels[max(count - columns, 0) : count], *figure.given]
 
 
 def plain_decades(axes: Sequence[Axes]) -> None:
@@ -137,15 +221,19 @@ def plain_decades(axes: Sequence[Axes]) -> None:
                 axis.set_minor_formatter(NullFormatter())
 
 
-def legend_above(figure: Figure, handles: Sequence[Any], columns: int) -> None:
-    """Put the legend above the panels, where it hides no data."""
+def legend_above(figure: PublishedFigure, handles: Sequence[Any], columns: int) -> None:
+    """Put the legend above the panels, where it hides no data; or into the first axes given."""
+    if figure.given:
+        figure.given[0].legend(handles=handles)
+        return
     figure.legend(handles=handles, loc="outside upper center", ncols=columns)
 
 
-def say_below(figure: Figure, text: str) -> None:
-    """Write below the panels what all of them have in common; nothing if empty."""
-    if text:
-        figure.supxlabel(text, fontsize=6, x=0.99, ha="right")
+def say_below(figure: PublishedFigure, text: str) -> None:
+    """Write below the panels what all of them have in common; nothing below axes that are given."""
+    if text and not figure.given:
+        width = int(figure.get_figwidth() / _WIDTH_OF_SIGN)
+        figure.supxlabel(textwrap.fill(text, width), fontsize=_SMALL, x=0.99, ha="right")
 
 
 def label_panel(axes: Axes, text: str) -> None:
@@ -155,7 +243,7 @@ def label_panel(axes: Axes, text: str) -> None:
 
 def gamma_label(work_of_adhesion: float) -> str:
     """Return the legend of one γ."""
-    return rf"$\gamma$ = {work_of_adhesion:g} J/m²"
+    return rf"$\gamma$ = {gamma_text(work_of_adhesion)}"
 
 
 @contextmanager

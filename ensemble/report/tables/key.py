@@ -9,7 +9,7 @@ from typing import Any
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.quantities import AXIS_UNITS, shown_unit
+from adhesis.ensemble.quantities import AXIS_UNITS, common_unit
 from adhesis.ensemble.report.tables.table import TableColumn, Value
 
 
@@ -30,11 +30,18 @@ def key_columns(
     """
     return (
         TableColumn("hurst", lambda entry: cell_of(entry).hurst, "H"),
-        TableColumn(
-            "work_of_adhesion [J/m^2]", lambda entry: cell_of(entry).work_of_adhesion, "γ (J/m²)"
-        ),
+        gamma_column(data, "", lambda entry: cell_of(entry).work_of_adhesion, "γ"),
         *axis_columns(data.further, cell_of),
     )
+
+
+def gamma_column(
+    data: Aggregate, suffix: str, value: Callable[[Any], Value], heading: str
+) -> TableColumn:
+    """Return a column of works of adhesion, for people in the unit of the campaign."""
+    unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
+    name = f"work_of_adhesion{suffix} [J/m^2]"
+    return TableColumn(name, value, f"{heading} ({unit})", partial(_in_unit, size))
 
 
 def axis_columns(
@@ -43,7 +50,7 @@ def axis_columns(
     """One column for each axis, from the ``others`` of what a row is about."""
     columns = []
     for axis in axes:
-        shown, size = shown_unit(axis.name, max(axis.values))
+        shown, size = common_unit(axis.name, axis.values)
         unit = AXIS_UNITS.get(axis.unit, "")
         shown = shown or unit
         columns.append(

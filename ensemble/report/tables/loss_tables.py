@@ -16,7 +16,7 @@ from adhesis.ensemble.aggregate.companions import Companion, LossDifference, dif
 from adhesis.ensemble.interval import interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.tables.key import axis_columns, estimate, key_columns
+from adhesis.ensemble.report.tables.key import axis_columns, estimate, gamma_column, key_columns
 from adhesis.ensemble.report.tables.table import (
     Format,
     Table,
@@ -65,6 +65,7 @@ def losses(data: Aggregate) -> Table:
         _estimated("loss", "sem [J/m^2]", "s.e.", number(2, unit=1e-3)),
         _estimated("loss", "ci_low [J/m^2]", "95 % from", partial(at_least_0, unit=1e-3)),
         _estimated("loss", "ci_high [J/m^2]", "to", number(unit=1e-3)),
+        *_friction_columns(data),
         TableColumn(
             "loss_over_work_of_adhesion",
             _loss_over_work_of_adhesion,
@@ -123,6 +124,21 @@ def losses(data: Aggregate) -> Table:
     return make_table("Loss of one loop", columns, data.cells)
 
 
+def _friction_columns(data: Aggregate) -> tuple[TableColumn, ...]:
+    """Return the columns of the two parts of the loss; none for one work of adhesion."""
+    if data.campaign.material.work_of_adhesion_open is None:
+        return ()
+    milli = number(unit=1e-3)
+    return (
+        _estimated("friction", "mean [J/m^2]", "friction", milli),
+        TableColumn(
+            "instability_mean [J/m^2]",
+            _if_done(lambda cell: np.mean(cell.values["loss"] - cell.values["friction"])),
+            *("instability", milli),
+        ),
+    )
+
+
 def _estimated(
     quantity: str, part: str, heading: str = "", show: Format = plain, *, last: bool = False
 ) -> TableColumn:
@@ -168,11 +184,11 @@ def precision(data: Aggregate) -> Table:
     three_digits = partial(percent, digits=3)
     columns = (
         *key_columns(data),
-        TableColumn("n", attrgetter("precision.count"), "n"),
+        TableColumn("n", attrgetter("precision.estimate.n"), "n"),
         TableColumn("quantity", attrgetter("precision.quantity"), "quantity"),
-        TableColumn("mean", attrgetter("precision.mean"), "mean", number()),
-        TableColumn("ci_low", attrgetter("precision.low"), "95 % from", number()),
-        TableColumn("ci_high", attrgetter("precision.high"), "to", number()),
+        TableColumn("mean", attrgetter("precision.estimate.mean"), "mean", number()),
+        TableColumn("ci_low", attrgetter("precision.estimate.low"), "95 % from", number()),
+        TableColumn("ci_high", attrgetter("precision.estimate.high"), "to", number()),
         TableColumn(
             "relative_error",
             lambda cell: finite(cell.precision.relative_error),
@@ -282,8 +298,8 @@ def paired(data: Aggregate) -> Table:
     columns = (
         TableColumn("hurst", attrgetter("hurst"), "H"),
         *axis_columns(data.further),
-        TableColumn("work_of_adhesion_from [J/m^2]", attrgetter("lower"), "γ from"),
-        TableColumn("work_of_adhesion_to [J/m^2]", attrgetter("upper"), "to (J/m²)"),
+        gamma_column(data, "_from", attrgetter("lower"), "γ from"),
+        gamma_column(data, "_to", attrgetter("upper"), "to"),
         TableColumn("pairs", attrgetter("loss.n"), "pairs"),
         *_differences("loss_dimensionless_difference", "loss_dimensionless", "W~ grows by"),
         TableColumn("loss_difference [J/m^2]", attrgetter("loss.mean"), "loss by (mJ/m²)", milli),

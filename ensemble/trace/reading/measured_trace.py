@@ -405,6 +405,11 @@ def _from_table(
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
     if gaps:
         notes.append(gaps)
+    if table.empty_lines:
+        notes.append(
+            f"{counted(len(table.empty_lines), 'empty line')} taken for missing heights, the first "
+            f"on line {table.empty_lines[0]}"
+        )
     if len(columns) == 2:
         if step is not None:
             raise InputError(

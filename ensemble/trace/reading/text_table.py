@@ -6,6 +6,7 @@ refused: where they belong to cannot be known.
 
 from __future__ import annotations
 
+import itertools
 import re
 import unicodedata
 from collections import Counter
@@ -76,6 +77,8 @@ class Table:
     lines : int array, shape (n,)
         Line of the file that each row stands on, from 1.
     delimiter, decimal : str
+    empty_lines : tuple of int
+        Lines of a single column that are empty, each a missing height.
     """
 
     columns: Array
@@ -85,6 +88,7 @@ class Table:
     lines: Array
     delimiter: str
     decimal: str
+    empty_lines: tuple[int, ...] = ()
 
     @property
     def form(self) -> str:
@@ -233,7 +237,9 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
                 f"signs of thousands out, or give {parameter('decimal')}"
             )
         if len(filled) == 1:
-            _refuse_odd_ends(source, column, [row.values[k] for row in rows], places)
+            numbers = [row.values[k] for row in rows]
+            _refuse_odd_ends(source, column, numbers, places)
+            _refuse_parts(source, numbers, places, reader.lines)
     header = [line[:_LONGEST_HEADER_LINE].strip().lstrip(COMMENT).strip() for line in lines[:start]]
     # Of one column, a line of the header is a name as a whole.
     names = [(line,) if count == 1 else _names(line, delimiter, count, filled) for line in header]
@@ -245,6 +251,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         lines=np.array(places) + 1,
         delimiter=delimiter,
         decimal=decimal,
+        empty_lines=tuple(place + 1 for place in places if not lines[place].strip()),
     )
 
 
@@ -388,6 +395,36 @@ def _refuse_odd_ends(
                 "heights: remove it if it is a count, a length, a step or a checksum; a height has "
                 "as many decimals as the others"
             )
+
+
+def _refuse_parts(
+    source: Source, numbers: Sequence[float], places: Sequence[int], lines: Sequence[str]
+) -> None:
+    """Refuse a column that an empty line divides into several profiles.
+
+    One empty line is a missing height. It is none if all parts have one length, or if the heights
+    leap there as they do nowhere else.
+    """
+    empty = [k for k, place in enumerate(places) if not lines[place].strip()]
+    bounds = [-1, *empty, len(numbers)]
+    lengths = {end - start - 1 for start, end in itertools.pairwise(bounds)}
+    if not empty or max(lengths) < _LONG_ROW:
+        return
+    heights = np.array([nan if may_be_code(number) else number for number in numbers])
+    leaps = np.abs(heights[2:] - heights[:-2])
+    over = [k - 1 for k in empty]
+    usual = np.fmax.reduce(np.delete(leaps, over), initial=0.0)
+    leap = next((k for k in empty if leaps[k - 1] > usual), None)
+    if len(lengths) == 1:
+        place, reason = empty[0], f"divides the column into parts of {lengths.pop()} rows each"
+    elif leap is not None:
+        place, reason = leap, "the heights beside it differ as no others two rows apart do"
+    else:
+        return
+    raise InputError(
+        f"line {places[place] + 1} of {source} is empty, and {reason}: write NaN on it if one "
+        "height is missing, or keep one profile in a file"
+    )
 
 
 # ---------------------------------------------------------------------- header

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from adhesis.solver._kernels import shortest_length
 
+from adhesis.solver._kernels import shortest_length
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.sharp.continuation.across_jump import carry_previous
 from adhesis.solver.sharp.continuation.corrector import correct
@@ -215,7 +215,8 @@ class Branch:
         if apart < resolution:
             way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
             edges = predictor.leading_edge, other.edge
-            self._two_folds = TwoFolds(edges, predictor.point.at + way, apart)
+            ways = tuple(float(np.sign(predictor.point.rate[e] * way)) for e in edges)
+            self._two_folds = TwoFolds(edges, ways, predictor.point.at + way, apart)
 
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed."""

@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from adhesis.solver._kernels import SearchedGaps
 
+from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.profile import Array
@@ -323,7 +323,9 @@ class Follower:
             return None
         furthest = max(fold.at, two.beyond) if fold.at > point.at else min(fold.at, two.beyond)
         longest = self.edges.longest_step
-        return Orders(furthest, tuple(self._moved_on(fold, edge, longest) for edge in two.edges))
+        ahead = zip(two.edges, two.ways, strict=True)
+        starts = tuple(self._moved_on(point.gaps, edge, way * longest) for edge, way in ahead)
+        return Orders(furthest, starts)
 
     def _start_at_fold(self, fold: Fold) -> Array:
         """Return the edges from which a descent at a fold starts.
@@ -338,15 +340,16 @@ class Follower:
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
         away = positions(point.gaps, self.edges.source.highest)[fastest]
-        return self._moved_on(fold, int(fastest[np.argmin(away)]), self.edges.law.rest_step)
+        edge = int(fastest[np.argmin(away)])
+        way = np.sign(point.rate[edge] * (fold.at - point.at))
+        return self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
 
-    def _moved_on(self, fold: Fold, edge: int, length: float) -> Array:
-        """Return the gaps before a fold, one edge moved on by a length in θ or its limit."""
-        point = fold.point
-        longest = step_limits(point.gaps, length)
-        motion = np.zeros(point.gaps.size)
-        motion[edge] = math.copysign(longest[edge], point.rate[edge] * (fold.at - point.at))
-        moved: Array = point.gaps + (outward(point.gaps) * motion).reshape(-1, 2)
+    def _moved_on(self, gaps: Array, edge: int, length: float) -> Array:
+        """Return gaps with one edge moved outwards by a length in θ, or to its limit."""
+        longest = step_limits(gaps, abs(length))
+        motion = np.zeros(gaps.size)
+        motion[edge] = math.copysign(longest[edge], length)
+        moved: Array = gaps + (outward(gaps) * motion).reshape(-1, 2)
         return moved
 
     def _early_closure_error(self, before: ContactState, point: Point, way: float) -> float:

@@ -132,13 +132,12 @@ class Jumps:
         """Go on with equal speeds, from a minimum that they reached, until nothing touches."""
         if isinstance(point, FullContact):
             raise point
-        return self._nucleate_until_clear(
-            point,
-            at,
-            lambda gaps, touching: self._relax(
-                self.nucleation.insert_seeds(gaps, touching), at, equal_speeds=True
-            )[0],
-        )
+
+        def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
+            gaps = self.nucleation.insert_seeds(gaps, touching)
+            return self._relax(gaps, at, equal_speeds=True)[0]
+
+        return self._nucleate_until_clear(point, at, relaxed)
 
     def _end_beyond(self, at: float, start: Array) -> Point | None:
         """Descend at a d next to that of an equilibrium, until nothing touches."""

@@ -13,8 +13,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from adhesis.solver._kernels import TwoPoints
 
+from adhesis.solver._kernels import TwoPoints
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.tolerances import (

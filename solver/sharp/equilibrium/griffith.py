@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from adhesis.solver._kernels import EdgeLaw, Panels
 
+from adhesis.solver._kernels import EdgeLaw, Panels
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import lengths_of, outward
 from adhesis.solver.sharp.tolerances import CLOSING_SHARE

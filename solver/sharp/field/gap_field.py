@@ -6,8 +6,9 @@ opening) and |D| the operator with symbol |m|,
     S = S_full + p + |D| T,      S = 0 in the gaps,  T = 0 on the contact,  mean(T) = q0 s,
 
 p = 2p̄/E* the mean stress. In the coordinate η of each gap (``kernels/gap.hpp``)
-T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part of |D| is diagonal in the Chebyshev polynomials U_n(η), and the rest is smooth. So a few values of f
-per gap are enough, at its M second-kind Gauss-Chebyshev nodes:
+T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part of |D| is diagonal
+in the Chebyshev polynomials U_n(η), and the rest is smooth. So a few values of f per gap are
+enough, at its M second-kind Gauss-Chebyshev nodes:
 
     (B + G) f = -(S~ + p X),     Xᵀ f = 2π q0 s,                                     (1)
 
@@ -36,8 +37,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from adhesis.solver._kernels import Field, LoadingDevice
 
+from adhesis.solver._kernels import Field, LoadingDevice
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 

@@ -22,6 +22,7 @@ import numpy as np
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.peaks import parabola_vertex
+from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.opening_series import GapOpening, fine_opening
 
@@ -76,10 +77,18 @@ class RefinedTension:
         return None
 
 
+@compiled
 def _sum_pull(theta: Array, sine: Array, cosine: Array, weight: Array) -> Array:
     """Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2."""
-    half = np.outer(np.sin(0.5 * theta), cosine) - np.outer(np.cos(0.5 * theta), sine)
-    return np.asarray((weight / half**2).sum(axis=1))
+    out = np.zeros(theta.shape[0])
+    for i in range(theta.shape[0]):
+        s, c = np.sin(0.5 * theta[i]), np.cos(0.5 * theta[i])
+        total = 0.0
+        for j in range(sine.shape[0]):
+            half = s * cosine[j] - c * sine[j]
+            total += weight[j] / (half * half)
+        out[i] = total
+    return out
 
 
 def nodal_tension(problem: Problem) -> NodalTension:

@@ -78,6 +78,25 @@ def with_gaps(gaps: Array, centres: Array, widths: Array) -> Array:
     return np.asarray(both[np.argsort(both[:, 0], kind="stable")])
 
 
+def union_of(one: Array, other: Array) -> Array:
+    """Return the places that lie in a gap of either state; empty if these are all."""
+    both = np.concatenate([one, other])
+    both = both - 2 * np.pi * np.floor(both[:, :1] / (2 * np.pi))
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    merged = [list(both[0])]
+    for left, right in both[1:].tolist():
+        if left <= merged[-1][1]:
+            merged[-1][1] = max(merged[-1][1], right)
+        else:
+            merged.append([left, right])
+    while len(merged) > 1 and merged[0][0] + 2 * np.pi <= merged[-1][1]:
+        last, first = merged[-1], merged.pop(0)
+        last[1] = max(last[1], first[1] + 2 * np.pi)
+    if merged[-1][1] - merged[-1][0] >= 2 * np.pi:
+        return np.empty((0, 2))
+    return np.array(merged)
+
+
 def without_small(gaps: Array, smallest: float) -> Array | None:
     """Drop closed gaps or vanished patches; None if all are as long as ``smallest``."""
     length, patch = lengths_of(gaps)

@@ -10,10 +10,11 @@ below p. Its moments over a gap: ``kernels/gap_moments.cpp``.
 from __future__ import annotations
 
 import numpy as np
-from adhesis.solver._kernels import Panels
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
+from adhesis.solver._kernels import Panels
+from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import Array, Profile
 
 # Nodes p of a panel, by the tolerance they serve. The finest panel is at most half a shortest wave
@@ -39,6 +40,8 @@ class StressSource:
     profile : Profile
     tolerance : float
         Wanted accuracy of moments and values, relative to the stress of the shortest waves.
+    measure : {"arc", "flat"}
+        Length on which adhesion acts.
 
     Attributes
     ----------
@@ -53,7 +56,7 @@ class StressSource:
     panels : Panels
     """
 
-    def __init__(self, profile: Profile, tolerance: float = 0.0) -> None:
+    def __init__(self, profile: Profile, tolerance: float = 0.0, measure: Measure = "arc") -> None:
         self.top = top = profile.highest_harmonic
         p = next(nodes for limit, nodes in _NODES if tolerance >= limit)
         count = 1 << int(np.ceil(np.log2(max(2 * top + 1, 16))))
@@ -68,6 +71,8 @@ class StressSource:
         slope = _on_panels(1j * m * m * h, x, count)
         y, v = legendre.leggauss(_TILT_NODES)
         tilt = _on_panels(1j * m * h, y, count) @ _to_chebyshev(y)
+        if measure == "flat":
+            tilt[:] = 0.0  # sqrt(1 + h'²) is then 1
         t, _ = legendre.leggauss(_HALF_PLANE_NODES)
         half_plane = [a @ _to_chebyshev(t) for a in _half_plane_openings(m * h, t, count)]
 

@@ -27,7 +27,7 @@ class ClosingBound:
             return abs(reached.at - point.at) * self._rate(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
         motion = CLOSING_BY_MOTION * np.abs(reached.gaps - point.gaps).sum(axis=1).max()
-        return float(self._edges.critical / np.sqrt(self._edges.wave) * motion)
+        return float(self._edges.largest_opening / np.sqrt(self._edges.wave) * motion)
 
     def _rate(self, point: Point) -> float:
         """Bound the closing of a gap along the branch per unit of d."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+
 from adhesis.solver._kernels import (
     SearchedGaps,
     SearchLengths,
@@ -21,7 +22,6 @@ from adhesis.solver._kernels import (
     least_clearances,
     search,
 )
-
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
 from adhesis.solver.sharp.equilibrium.branch_point import Point
@@ -70,7 +70,7 @@ class Nucleation:
         self.searched = SearchedGaps()
         self._lengths = SearchLengths(
             max_displacement=COMPARABLE * edges.wave,
-            closing_per_motion=float(edges.critical / np.sqrt(edges.wave)),
+            closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=math.pi * edges.critical**2 / 8,  # Γ
             narrowest=float(3 * edges.smallest),
             widest=float(edges.longest_step),

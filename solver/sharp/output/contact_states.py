@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from adhesis.solver._kernels import LoadingDevice, SearchedGaps
 
+from adhesis.solver._kernels import LoadingDevice, SearchedGaps
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
@@ -15,6 +15,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
+from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.values import with_values
 
@@ -174,8 +175,26 @@ class States:
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             stiffness=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gap_field.gaps, 0.0),
+            internal=replace(state.internal, gaps=gap_field.gaps, clearance=0.0, branch_data=None),
         )
+
+    def with_receded(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
+        """Return states with the length over which edges have receded since a state before."""
+        out, total = [], before.receded
+        for state in states:
+            if before.patches:
+                lost = self._contact_measure(before.internal.gaps)
+                if state.patches:
+                    both = union_of(before.internal.gaps, state.internal.gaps)
+                    lost -= self._contact_measure(both)
+                total += max(lost, 0.0) / self.q0
+            out.append(with_values(state, receded=total))
+            before = state
+        return out
+
+    def _contact_measure(self, gaps: Array) -> float:
+        """Length along the profile, in θ, of the contact between gaps; 0 if they leave none."""
+        return self.source.contact_between(gaps)[1] if len(gaps) else 0.0
 
     def work(self, before: ContactState, after: ContactState, way: float) -> float:
         """Compute |Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from adhesis.solver._kernels import EdgeLaw, FieldModel, LoadingDevice
 
+from adhesis.solver._kernels import EdgeLaw, FieldModel, LoadingDevice
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
@@ -34,6 +34,8 @@ class EdgeProblem:
         Relative accuracy of the field.
     device : LoadingDevice
         What prescribes the quantity d.
+    pinning : float
+        sqrt(γ_open/γ) - 1; 0 for one work of adhesion.
 
     Attributes
     ----------
@@ -56,6 +58,7 @@ class EdgeProblem:
         critical: float,
         tolerance: float,
         device: LoadingDevice = FIXED_SEPARATION,
+        pinning: float = 0.0,
     ) -> None:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.wave = 2 * np.pi / source.top
@@ -78,6 +81,7 @@ class EdgeProblem:
             smallest=float(self.smallest),
             overlap_limit=float(OVERLAPPING * max(critical, roughness_opening)),
             force_error=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
+            pinning=float(pinning),
         )
         self.model = FieldModel(
             device=device,
@@ -85,6 +89,16 @@ class EdgeProblem:
             panels=source.panels,
         )
         self.count = Counters()
+
+    @property
+    def pins(self) -> bool:
+        """Whether edges are pinned, as works of adhesion differ."""
+        return self.law.pinning > 0
+
+    @property
+    def largest_opening(self) -> float:
+        """Critical opening on a flat piece of an edge that recedes."""
+        return self.critical * (1 + self.law.pinning)
 
     @property
     def is_fixed(self) -> bool:

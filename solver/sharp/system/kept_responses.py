@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from adhesis.solver._kernels import LinearResponse, set_up_response, shortest_length
 
+from adhesis.solver._kernels import LinearResponse, set_up_response, shortest_length
 from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.tolerances import RESPONSE_TRIALS, RESPONSES_KEPT

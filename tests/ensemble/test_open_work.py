@@ -1,0 +1,298 @@
+"""The work of adhesion of receding edges in commands, campaigns, results files and reports."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import adhesis
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.report.findings import verdict
+from adhesis.ensemble.report.paper import is_reading
+from adhesis.ensemble.report.tables.loss_tables import losses
+from adhesis.ensemble.task.compute import Runner, make_problem
+from adhesis.ensemble.task.doubt import beyond_zero_range
+from adhesis.ensemble.trace.answer import check as check_trace
+from adhesis.ensemble.trace.answer import make_cycle
+from adhesis.ensemble.trace.prepare import prepare_trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
+from adhesis.ensemble.trace.variants import make_plan
+from tests.support.campaign_support import campaign_text
+from tests.support.scenes import HALF_SPACE
+from tests.support.synthetic_results import rows, text_of, write
+
+ROUGH = ("--hurst", 0.8, "--seed", 1, "--n0", 2, "--ratio", 4, "--max-penetration", 0.5)
+
+
+def run(*words) -> int:
+    return main([str(word) for word in words])
+
+
+def text(value: str, **changes: str) -> str:
+    """A campaign of method ``auto`` with a work of adhesion of receding edges."""
+    given = campaign_text(poisson=f"0.5\nwork_of_adhesion_open = {value}", **changes)
+    return given.replace('method = "grid"\nnodes_per_wave = 16\n', "")
+
+
+# ---------------------------------------------------------------------- loop
+
+
+def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
+    out = tmp_path / "loop.json"
+    words = ("--work-of-adhesion", "40mJ/m2", "--work-of-adhesion-open", "80mJ/m2")
+    assert run("loop", *ROUGH, "--load-steps", 6, *words, "--json", out, "--quiet") == 0
+    data = json.loads(out.read_text())
+    assert (data["work_of_adhesion"], data["work_of_adhesion_open"]) == (0.04, 0.08)
+    assert 0 < data["friction"] < data["loss"]
+    assert data["loss"] == pytest.approx(data["loss_from_drops"], rel=1e-3)
+    drops = sum(jump["energy_drop"] for jump in data["jumps"])
+    assert drops < 0.99 * data["loss"]  # the rest is friction between jumps
+    assert data["provenance"]["units"]["friction"] == "J/m²"
+    assert np.all(np.diff([state["receded"] for state in data["states"]]) >= 0)
+    line = f"friction    {data['friction']:.6g} J/m² at edges, which recede at 0.08 J/m²; "
+    line += f"{data['loss'] - data['friction']:.6g} J/m² lost by instability"
+    assert line in capsys.readouterr().out.splitlines()
+
+
+def test_a_loop_of_one_work_of_adhesion_is_as_before(tmp_path, capsys):
+    found = []
+    for more in ((), ("--work-of-adhesion-open", 0.04)):
+        out = tmp_path / "loop.json"
+        words = ("--work-of-adhesion", 0.04, *more, "--json", out, "--quiet")
+        assert run("loop", *ROUGH, "--load-steps", 4, *words) == 0
+        found.append(json.loads(out.read_text()))
+    changing = ("seconds", "provenance", "warnings")
+    one, both = ({k: v for k, v in data.items() if k not in changing} for data in found)
+    assert one == both
+    assert (one["work_of_adhesion_open"], one["friction"]) == (0.04, 0.0)
+    assert "receded" not in one
+    assert "friction" not in capsys.readouterr().out
+
+
+def test_a_path_lists_its_friction(tmp_path, capsys):
+    words = ("--work-of-adhesion-open", 0.08, "--load-steps", 5, "--quiet")
+    out = tmp_path / "path.json"
+    given = [word for word in ROUGH if word not in ("--max-penetration", 0.5)]
+    assert run("loop", *given, "--path", "0.5,0.1,0.5,out", *words, "--json", out) == 0
+    data = json.loads(out.read_text())
+    assert abs(data["audit_residual"]) < 1e-3
+    (part,) = data["minor_loops"]
+    assert abs(part["audit_residual"]) < 1e-3 * data["loss"]
+    assert "\nfriction    " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--work-of-adhesion-open", 0.01), "-open is 0.01 J/m²: it must be at least the work of"),
+        (("--work-of-adhesion-open", "0,08"), "--work-of-adhesion-open"),
+        (("--work-of-adhesion-open", 0.08, "--strength", 1e9), "beside a strength of"),
+        (("--work-of-adhesion-open", 0.08, "--adhesion-range", "1nm"), "give one of them"),
+        (("--work-of-adhesion-open", 0.08, "--work-of-adhesion", 0), "left out, as γ is 0"),
+        (("--work-of-adhesion-open", 0.08, "--method", "grid"), "--method is 'grid' beside a work"),
+        (("--work-of-adhesion-open", 0.08, "--nodes-per-wave", 32), "--nodes-per-wave is 32 besi"),
+    ],
+)
+def test_impossible_options_are_refused_in_one_sentence(words, message, capsys):
+    assert run("loop", *ROUGH, *words, "--quiet") == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1 or error.startswith("usage")
+
+
+# ---------------------------------------------------------------------- trace
+
+
+def small_trace():
+    x = np.arange(200) / 200 * 1e-3
+    heights = 1e-6 * np.sin(2 * np.pi * 3 * x / 1e-3) + 3e-7 * np.sin(2 * np.pi * 7 * x / 1e-3 + 1)
+    return prepare_trace(Trace(heights, 5e-6, "t.txt"))
+
+
+def test_the_table_of_a_trace_keeps_the_ratio_of_both_works_of_adhesion():
+    cycle = make_cycle(
+        HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3, work_of_adhesion_open=0.06
+    )  # below the 0.08 of the table
+    prepared = small_trace()
+    check_trace(prepared, cycle)
+    plan = make_plan(prepared, cycle, processes=0)
+    found = {(job.work_of_adhesion, job.cycle.open_at(job.work_of_adhesion)) for job in plan.jobs}
+    assert found == {(0.04, 0.06), (0.02, 0.03), (0.08, 0.12)}
+
+
+def test_the_answer_of_a_trace_has_its_friction(capsys):
+    answer = adhesis.loss_of_trace(
+        small_trace(),
+        half_space=HALF_SPACE,
+        work_of_adhesion=0.01,
+        work_of_adhesion_open=0.02,
+        max_penetration=0.3,
+        load_steps=4,
+        quick=True,
+        processes=0,
+    )
+    assert 0 < answer.main["friction"] < answer.main["loss"]
+    assert answer.main["work_of_adhesion_open"] == 0.02
+    assert "\nfriction    " in str(answer)
+    assert "which recede at 0.02 J/m²" in str(answer)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("0.04,0.02", "--work-of-adhesion-open", 0.1), "beside 2 works of adhesion: give one of"),
+        (("0.04", "--work-of-adhesion-open", 0.01), "-open is 0.01 J/m²: it must be at least the"),
+        (("0.04", "--work-of-adhesion-open", 0.08, "--strength", 1e9), "beside a strength of 1e"),
+        (("0.04", "--work-of-adhesion-open", 0.08, "--method", "grid"), "--method is 'grid' besi"),
+    ],
+)
+def test_a_trace_refuses_them_before_its_loops(words, message, tmp_path, capsys):
+    file, prepared = tmp_path / "t.txt", small_trace()
+    np.savetxt(
+        file, np.column_stack([prepared.trace.step * np.arange(200), prepared.trace.heights])
+    )
+    more = ("--unit", "m", "--young", 1e6, "--poisson", 0.5, "--to", tmp_path / "out", "--quiet")
+    assert run("trace", file, "--work-of-adhesion", *words, *more) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+# ---------------------------------------------------------------------- campaign
+
+
+def test_it_is_a_key_of_the_material_and_may_be_an_axis():
+    campaign = parse_campaign(text('["50 mJ/m2", 0.08]'))
+    assert campaign.has_axis("work_of_adhesion_open")
+    found = {
+        (task.work_of_adhesion, make_problem(campaign, task).work_of_adhesion_open)
+        for task in campaign.tasks()
+    }
+    assert found == {(0.01, 0.05), (0.01, 0.08), (0.04, 0.05), (0.04, 0.08)}
+    assert parse_campaign(campaign_text()).material.work_of_adhesion_open is None
+
+
+def test_zip_joins_it_with_the_work_of_adhesion():
+    joined = text("[0.02, 0.08]", seed='5\nzip = [["work_of_adhesion", "work_of_adhesion_open"]]')
+    campaign = parse_campaign(joined)
+    found = {
+        (task.work_of_adhesion, make_problem(campaign, task).gamma_open)
+        for task in campaign.tasks()
+    }
+    assert found == {(0.01, 0.02), (0.04, 0.08)}
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (text("0.02"), "_open is 0.02: it must be at least the work of adhesion, 0.04"),
+        (text("[0.02, 0.08]"), "work_of_adhesion_open is 0.02: it must be at least"),
+        (text("0.08", work_of_adhesion="[0, 0.04]"), "must be left out, as γ is 0, in every cell"),
+        (text("-1"), "work_of_adhesion_open is -1: it must be"),
+        (text('"80 mm"'), "work_of_adhesion_open"),
+        (text("0.08\nstrength = 3e9"), "_open and a range or strength: at most one"),
+        (text("0.08\nadhesion_range = 1e-12"), "and a range or strength: at most one"),
+        (
+            campaign_text(poisson="0.5\nwork_of_adhesion_open = 0.08"),
+            "[solver] method is 'grid' beside a work_of_adhesion_open",
+        ),
+    ],
+)  # fmt: skip
+def test_campaigns_that_cannot_be_computed_are_refused(given, message):
+    with pytest.raises(InputError) as error:
+        parse_campaign(given)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_equal_works_of_adhesion_are_those_of_one():
+    campaign = parse_campaign(
+        campaign_text(work_of_adhesion="[0.04]", poisson="0.5\nwork_of_adhesion_open = 0.04")
+    )  # also with the method grid
+    assert make_problem(campaign, campaign.tasks()[0]).work_of_adhesion_open is None
+
+
+def test_a_row_has_its_friction():
+    campaign = parse_campaign(text("0.08", work_of_adhesion="[0.04]", hurst="[0.8]"))
+    row = Runner()(campaign, campaign.tasks()[0])
+    assert row["gamma_open"] == 0.08
+    assert 0 < row["friction"] < row["loss"]
+    assert row["loss_from_drops"] == pytest.approx(row["loss"], rel=1e-3)
+    assert row["loss_small_scale"] + row["loss_large_scale"] < 0.99 * row["loss"]
+
+
+def test_a_loss_is_doubted_by_the_work_of_adhesion_that_it_spends():
+    """Twenty times the work of adhesion of the largest contact bound it, that of opening."""
+    values = {
+        "valid_range": 1.0, "loss": 1.0, "work_of_adhesion": 0.04, "largest_contact_fraction": 0.5,
+        "opening_strength": np.inf, "barrier": 0.0, "edge_range": 1.0, "touch_range": 1.0,
+    }  # fmt: skip
+    assert beyond_zero_range(values | {"gamma_open": 0.04})
+    assert not beyond_zero_range(values | {"gamma_open": 0.4})
+    assert beyond_zero_range(values | {"gamma_open": np.nan})
+
+
+# ---------------------------------------------------------------------- report
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """Aggregates of a campaign with the key as an axis, and of one without."""
+    folder = tmp_path_factory.mktemp("open")
+    found = []
+    for name, key in (("open", "\nwork_of_adhesion_open = [0.05, 0.08]"), ("one", "")):
+        plan = parse_campaign(
+            text_of(realisations=2).replace("poisson = 0.5", f"poisson = 0.5{key}")
+        )
+        values = rows(plan)
+        if key:
+            values["friction"] = 0.25 * values["loss"]
+            values["gamma_open"] = values["work_of_adhesion_open"]
+        found.append(aggregate(write(folder / f"{name}.h5", plan, values)))
+    return found
+
+
+def test_the_table_of_losses_has_both_parts_where_the_key_is_given(both, tmp_path):
+    tables = []
+    for data in both:
+        losses(data).write_csv(tmp_path / "losses.csv")
+        with (tmp_path / "losses.csv").open(newline="") as stream:
+            tables.append(list(csv.reader(stream)))
+    (head, *lines), (one, *_) = tables
+    new = ["friction_mean [J/m^2]", "instability_mean [J/m^2]"]
+    assert [name for name in head if name in new] == new
+    assert "work_of_adhesion_open [J/m^2]" in head
+    for line in lines:
+        row = dict(zip(head, line, strict=True))
+        loss = float(row["loss_mean [J/m^2]"])
+        assert float(row[new[0]]) == pytest.approx(0.25 * loss)
+        assert float(row[new[1]]) == pytest.approx(0.75 * loss)
+    assert not set(new) & set(one)
+
+
+def test_the_report_says_which_part_is_friction(both):
+    opened, one = ("\n".join(verdict(data)) for data in both)
+    assert "; 25 % is friction of receding edges." in opened
+    assert "friction" not in one
+
+
+def test_its_cells_are_not_those_of_the_paper(both):
+    given = text_of(ratio=100, max_penetration=0.9)
+    assert is_reading(parse_campaign(given), [0.8])
+    opened = parse_campaign(
+        given.replace("poisson = 0.5", "poisson = 0.5\nwork_of_adhesion_open = 1")
+    )
+    assert not is_reading(opened, [0.8])
+
+
+def test_results_in_python_have_it_along_an_axis(both):
+    results = adhesis.open(both[0].path)
+    assert results.dataset.work_of_adhesion_open.values.tolist() == [0.05, 0.08]
+    chosen = results.dataset.sel(hurst=0.8, work_of_adhesion=0.04, work_of_adhesion_open=0.08)
+    np.testing.assert_allclose(chosen.friction, 0.25 * chosen.loss)
+    assert results.dataset.friction.units == "J m-2"

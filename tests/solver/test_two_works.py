@@ -1,0 +1,222 @@
+"""Two works of adhesion: an edge advances at γ, recedes at γ_open, and is pinned between both."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import adhesis
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.path import run_path
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Profile, single_wave
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.registry import make_method
+
+A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
+SOLID = HalfSpace(1e6, 0.5)
+# A few waves with three patches at most, six jumps and minor crests that are pinned.
+ROUGH = np.zeros(7, complex)
+ROUGH[2:] = 1e-7 * np.array([0.51 - 0.35j, -0.64 + 0.66j, 0.10 - 0.09j, -0.13 - 0.29j, 0.02 - 0.4j])
+
+
+def wave(ratio: float, control: Control | None = None) -> Problem:
+    return Problem(
+        single_wave(A, PERIOD),
+        SOLID,
+        GAMMA,
+        control or Control(),
+        work_of_adhesion_open=ratio * GAMMA,
+    )
+
+
+def closed_form(ratio: float, depth: float) -> tuple[float, float]:
+    """Loss of one wave in J/m², and the part of it that is friction."""
+    closes = SingleWave(A, PERIOD, SOLID.modulus, GAMMA, "arc")
+    opens = SingleWave(A, PERIOD, SOLID.modulus, ratio * GAMMA, "arc")
+    turn = closes.half_width(A * (1 - depth))
+    adhesive_length = -closes.adhesion_energy(turn) / GAMMA
+    friction = (ratio - 1) * GAMMA * adhesive_length
+    gained = closes.energy(closes.half_width(A))
+    lost = opens.energy(opens.fold_half_width)
+    return float((lost - gained + friction) / PERIOD), float(friction / PERIOD)
+
+
+@cache
+def rough_loop(factor: complex = 1.0, *, mirrored: bool = False, shift: float = 0.0) -> LoopResult:
+    """Loop of the rough profile, scaled as a whole, mirrored and shifted."""
+    heights = ROUGH.conj() if mirrored else ROUGH
+    heights = heights * np.exp(1j * np.arange(ROUGH.size) * shift) * factor
+    length = abs(factor)
+    problem = Problem(
+        Profile(PERIOD * length, heights), SOLID, 1e-3 * length, work_of_adhesion_open=2e-3 * length
+    )
+    return run_loop(
+        make_method("sharp", problem, accuracy=1e-4), max_penetration=0.6, load_steps=20
+    )
+
+
+@pytest.mark.parametrize("depth", [0.3, 0.6])
+@pytest.mark.parametrize("ratio", [1.1, 2.0, 4.0])
+def test_loss_of_a_wave_is_the_closed_form(ratio, depth):
+    method = make_method("sharp", wave(ratio), accuracy=1e-4)
+    loop = run_loop(method, max_penetration=depth, load_steps=20)
+    loss, friction = closed_form(ratio, depth)
+    assert loop.loss == pytest.approx(loss, rel=1e-4)
+    assert loop.loss_from_drops == pytest.approx(loss, rel=1e-4)
+    assert loop.friction == pytest.approx(friction, rel=1e-4)
+    assert abs(loop.audit_residual) < 1e-4
+    assert loop.warnings == ()
+    assert 0 < loop.friction < loop.loss
+
+
+def test_equal_works_of_adhesion_give_the_same_bits_as_one():
+    one = Problem(single_wave(A, PERIOD), SOLID, GAMMA)
+    both = wave(1.0)
+    assert both == one
+    assert both.work_of_adhesion_open is None
+    assert (both.pinning, both.gamma_open) == (0.0, GAMMA)
+    loops = [
+        run_loop(make_method("sharp", p), max_penetration=0.6, load_steps=10) for p in (one, both)
+    ]
+    assert loops[0] == loops[1]
+    assert loops[0].friction == 0.0
+    assert loops[0].receded is None
+    assert "receded" not in loops[0].columns()
+
+
+@pytest.mark.parametrize("control", [Control(), Control(1e11)])
+def test_a_minor_loop_within_the_pinned_range_is_reversible(control):
+    """Its edges do not move, so nothing is lost; a longer one is audited with its friction."""
+    method = make_method("sharp", wave(2.0, control), accuracy=1e-4)
+    path = run_path(method, [0.3, 0.28, 0.3, -0.3, 0.3], load_steps=20)
+    short, long = path.minor_loops
+    assert (short.turn, long.turn) == (0.28, -0.3)
+    assert short.closes
+    assert abs(short.loss) < 1e-6 * long.loss
+    assert abs(short.loss_from_drops) < 1e-6 * long.loss
+    assert long.loss > 0.1 * path.work
+    assert abs(long.audit_residual) < 1e-4 * long.loss
+    assert abs(path.audit_residual) < 1e-4
+    assert path.friction > long.loss_from_drops
+
+
+def test_a_leg_that_ends_in_contact_is_audited_with_its_friction():
+    path = run_path(
+        make_method("sharp", wave(2.0), accuracy=1e-4), [0.5, 0.2, 0.4], load_steps=20, out=False
+    )
+    assert path.friction > 0.2 * path.work  # without it the audit is off by as much
+    assert abs(path.audit_residual) < 1e-4
+
+
+def test_more_pinning_loses_more_and_friction_grows_with_depth():
+    losses = [closed_form(ratio, depth)[0] for ratio in (1.1, 2.0, 4.0) for depth in (0.3, 0.6)]
+    assert losses == sorted(losses)
+
+
+def test_a_rough_loop_closes_its_audit_with_friction_between_jumps():
+    loop = rough_loop()
+    drops = sum(jump.energy_drop for jump in loop.jumps)
+    assert loop.patches.max() > 1
+    assert len(loop.jumps) > 2
+    assert loop.loss - drops > 0.05 * loop.loss
+    assert abs(loop.audit_residual) < 1e-4
+    assert loop.loss == pytest.approx(loop.loss_from_drops, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["loss", "friction"])
+def test_scale_mirror_and_shift_do_not_matter(name):
+    value = getattr(rough_loop(), name)
+    assert value > 0
+    assert getattr(rough_loop(3.0), name) / 3 == pytest.approx(value, rel=1e-8)
+    assert getattr(rough_loop(mirrored=True), name) == pytest.approx(value, rel=1e-8)
+    assert getattr(rough_loop(shift=0.7), name) == pytest.approx(value, rel=1e-5)
+
+
+def test_receded_length_only_grows_and_is_kept_in_a_file(tmp_path):
+    loop = rough_loop()
+    assert np.all(np.diff(loop.receded) >= 0)
+    assert loop.to_dataframe().attrs["units"]["receded"] == "m"
+    loop.save(tmp_path / "loop.nc")
+    again = adhesis.load(tmp_path / "loop.nc")
+    assert again == loop
+    assert again.problem.work_of_adhesion_open == 2e-3
+    assert again.numbers() == loop.numbers()
+    data = loop.to_xarray()
+    assert data.attrs["friction"] == loop.friction
+    np.testing.assert_array_equal(data.receded, loop.receded)
+
+
+def test_a_file_whose_friction_was_changed_is_refused(tmp_path):
+    """The sum of drops and friction is computed again from the lengths over which edges receded."""
+    from adhesis.ensemble.loop.saved import _contradiction, to_xarray
+
+    loop = rough_loop()
+    changed = replace(loop, receded=loop.receded * 1.01)
+    assert _contradiction(to_xarray(loop), loop) is None
+    assert _contradiction(to_xarray(changed), changed) == "loss_from_drops"
+
+
+def test_a_loop_says_how_much_is_friction():
+    loop = rough_loop()
+    numbers = loop.numbers()
+    assert (numbers["work_of_adhesion"], numbers["work_of_adhesion_open"]) == (1e-3, 2e-3)
+    assert numbers["friction"] == loop.friction
+    text = f"{loop.friction:.6g} J/m² at edges, which recede at 0.002 J/m²; "
+    text += f"{loop.loss - loop.friction:.6g} J/m² lost by instability"
+    assert loop.friction_summary() == text
+    assert f"friction   {text}" in str(loop)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"work_of_adhesion_open": 1e-3}, "0.001 J/m²: it must be at least the work of adhesion"),
+        ({"work_of_adhesion_open": -1.0}, "work_of_adhesion_open is -1.0: it must be"),
+        ({"work_of_adhesion_open": np.inf}, "work_of_adhesion_open is inf: it must be"),
+        ({"work_of_adhesion_open": 1.0, "strength": 1e6}, "beside a strength of 1e\\+06 Pa: give"),
+        ({"work_of_adhesion_open": 1.0, "adhesion_range": 1e-9}, "give one of them"),
+    ],
+)
+def test_impossible_works_of_adhesion_are_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        Problem(single_wave(A, PERIOD), SOLID, GAMMA, **given)
+
+
+def test_without_adhesion_none_opens():
+    with pytest.raises(ValueError, match="it must be left out, as γ is 0"):
+        Problem(single_wave(A, PERIOD), SOLID, 0.0, work_of_adhesion_open=0.1)
+
+
+def test_the_grid_is_refused_and_auto_takes_sharp():
+    with pytest.raises(ValueError, match="method is 'grid' beside a work_of_adhesion_open"):
+        make_method("grid", wave(2.0))
+    with pytest.raises(ValueError, match="nodes_per_wave is 32 beside a work_of_adhesion_open"):
+        make_method("auto", wave(2.0), nodes_per_wave=32)
+    assert make_method("auto", wave(2.0)).name == "sharp"
+    assert make_method("grid", wave(1.0)).name == "grid"
+
+
+def test_equal_patches_of_two_works_are_doubted() -> None:
+    """Which of them goes first, and when, differs between accuracies by more than the error."""
+    equal = replace(wave(3.0), profile=Profile(PERIOD, np.array([0, 0, 0.5 * A], complex)))
+    loops = [
+        run_loop(make_method("sharp", problem), max_penetration=0.8, load_steps=10)
+        for problem in (equal, replace(equal, work_of_adhesion_open=None), wave(3.0))
+    ]
+    assert [any("are alike" in text for text in loop.warnings) for loop in loops] == [1, 0, 0]
+
+
+def test_under_a_load_the_solid_falls_off_at_the_largest_tension_of_the_larger_work() -> None:
+    method = make_method("sharp", wave(2.0, Control(0.0)), accuracy=1e-4)
+    loop = run_loop(method, max_stress=2000.0, load_steps=20)
+    opens = SingleWave(A, PERIOD, SOLID.modulus, 2.0 * GAMMA, "arc")
+    tension = -opens.mean_stress(np.linspace(1e-3, 0.4, 40_000) * PERIOD).min()
+    assert loop.pull_off_stress == pytest.approx(tension, rel=1e-5)
+    assert abs(loop.audit_residual) < 1e-5
