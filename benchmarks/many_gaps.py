@@ -16,16 +16,16 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-
-from adhesis.solver.model.profile import Array, self_affine_profile
-from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.equilibrium.linear_response import solve_response
 from adhesis.solver.sharp.equilibrium.response_setup import set_up_response
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
+
+from adhesis.solver.model.profile import Array, self_affine_profile
+from adhesis.solver.runtime.malloc import keep_freed
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 
 _TOUGHNESS = 1e-3  # critical opening: that of edges which are hardly in balance

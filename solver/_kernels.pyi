@@ -7,6 +7,8 @@ import numpy
 from numpy.typing import NDArray
 
 
+COMPILER: str = 'GNU 12.2.0'
+
 class Panels:
     """The full-contact stress of a profile, compressed on panels."""
 
@@ -195,6 +197,9 @@ class Field:
 
     def work_of_gaps(self) -> float:
         """Integrate S_full T dθ over the gaps."""
+
+def sum_pull(theta: NDArray[numpy.float64], sine: NDArray[numpy.float64], cosine: NDArray[numpy.float64], weight: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+    """Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2."""
 
 def solve_field(gaps: NDArray[numpy.float64], prescribed: float, model: FieldModel, orders: NDArray[numpy.int64] | None = None) -> Field:
     """

@@ -1,6 +1,6 @@
 """Write the types of the kernels, from the module that was built, for mypy and editors.
 
-    python tools/stub.py
+python tools/stub.py
 """
 
 from __future__ import annotations

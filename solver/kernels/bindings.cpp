@@ -338,6 +338,18 @@ void bind_field(nb::module_& m) {
       .def("work_of_gaps",
            [](const Field& f) { return unlocked([&] { return work_of_gaps(f); }); },
            "Integrate S_full T dθ over the gaps.");
+  m.def("sum_pull",
+        [](const Array& theta, const Array& sine, const Array& cosine, const Array& weight) {
+          const Vector at = vector_of(theta), s = vector_of(sine), c = vector_of(cosine);
+          const Vector w = vector_of(weight);
+          return array_of(unlocked([&] {
+            Vector out;
+            for (double each : at) out.push_back(sum_pull(each, s, c, w));
+            return out;
+          }));
+        },
+        "theta"_a, "sine"_a, "cosine"_a, "weight"_a,
+        "Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2.");
   m.def("solve_field",
         [](const Array& gaps, double prescribed, const Model& model,
            const std::optional<IntegerArray>& orders) {
@@ -732,6 +744,7 @@ void bind_parts(nb::module_& m) {
 
 NB_MODULE(_kernels, m) {
   m.doc() = "Kernels of the methods sharp and grid.";
+  m.attr("COMPILER") = ADHESIS_COMPILER;
   adhesis::bind_model(m);
   adhesis::bind_field(m);
   adhesis::bind_response(m);

@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 import pytest
+from adhesis.solver.runtime.compiler import Compiler
 from numba import njit
 
 from adhesis.ensemble.run.attempt import Outcome
@@ -27,7 +28,6 @@ from adhesis.ensemble.run.dispatch import (
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
-from adhesis.solver.runtime.compiler import Compiler
 from tools.interrupted import Interrupt
 
 

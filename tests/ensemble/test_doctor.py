@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from adhesis.solver.runtime.disk_cache import CodeFiles
 
 from adhesis.ensemble import versions
 from adhesis.ensemble.command.main import main
@@ -16,7 +17,6 @@ from adhesis.ensemble.doctor import examine as doctor
 from adhesis.ensemble.run import launch
 from adhesis.solver import precompile as warm
 from adhesis.solver.runtime import disk_cache as code_cache
-from adhesis.solver.runtime.disk_cache import CodeFiles
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:

@@ -6,9 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
-from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
 from adhesis.solver.sharp.descent.edge_model import (
     EdgeModel,
     advance,
@@ -28,12 +25,15 @@ from adhesis.solver.sharp.descent.implicit_flow import (
     descend,
 )
 from adhesis.solver.sharp.descent.model_flow import ModelFlow, flow_through, implicit_step
-from adhesis.solver.sharp.descent.saddle import leaving_step
 from adhesis.solver.sharp.descent.step_size import model_error, next_reach
-from adhesis.solver.sharp.equilibrium.griffith import imbalance
-from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.cholesky import padded
 from adhesis.solver.sharp.field.solution import Solution
+from scipy.integrate import solve_ivp
+
+from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from adhesis.solver.sharp.descent.saddle import leaving_step
+from adhesis.solver.sharp.equilibrium.griffith import imbalance
+from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.tolerances import (

@@ -15,6 +15,9 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 import pytest
+from adhesis.solver.precompile import COMPILED_METHODS, _small_loops, small_problem
+from adhesis.solver.sharp.field.solution import LoadingDevice
+from adhesis.solver.sharp.field.tree_factor import Charges
 from numba import types
 from numba.core import boxing, pythonapi, serialize
 from numba.core.dispatcher import Dispatcher
@@ -25,13 +28,10 @@ from adhesis.solver.method import Method
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import self_affine_profile
-from adhesis.solver.precompile import COMPILED_METHODS, _small_loops, small_problem
 from adhesis.solver.registry import make_method
 from adhesis.solver.runtime import compiler
 from adhesis.solver.runtime import jit as compiled
 from adhesis.solver.runtime.uninterrupted import uninterrupted
-from adhesis.solver.sharp.field.solution import LoadingDevice
-from adhesis.solver.sharp.field.tree_factor import Charges
 from tools.interrupted import Interrupt, interrupted
 
 KERNELS = 20  # at least so many are called from Python

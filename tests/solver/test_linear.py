@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from adhesis.solver.sharp.field.cholesky import (
     cholesky,
     factor_rows,

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
+from adhesis.solver.sharp.gap.chebyshev_moments import gap_moments
+from adhesis.solver.sharp.gap.conformal_map import map_gaps, theta_at
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from scipy.integrate import quad
 
 from adhesis import Problem, self_affine_profile, single_wave
 from adhesis.solver.sharp.field.gap_field import GapField, respond_at_fixed_edges
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.opening_series import fine_opening, sum_modes, work_of_gaps
-from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
-from adhesis.solver.sharp.gap.chebyshev_moments import gap_moments
-from adhesis.solver.sharp.gap.conformal_map import map_gaps, theta_at
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource, half_plane_opening
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from adhesis import HalfSpace, Problem, self_affine_profile
-from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.condensed import tangent_between
-from adhesis.solver.sharp.equilibrium.griffith import move_edges
 from adhesis.solver.sharp.equilibrium.linear_response import solve_response
 from adhesis.solver.sharp.equilibrium.response_setup import set_up_response, update_response
-from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.cluster_tree import build_tree, pair_again
-from adhesis.solver.sharp.field.gap_field import respond_at_fixed_edges
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
@@ -25,8 +18,15 @@ from adhesis.solver.sharp.field.tree_factor import (
     whole_tree,
 )
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
+
+from adhesis import HalfSpace, Problem, self_affine_profile
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.griffith import move_edges
+from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.field.gap_field import respond_at_fixed_edges
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.system.kept_responses import KeptResponses

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from adhesis.solver.sharp.gap.sine_transform import sine_sums, tabulate_circle
 
 from adhesis.solver.sharp.field.opening_series import fast_size
-from adhesis.solver.sharp.gap.sine_transform import sine_sums, tabulate_circle
 
 
 @pytest.mark.parametrize("count", [4, 8, 12, 20, 36, 60, 64, 96, 100, 108, 144, 240, 500])

@@ -7,13 +7,13 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from adhesis.solver.sharp.nucleation.gap_minima import local_minima
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
-from adhesis.solver.sharp.nucleation.gap_minima import local_minima
 from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation, Touch
 from tests.support.scenes import HALF_SPACE
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-
-from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.solution import FieldModel, MeanResponse, Solution, edge_openings
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 
 _STEP = 1e-6  # of an edge in θ, to both sides

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-
-from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.solution import (
     FIXED_SEPARATION,
@@ -13,8 +10,11 @@ from adhesis.solver.sharp.field.solution import (
     LoadingDevice,
 )
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.field.gap_field import GapField
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 
 
 def solved_field(
