@@ -60,24 +60,20 @@ class Charges(NamedTuple):
 
 
 @compiled_sums
-def eliminate(a: Array, x: Array) -> bool:
-    """Solve a y = x for the columns of x, both overwritten; returns whether det a is negative."""
+def eliminate(a: Array, x: Array) -> None:
+    """Solve a y = x for the columns of x, both overwritten."""
     n = a.shape[0]
     columns = x.shape[1]
-    negative = False
     for k in range(n):
         best = k
         for i in range(k + 1, n):
             if abs(a[i, k]) > abs(a[best, k]):
                 best = i
         if best != k:
-            negative = not negative
             for j in range(k, n):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
             for j in range(columns):
                 x[k, j], x[best, j] = x[best, j], x[k, j]
-        if a[k, k] < 0:
-            negative = not negative
         pivot = 1 / a[k, k]
         for i in range(k + 1, n):
             factor = a[i, k] * pivot
@@ -93,7 +89,55 @@ def eliminate(a: Array, x: Array) -> bool:
         pivot = 1 / a[k, k]
         for j in range(columns):
             x[k, j] *= pivot
+
+
+@compiled_sums
+def count_negative(h: Array, r: Array) -> int:
+    """Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric and overwritten.
+
+    By pivots of two rows, one of each half: where h r is small they are far from singular.
+    """
+    n = h.shape[0]
+    x, columns = np.eye(n), np.empty((2, n))
+    of_h, of_r = columns[0], columns[1]
+    negative = 0
+    for k in range(n):
+        _take_pivot(h, r, x, k)
+        a, b, c = h[k, k], x[k, k], r[k, k]
+        det = a * c - b * b
+        if det < 0:
+            negative += 1
+        elif a + c < 0:
+            negative += 2
+        for i in range(k + 1, n):
+            of_h[i], of_r[i] = x[i, k], x[k, i]
+        for i in range(k + 1, n):
+            own, cross = h[i, k], of_h[i]
+            first, second = (c * own - b * cross) / det, (a * cross - b * own) / det
+            own, cross = r[i, k], of_r[i]
+            third, fourth = (c * cross - b * own) / det, (a * own - b * cross) / det
+            for j in range(k + 1, n):
+                h[i, j] -= first * h[k, j] + second * of_h[j]
+                x[i, j] -= first * of_r[j] + second * r[k, j]
+                r[i, j] -= third * of_r[j] + fourth * r[k, j]
     return negative
+
+
+@compiled
+def _take_pivot(h: Array, r: Array, x: Array, k: int) -> None:
+    """Bring the pivot with the largest determinant to row and column ``k``."""
+    best, largest = k, 0.0
+    for i in range(k, h.shape[0]):
+        det = abs(h[i, i] * r[i, i] - x[i, i] * x[i, i])
+        if det > largest:
+            best, largest = i, det
+    if best == k:
+        return
+    for a in (h, r, x):
+        for j in range(h.shape[0]):
+            a[k, j], a[best, j] = a[best, j], a[k, j]
+        for i in range(h.shape[0]):
+            a[i, k], a[i, best] = a[i, best], a[i, k]
 
 
 @compiled
@@ -128,9 +172,8 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
 def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
     """Compute the response of a run from those of its halves.
 
-    A whole has no fewer negative eigenvalues than each of its halves; the sign of a pair's
-    determinant gives whether their number is even. Two that appear together in one pair go unseen:
-    those of two edges whose forces are equal to rounding.
+    With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
+    than its halves, n that of nodes of the first half: Haynsworth's formula, applied twice.
     """
     responses, negative = factor.response, factor.negative
     one, two, n, m = run_halves(tree, run)
@@ -149,11 +192,9 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
             matrix[i, j] = -matrix[i, j]
         inverse[i, i] = 1.0
         matrix[i, i] += 1.0
-    odd = eliminate(matrix, inverse)
-    count = max(negative[one], negative[two])
-    if (negative[one] + negative[two] + count + (1 if odd else 0)) % 2 == 1:
-        count += 1
-    negative[run] = count
+    eliminate(matrix, inverse)
+    more = n - count_negative(reflected, first.copy())
+    negative[run] = negative[one] + negative[two] + more
     if r == 0:
         return
     interpolation = tree.interpolation[run_span(tree.interpolation_start, run)].reshape(n + m, r)
