@@ -65,7 +65,6 @@ from adhesis.solver.sharp.tolerances import (
     RAN,
     RUNNING,
     RUNNING_LENGTH,
-    SHORT_REACH,
     SHORTEST_REACH,
 )
 
@@ -216,7 +215,7 @@ def _flow_on(
     is_long = reach >= LEAST_REACH and not near_balance(force, strongest, law)
     while True:
         openings = model_about(edges, gaps, held.residual, held.tangent, law, panels)
-        most, share = min(reach, SHORT_REACH) * law.longest_step, CLOSING_SHARE
+        most, share = min(reach, 1.0) * law.longest_step, CLOSING_SHARE
         if is_long:
             most, share = reach * law.longest_step, LONG_CLOSING
         limit = step_limits(map_gaps(gaps), most, share)[edges]

@@ -77,7 +77,8 @@ def flow_through(
     """Follow the flow until an edge is at its limit, or at rest; a long step, or near balance.
 
     ``model`` goes along with the edges. ``strongest`` is the largest norm of the forces on the way
-    so far.
+    so far. A short step ends where the forces have fallen, too: how far a shallow minimum is from a
+    saddle only the field shows.
     """
     edges = model.opening.shape[0]
     residuals = np.empty((MODEL_STEPS, edges))
@@ -86,18 +87,20 @@ def flow_through(
     force, step = np.empty(edges), np.empty(edges)
     factor = np.empty((edges, padded(edges)))
     longest = (MODEL_STEP if is_long else MODEL_SHORT_STEP) * law.longest_step
-    count, length, share = 0, 0.0, 1.0
+    count, length, share, first = 0, 0.0, 1.0, 0.0
     while count < MODEL_STEPS and share == 1:
         model_forces(model, force)
         total = norm(force)
-        strongest = max(strongest, total)
-        if is_long and near_balance(total, strongest, law):
+        strongest, first = max(strongest, total), max(first, total)
+        if near_balance(total, strongest, law) if is_long else FORCES_FELL * total < first:
             break
         model_hessian(model, matrix)
-        size, stable = implicit_step(matrix, force, longest, equal_speeds, factor, step)
-        faint = total < FAINT_SADDLE * law.force_error
-        if not size > RUNNING_ENDS * law.longest_step and (stable or faint):
-            break
+        size = implicit_step(matrix, force, longest, equal_speeds, factor, step)
+        shortest = RUNNING_ENDS * law.longest_step
+        if not size > shortest:
+            distance = distance_to_minimum(matrix, force, factor)
+            if distance <= shortest or total < FAINT_SADDLE * law.force_error:
+                break
         share = share_within(model.motion, step, limit)
         if share < 1:
             step *= share
@@ -123,10 +126,8 @@ def near_balance(force: float, strongest: float, law: EdgeLaw) -> bool:
 @compiled
 def implicit_step(
     matrix: Array, force: Array, longest: float, equal_speeds: bool, factor: Array, step: Array
-) -> tuple[float, bool]:
+) -> float:
     """Take a linearly implicit step, (1/Δτ + H) Δn = force; returns the largest motion.
-
-    Returns also whether the edges are stable with the time of the largest force.
 
     No edge moves further than ``longest``. The time Δτ is that in which the largest force alone
     would move its edge so far; with equal speeds every edge has its own time, in which its own
@@ -136,7 +137,7 @@ def implicit_step(
     edges = force.shape[0]
     strongest = largest(force)
     growth = 1 / longest
-    size, stable = 0.0, True
+    size = 0.0
     for _ in range(TIME_TRIES):
         for e in range(edges):
             for f in range(e + 1):
@@ -144,7 +145,6 @@ def implicit_step(
             own = max(abs(force[e]), SLOWEST * strongest) if equal_speeds else strongest
             factor[e, e] += growth * own
         if not factor_rows(factor, 0.0):
-            stable = False
             growth *= RATE_GROWTH
             continue
         step[:] = force
@@ -155,7 +155,21 @@ def implicit_step(
         step *= longest / size
         growth *= min(RATE_GROWTH, 1.1 * size / longest)
         size = longest
-    return size, stable
+    return size
+
+
+@compiled
+def distance_to_minimum(matrix: Array, force: Array, factor: Array) -> float:
+    """Compute the largest motion to the minimum of a quadratic model; infinite without one."""
+    edges = force.shape[0]
+    for e in range(edges):
+        for f in range(e + 1):
+            factor[e, f] = matrix[e, f]
+    if not factor_rows(factor, 0.0):
+        return np.inf
+    step = force.copy()
+    solve_column(factor, step)
+    return largest(step)
 
 
 @compiled
