@@ -297,6 +297,14 @@ class LinearResponse:
     def opening(self) -> NDArray[numpy.float64]:
         """C of every edge in its reference."""
 
+    @property
+    def potential(self) -> NDArray[numpy.float64]:
+        """Potentials of the last solution, without p and by a unit of p."""
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+
     def update(self, gaps: NDArray[numpy.float64], prescribed: float, least: NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
         """Set up a response of gaps of which most are those of this one."""
 
@@ -448,8 +456,33 @@ def fast_size(fewest: int) -> int:
 def sine_sums(x: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
     """Compute Σ_j x_j sin(π (j+1)(k+1)/N) of N - 1 numbers."""
 
-def count_charges(gaps: NDArray[numpy.float64], orders: NDArray[numpy.int64], digits: float) -> NDArray[numpy.int64]:
+def count_charges(gaps: NDArray[numpy.float64], digits: float) -> NDArray[numpy.int64]:
     """Count the charges of every run of the tree of gaps."""
+
+def pair_runs(count: int) -> NDArray[numpy.int64]:
+    """
+    Pair neighbouring runs of gaps, level by level: the halves of every run.
+    """
+
+def pair_again(known: NDArray[numpy.int64], source: NDArray[numpy.int64]) -> tuple[NDArray[numpy.int64], NDArray[numpy.int64]]:
+    """Pair the runs of gaps most of which are those of known halves."""
+
+def count_negative(h: NDArray[numpy.float64], r: NDArray[numpy.float64]) -> int:
+    """Count the negative eigenvalues of [[h, 1], [1, r]]."""
+
+def solve_definite(matrix: NDArray[numpy.float64], load: NDArray[numpy.float64]) -> NDArray[numpy.float64] | None:
+    """Solve a system; None if its matrix is not positive definite."""
+
+def invert_definite(matrix: NDArray[numpy.float64]) -> NDArray[numpy.float64] | None:
+    """Invert a matrix; None if it is not positive definite."""
+
+def local_minima(theta: NDArray[numpy.float64], opening: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]:
+    """Find local minima where θ falls: position, value, its error."""
+
+def on_new_tree(response: LinearResponse, digits: float) -> tuple[NDArray[numpy.float64], int]:
+    """
+    Solve for the potentials of a response on a tree that is built anew, and count its negative eigenvalues.
+    """
 
 class EdgeModel:
     """Model of the edge openings about solved edges."""
@@ -490,8 +523,8 @@ class ModelFlow:
     @property
     def is_at_limit(self) -> bool: ...
 
-def implicit_step(hessian: NDArray[numpy.float64], force: NDArray[numpy.float64], longest: float, equal_speeds: bool) -> tuple[NDArray[numpy.float64], float]:
-    """Take a linearly implicit step; returns it and its largest motion."""
+def implicit_step(hessian: NDArray[numpy.float64], force: NDArray[numpy.float64], longest: float, equal_speeds: bool) -> NDArray[numpy.float64]:
+    """Take a linearly implicit step."""
 
 def model_error(flow: ModelFlow, residual: NDArray[numpy.float64], edges: NDArray[numpy.int64], gaps: NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> float: ...
 

@@ -10,6 +10,7 @@
 
 #include <chrono>
 
+#include "cholesky.hpp"
 #include "clearance.hpp"
 #include "descent.hpp"
 #include "edge_model.hpp"
@@ -79,6 +80,12 @@ Values pairs_of(Vector values) {
 
 Whole array_of(const Integers& values) {
   return hand_over(std::vector<int64_t>(values.begin(), values.end()), {values.size()});
+}
+
+Whole array_of(const Halves& halves) {
+  std::vector<int64_t> out;
+  for (auto& [one, two] : halves) out.insert(out.end(), {one, two});
+  return hand_over(std::move(out), {halves.size(), 2});
 }
 
 Values array_of(const Matrix& matrix) {
@@ -413,6 +420,16 @@ void bind_response(nb::module_& m) {
                      return array_of(out);
                    }, new_array,
                    "C of every edge in its reference.")
+      .def_prop_ro("potential",
+                   [](const LinearResponse& r) {
+                     Vector out;
+                     for (const Vector& g : r.potential)
+                       out.insert(out.end(), g.begin(), g.begin() + r.nodes.size());
+                     return hand_over(std::move(out), {2, size_t(r.nodes.size())});
+                   }, new_array,
+                   "Potentials of the last solution, without p and by a unit of p.")
+      .def_prop_ro("negative", [](const LinearResponse& r) { return r.tree.runs.back().negative; },
+                   "Number of negative eigenvalues.")
       .def("update",
            [](const LinearResponse& known, const Array& gaps, double prescribed,
               const std::optional<IntegerArray>& least, const EdgeLaw& law, const Model& model) {
@@ -654,16 +671,91 @@ void bind_parts(nb::module_& m) {
         },
         "x"_a, "Compute Σ_j x_j sin(π (j+1)(k+1)/N) of N - 1 numbers.");
   m.def("count_charges",
-        [](const Array& gaps, const IntegerArray& orders, double digits) {
+        [](const Array& gaps, double digits) {
           const std::vector<Gap> table = map_gaps(vector_of(gaps));
-          const auto halves = pair_runs(int(table.size()));
-          const Tree tree(Nodes(table, integers_of(orders)), halves,
-                          Integers(halves.size(), 0), digits);
+          const Tree tree(Nodes(table, choose_orders(table, digits)), pair_runs(int(table.size())),
+                          Integers(2 * table.size() - 1), digits);
           Integers out;
           for (const Run& run : tree.runs) out.push_back(run.rank);
           return array_of(out);
         },
-        "gaps"_a, "orders"_a, "digits"_a, "Count the charges of every run of the tree of gaps.");
+        "gaps"_a, "digits"_a, "Count the charges of every run of the tree of gaps.");
+  m.def("pair_runs", [](int count) { return array_of(pair_runs(count)); }, "count"_a,
+        "Pair neighbouring runs of gaps, level by level: the halves of every run.");
+  m.def("pair_again",
+        [](const IntegerArray& known, const IntegerArray& source) {
+          Halves halves;
+          const Integers flat = integers_of(known);
+          for (size_t i = 0; i < flat.size(); i += 2) halves.push_back({flat[i], flat[i + 1]});
+          const PairedAgain again = pair_again(halves, integers_of(source));
+          return std::pair(array_of(again.halves), array_of(again.same));
+        },
+        "known"_a, "source"_a, "Pair the runs of gaps most of which are those of known halves.");
+  m.def("count_negative",
+        [](const Array& h, const Array& r) {
+          Matrix one = matrix_of(h), two = matrix_of(r);
+          return count_negative(one.values.data(), two.values.data(), one.n);
+        },
+        "h"_a, "r"_a, "Count the negative eigenvalues of [[h, 1], [1, r]].");
+  m.def("solve_definite",
+        [](const Array& matrix, const Array& load) -> std::optional<Values> {
+          Matrix factor = matrix_of(matrix);
+          Vector x = vector_of(load);
+          if (!factor_rows(factor.values.data(), factor.n, factor.n)) return std::nullopt;
+          solve_column(factor.values.data(), factor.n, factor.n, x.data());
+          return array_of(x);
+        },
+        "matrix"_a, "load"_a, "Solve a system; None if its matrix is not positive definite.");
+  m.def("invert_definite",
+        [](const Array& matrix) -> std::optional<Values> {
+          const Matrix of = matrix_of(matrix);
+          Matrix inverse(of.n);
+          if (!invert_definite(of.values.data(), of.n, inverse.values.data())) return std::nullopt;
+          return array_of(inverse);
+        },
+        "matrix"_a, "Invert a matrix; None if it is not positive definite.");
+  m.def("local_minima",
+        [](const Array& theta, const Array& opening) {
+          Vector position, value, error;
+          for (const Candidate& one : local_minima(vector_of(theta), vector_of(opening))) {
+            position.push_back(one.theta);
+            value.push_back(one.opening);
+            error.push_back(one.error);
+          }
+          return std::tuple(array_of(position), array_of(value), array_of(error));
+        },
+        "theta"_a, "opening"_a, "Find local minima where θ falls: position, value, its error.");
+  m.def("on_new_tree",
+        [](const LinearResponse& response, double digits) {
+          const Tree& known = response.tree;
+          const int count = known.count, n = response.nodes.size();
+          Tree tree(response.nodes, pair_runs(count), Integers(known.runs.size()), digits);
+          std::copy_n(known.theta.begin(), n, tree.theta.begin());
+          std::copy_n(known.stretch.begin(), n, tree.stretch.begin());
+          for (int k = 0; k < count; ++k) {
+            const int m = response.nodes.size_of(k);
+            tree.runs[k].negative = known.runs[k].negative;
+            std::copy_n(&known.response[known.runs[k].response], m * m,
+                        &tree.response[tree.runs[k].response]);
+          }
+          for (int run = count; run < tree.run_count(); ++run) {
+            tree.place_charges(run);
+            tree.factor(run);
+          }
+          Vector found;
+          for (const Charges& column : response.charges) {
+            Charges charges(tree.size());
+            Vector potential(tree.size());
+            std::copy_n(column.isolated.begin(), n, charges.isolated.begin());
+            for (int run = count; run < tree.run_count(); ++run) tree.charge(run, charges);
+            tree.pass_down(charges, potential);
+            found.insert(found.end(), potential.begin(), potential.begin() + n);
+          }
+          return std::pair(hand_over(std::move(found), {2, size_t(n)}), tree.runs.back().negative);
+        },
+        "response"_a, "digits"_a,
+        "Solve for the potentials of a response on a tree that is built anew, and count its "
+        "negative eigenvalues.");
   nb::class_<EdgeModel>(m, "EdgeModel", "Model of the edge openings about solved edges.")
       .def("__init__",
            [](EdgeModel* model, const IntegerArray& edges, const Array& gaps,
@@ -722,12 +814,11 @@ void bind_parts(nb::module_& m) {
       .def_ro("is_at_limit", &ModelFlow::is_at_limit);
   m.def("implicit_step",
         [](const Array& hessian, const Array& force, double longest, bool equal_speeds) {
-          const ImplicitStep step =
-              implicit_step(matrix_of(hessian), vector_of(force), longest, equal_speeds);
-          return std::pair(array_of(step.step), step.size);
+          return array_of(
+              implicit_step(matrix_of(hessian), vector_of(force), longest, equal_speeds));
         },
         "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a,
-        "Take a linearly implicit step; returns it and its largest motion.");
+        "Take a linearly implicit step.");
   m.def("model_error",
         [](const ModelFlow& flow, const Array& residual, const IntegerArray& edges,
            const Array& gaps, const EdgeLaw& law, const Panels& panels) {

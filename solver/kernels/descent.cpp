@@ -117,7 +117,7 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
   bool is_long = reach >= LEAST_REACH && !near_balance(force, strongest, law);
   while (true) {
     EdgeModel openings(edges, ends, residual, tangent, law, panels);
-    const double longest = (is_long ? reach : std::min(reach, SHORT_REACH)) * law.longest_step;
+    const double longest = (is_long ? reach : std::min(reach, 1.0)) * law.longest_step;
     const double share = is_long ? LONG_CLOSING : CLOSING_SHARE;
     Vector limit(count), motion(ends.size());
     for (int i = 0; i < count; ++i)

@@ -23,15 +23,23 @@ double share_within(const EdgeModel& model, const Vector& step, const Vector& li
   return share;
 }
 
+// Compute the largest motion to the minimum of a quadratic model; infinite without one.
+double distance_to_minimum(const Matrix& hessian, const Vector& force) {
+  Matrix factor = hessian;
+  if (!factor_rows(factor.values.data(), factor.n, factor.n)) return infinity;
+  Vector step = force;
+  solve_column(factor.values.data(), factor.n, factor.n, step.data());
+  return largest(step);
+}
+
 }  // namespace
 
-ImplicitStep implicit_step(const Matrix& hessian, const Vector& force, double longest,
-                           bool equal_speeds) {
+Vector implicit_step(const Matrix& hessian, const Vector& force, double longest,
+                     bool equal_speeds) {
   const int n = hessian.n;
   const double strongest = largest(force);
   double growth = 1 / longest;
-  ImplicitStep out;
-  out.step.resize(n);
+  Vector step(n);
   for (int tries = 0; tries < TIME_TRIES; ++tries) {
     Matrix factor = hessian;
     for (int e = 0; e < n; ++e) {
@@ -39,19 +47,17 @@ ImplicitStep implicit_step(const Matrix& hessian, const Vector& force, double lo
       factor(e, e) += growth * own;
     }
     if (!factor_rows(factor.values.data(), n, n)) {
-      out.stable = false;
       growth *= RATE_GROWTH;
       continue;
     }
-    out.step = force;
-    solve_column(factor.values.data(), n, n, out.step.data());
-    out.size = largest(out.step);
-    if (out.size <= longest) break;
-    for (double& motion : out.step) motion *= longest / out.size;
-    growth *= std::min(RATE_GROWTH, 1.1 * out.size / longest);
-    out.size = longest;
+    step = force;
+    solve_column(factor.values.data(), n, n, step.data());
+    const double size = largest(step);
+    if (size <= longest) break;
+    for (double& motion : step) motion *= longest / size;
+    growth *= std::min(RATE_GROWTH, 1.1 * size / longest);
   }
-  return out;
+  return step;
 }
 
 EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& residual,
@@ -155,20 +161,23 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
   Matrix hessian(count);
   Vector force(count);
   const double longest = (is_long ? MODEL_STEP : MODEL_SHORT_STEP) * law.longest_step;
-  double length = 0, share = 1;
+  double length = 0, share = 1, first = 0;
   while (int(out.lengths.size()) < MODEL_STEPS && share == 1) {
     model.forces(force);
     const double total = norm(force);
     strongest = std::max(strongest, total);
-    if (is_long && near_balance(total, strongest, law)) break;
+    first = std::max(first, total);
+    if (is_long ? near_balance(total, strongest, law) : FORCES_FELL * total < first) break;
     model.hessian(hessian);
-    ImplicitStep implicit = implicit_step(hessian, force, longest, equal_speeds);
-    const bool faint = total < FAINT_SADDLE * law.force_error;
-    if (!(implicit.size > RUNNING_ENDS * law.longest_step) && (implicit.stable || faint)) break;
-    share = share_within(model, implicit.step, limit);
+    Vector step = implicit_step(hessian, force, longest, equal_speeds);
+    const double shortest = RUNNING_ENDS * law.longest_step;
+    if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
+                                        total < FAINT_SADDLE * law.force_error))
+      break;
+    share = share_within(model, step, limit);
     if (share < 1)
-      for (double& motion : implicit.step) motion *= share;
-    model.advance(implicit.step);
+      for (double& motion : step) motion *= share;
+    model.advance(step);
     Vector residual(count);
     for (int e = 0; e < count; ++e) {
       residual[e] = model.edges[e].opening - model.edges[e].critical;

@@ -63,19 +63,13 @@ class EdgeModel {
   void follow_lengths(const Vector& step);
 };
 
-struct ImplicitStep {
-  Vector step;
-  double size = 0;     // largest motion
-  bool stable = true;  // with the time of the largest force
-};
-
-// Take a linearly implicit step in which no edge moves further than `longest`.
+// Take a linearly implicit step, (1/Δτ + H) Δn = force, in which no edge moves further than
+// `longest`.
 //
 // The time Δτ is that in which the largest force alone would move its edge so far; with equal
 // speeds every edge has its own time, in which its own force would. It is less where 1/Δτ + H is
 // not positive definite: the step would not be downhill.
-ImplicitStep implicit_step(const Matrix& hessian, const Vector& force, double longest,
-                           bool equal_speeds);
+Vector implicit_step(const Matrix& hessian, const Vector& force, double longest, bool equal_speeds);
 
 // Flow through the model.
 struct ModelFlow {
@@ -88,8 +82,9 @@ struct ModelFlow {
 
 // Follow the flow ṅ = C_c² - C² by linearly implicit Euler steps, (1/Δτ + H) Δn = force, until an
 // edge is at its limit, or at rest; a long step, or near balance. `strongest` is the largest norm
-// of the forces on the way so far. With equal speeds, for comparison, the time Δτ is each edge's
-// own.
+// of the forces on the way so far. A short step ends where the forces have fallen, too: how far a
+// shallow minimum is from a saddle only the field shows. With equal speeds, for comparison, the time
+// Δτ is each edge's own.
 ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds, bool is_long,
                        double strongest, const EdgeLaw& law);
 

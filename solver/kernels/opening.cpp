@@ -23,38 +23,6 @@ FineOpening fine_moments(const Gap& gap, const Circle& circle, const Panels& pan
   return out;
 }
 
-// A minimum by the parabola through three nodes.
-struct Candidate {
-  double theta, opening, half;  // half the curvature
-  double width, error;          // distance of the outer nodes; error of the opening
-};
-
-// Find local minima where θ falls; of the minima θ rises. The error is estimated from the cubics
-// through a fourth node on either side.
-std::vector<Candidate> local_minima(const Vector& x, const Vector& y) {
-  std::vector<Candidate> out;
-  const int count = int(y.size());
-  for (int i = count - 2; i > 0; --i) {
-    if (!(y[i] <= y[i + 1] && y[i] < y[i - 1])) continue;
-    const double first = (y[i] - y[i + 1]) / (x[i] - x[i + 1]);
-    const double second = (y[i - 1] - y[i]) / (x[i - 1] - x[i]);
-    const double width = x[i - 1] - x[i + 1];
-    const double half = (second - first) / width;
-    const double slope = first + half * (x[i] - x[i + 1]);
-    double cubic = 0;
-    for (int j : {i - 2, i + 2}) {
-      if (j < 0 || j >= count) continue;
-      const int beside = j < i ? i - 1 : i + 1, far = j < i ? i + 1 : i - 1;
-      const double outer = (y[j] - y[beside]) / (x[j] - x[beside]);
-      const double other = (outer - (j < i ? second : first)) / (x[j] - x[i]);
-      cubic = std::max(cubic, std::abs((other - half) / (x[j] - x[far])));
-    }
-    out.push_back({x[i] - slope / (2 * half), y[i] - slope * slope / (4 * half), half, width,
-                   0.05 * cubic * width * width * width});
-  }
-  return out;
-}
-
 // Locate a minimum by narrowing parabolas.
 void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
   double width = 0.5 * minimum.width, low = infinity, half = 0;
@@ -79,6 +47,30 @@ void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
 }
 
 }  // namespace
+
+std::vector<Candidate> local_minima(const Vector& x, const Vector& y) {
+  std::vector<Candidate> out;
+  const int count = int(y.size());
+  for (int i = count - 2; i > 0; --i) {
+    if (!(y[i] <= y[i + 1] && y[i] < y[i - 1])) continue;
+    const double first = (y[i] - y[i + 1]) / (x[i] - x[i + 1]);
+    const double second = (y[i - 1] - y[i]) / (x[i - 1] - x[i]);
+    const double width = x[i - 1] - x[i + 1];
+    const double half = (second - first) / width;
+    const double slope = first + half * (x[i] - x[i + 1]);
+    double cubic = 0;
+    for (int j : {i - 2, i + 2}) {
+      if (j < 0 || j >= count) continue;
+      const int beside = j < i ? i - 1 : i + 1, far = j < i ? i + 1 : i - 1;
+      const double outer = (y[j] - y[beside]) / (x[j] - x[beside]);
+      const double other = (outer - (j < i ? second : first)) / (x[j] - x[i]);
+      cubic = std::max(cubic, std::abs((other - half) / (x[j] - x[far])));
+    }
+    out.push_back({x[i] - slope / (2 * half), y[i] - slope * slope / (4 * half), half, width,
+                   0.05 * cubic * width * width * width});
+  }
+  return out;
+}
 
 int fast_size(int fewest) {
   constexpr int many_nodes = 500;  // from so many on, sizes of the transform lie closer together

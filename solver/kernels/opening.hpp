@@ -36,6 +36,16 @@ double work_of_gaps(const Field& field);
 // Sum weight_j / sin²((θ-φ_j)/2) over the nodes φ_j, from sine and cosine of φ_j/2.
 double sum_pull(double theta, const Vector& sine, const Vector& cosine, const Vector& weight);
 
+// A minimum by the parabola through three nodes.
+struct Candidate {
+  double theta, opening, half;  // half the curvature
+  double width, error;          // distance of the outer nodes; error of the opening
+};
+
+// Find local minima where θ falls; of the minima θ rises. The error is estimated from the cubics
+// through a fourth node on either side.
+std::vector<Candidate> local_minima(const Vector& x, const Vector& y);
+
 struct Minimum {
   double theta, opening, curvature;
   int gap;

@@ -153,7 +153,7 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
     else
       copy_equations(known, source[k], nodes, equations, k);
   }
-  auto [halves, same] = pair_again(known.tree, source);
+  auto [halves, same] = pair_again(known.tree.halves(), source);
   Integers rank(same.size(), 0);
   for (size_t run = 0; run < same.size(); ++run)
     if (same[run] >= 0) rank[run] = known.tree.runs[same[run]].rank;

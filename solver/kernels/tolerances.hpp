@@ -18,12 +18,12 @@ inline constexpr int FEW_REFERENCES = 8, FURTHER_ORDERS = 2;
 
 inline constexpr double LEAST_REACH = 2.0, LONGEST_REACH = 100.0, REACH_GROWTH = 3.0;
 inline constexpr double REACH_CUT = 0.1, REACH_SAFETY = 0.8;
-inline constexpr double MODEL_ERROR = 0.005, MODEL_SHARE = 0.1, MODEL_STEP = 2.0;
+inline constexpr double MODEL_ERROR = 0.005, MODEL_SHARE = 0.1, MODEL_STEP = 1.0;
 inline constexpr double MODEL_SHORT_STEP = 0.1, NEAR_BALANCE = 0.05, FORCES_FELL = 8.0;
 inline constexpr double LONG_CLOSING = 0.45, RUNNING_ENDS = 0.01, RUNNING_LENGTH = 0.5;
 inline constexpr double RUNNING = 0.01, FOLLOWING = 0.2, LONGEST_STEP = 0.05;
 inline constexpr double RAN = 0.05, HELD_BACK = 0.03;
-inline constexpr double SHORT_REACH = 3.0, SHORTEST_REACH = 0.1, FAINT_SADDLE = 0.01;
+inline constexpr double SHORTEST_REACH = 0.1, FAINT_SADDLE = 0.01;
 inline constexpr double SLOWEST = 0.01, RATE_GROWTH = 4.0, FURTHEST_FOLLOWING = 5.0;
 inline constexpr int MODEL_STEPS = 200, TIME_TRIES = 20;
 

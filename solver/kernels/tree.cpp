@@ -8,8 +8,6 @@ namespace adhesis {
 
 namespace {
 
-using Halves = std::vector<std::array<int, 2>>;
-
 // Make the interval of a run of gaps.
 Gap interval(const std::vector<Gap>& gaps, int first, int last) {
   const double left = gaps[first].patch[0], right = gaps[last].patch[1];
@@ -114,18 +112,15 @@ void add(const double* a, double* out, int count) {
 
 }  // namespace
 
-bool eliminate(double* a, int n, double* x, int columns) {
-  bool negative = false;
+void eliminate(double* a, int n, double* x, int columns) {
   for (int k = 0; k < n; ++k) {
     int best = k;
     for (int i = k + 1; i < n; ++i)
       if (std::abs(a[i * n + k]) > std::abs(a[best * n + k])) best = i;
     if (best != k) {
-      negative = !negative;
       std::swap_ranges(a + k * n + k, a + (k + 1) * n, a + best * n + k);
       std::swap_ranges(x + k * columns, x + (k + 1) * columns, x + best * columns);
     }
-    if (a[k * n + k] < 0) negative = !negative;
     const double pivot = 1 / a[k * n + k];
     for (int i = k + 1; i < n; ++i) {
       const double factor = -(a[i * n + k] * pivot);
@@ -138,6 +133,64 @@ bool eliminate(double* a, int n, double* x, int columns) {
       add_scaled(-a[k * n + i], x + i * columns, x + k * columns, columns);
     const double pivot = 1 / a[k * n + k];
     for (int j = 0; j < columns; ++j) x[k * columns + j] *= pivot;
+  }
+}
+
+namespace {
+
+// Bring the pivot of two rows with the largest determinant to row and column k.
+void take_pivot(const std::array<double*, 3>& matrices, int k, int n) {
+  auto [h, r, x] = matrices;
+  int best = k;
+  double most = 0;
+  for (int i = k; i < n; ++i) {
+    const int at = i * n + i;
+    const double det = std::abs(h[at] * r[at] - x[at] * x[at]);
+    if (det > most) {
+      best = i;
+      most = det;
+    }
+  }
+  if (best == k) return;
+  for (double* a : matrices) {
+    std::swap_ranges(a + k * n, a + (k + 1) * n, a + best * n);
+    for (int i = 0; i < n; ++i) std::swap(a[i * n + k], a[i * n + best]);
+  }
+}
+
+}  // namespace
+
+int count_negative(double* h, double* r, int n) {
+  Vector unit(n * n), of_h(n), of_r(n);
+  for (int i = 0; i < n; ++i) unit[i * n + i] = 1;
+  double* x = unit.data();
+  int negative = 0;
+  for (int k = 0; k < n; ++k) {
+    take_pivot({h, r, x}, k, n);
+    const double a = h[k * n + k], b = x[k * n + k], c = r[k * n + k];
+    const double det = a * c - b * b;
+    if (det < 0)
+      negative += 1;
+    else if (a + c < 0)
+      negative += 2;
+    for (int i = k + 1; i < n; ++i) {
+      of_h[i] = x[i * n + k];
+      of_r[i] = x[k * n + i];
+    }
+    const double *h_k = h + k * n, *r_k = r + k * n;
+    for (int i = k + 1; i < n; ++i) {
+      const double own_h = h[i * n + k], own_r = r[i * n + k];
+      const double first = (c * own_h - b * of_h[i]) / det;
+      const double second = (a * of_h[i] - b * own_h) / det;
+      const double third = (c * of_r[i] - b * own_r) / det;
+      const double fourth = (a * own_r - b * of_r[i]) / det;
+      double *h_i = h + i * n, *x_i = x + i * n, *r_i = r + i * n;
+      for (int j = k + 1; j < n; ++j) {
+        h_i[j] -= first * h_k[j] + second * of_h[j];
+        x_i[j] -= first * of_r[j] + second * r_k[j];
+        r_i[j] -= third * of_r[j] + fourth * r_k[j];
+      }
+    }
   }
   return negative;
 }
@@ -159,11 +212,11 @@ Halves pair_runs(int count) {
   return halves;
 }
 
-PairedAgain pair_again(const Tree& known, const Integers& source) {
-  const int count = int(source.size()), before = known.count;
+PairedAgain pair_again(const Halves& known, const Integers& source) {
+  const int count = int(source.size()), before = (int(known.size()) + 1) / 2;
   PairedAgain out{Halves(2 * count - 1, {-1, -1}), Integers(2 * count - 1, -1)};
   std::copy(source.begin(), source.end(), out.same.begin());
-  Integers image(known.run_count(), -1);  // of every run of the known tree
+  Integers image(known.size(), -1);  // of every run of the known tree
   int made = count;
   int first = -1;  // run of the gaps before all known ones
   int free = 0;    // index in the known tree
@@ -188,8 +241,8 @@ PairedAgain pair_again(const Tree& known, const Integers& source) {
       partner = made++;
     }
   }
-  for (int run = before; run < known.run_count(); ++run) {
-    auto [left, right] = known.runs[run].half;
+  for (int run = before; run < int(known.size()); ++run) {
+    auto [left, right] = known[run];
     const int one = image[left], two = image[right];
     image[run] = std::max(one, two);
     if (one >= 0 && two >= 0) {
@@ -198,6 +251,12 @@ PairedAgain pair_again(const Tree& known, const Integers& source) {
       image[run] = made++;
     }
   }
+  return out;
+}
+
+Halves Tree::halves() const {
+  Halves out;
+  for (const Run& run : runs) out.push_back(run.half);
   return out;
 }
 
@@ -295,12 +354,12 @@ void Tree::factor(int index) {
       matrix[i * n + j] = unit[i * n + j] - matrix[i * n + j];
     }
   }
-  const bool odd = eliminate(matrix.data(), n, unit, n);
-  // A whole has no fewer negative eigenvalues than each of its halves; the sign of a pair's
-  // determinant gives whether their number is even. Two that appear together in one pair go
-  // unseen: those of two edges whose forces are equal to rounding.
-  run.negative = std::max(one.negative, two.negative);
-  if ((one.negative + two.negative + run.negative + odd) % 2 == 1) ++run.negative;
+  eliminate(matrix.data(), n, unit, n);
+  // With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
+  // than its halves: Haynsworth's formula, applied twice.
+  Vector own_first(first, first + n * n);
+  run.negative = one.negative + two.negative + n -
+                 count_negative(reflected.data(), own_first.data(), n);
   if (r == 0) return;
   const double *e1 = &interpolation[run.interpolation], *e2 = e1 + n * r;
   double *d1 = &inner_potential[run.interpolation], *d2 = d1 + n * r;

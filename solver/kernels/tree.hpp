@@ -23,6 +23,9 @@
 
 namespace adhesis {
 
+// The halves of every run; of a gap -1.
+using Halves = std::vector<std::array<int, 2>>;
+
 // A run: one gap, or two neighbouring runs.
 struct Run {
   std::array<int, 2> half = {-1, -1};  // of a gap none
@@ -57,11 +60,12 @@ struct Tree {
   Tree() = default;
 
   // Allocate the tree of gaps in runs with these halves; `known` are numbers of charges, or 0.
-  Tree(const Nodes& nodes, const std::vector<std::array<int, 2>>& halves, const Integers& known,
-       double digits);
+  Tree(const Nodes& nodes, const Halves& halves, const Integers& known, double digits);
 
   int size() const { return int(theta.size()); }
   int run_count() const { return int(runs.size()); }
+
+  Halves halves() const;
 
   // Place the charges of a run, and compute its interpolation and kernel.
   void place_charges(int run);
@@ -81,19 +85,24 @@ struct Tree {
 };
 
 // Pair neighbouring runs, level by level.
-std::vector<std::array<int, 2>> pair_runs(int count);
+Halves pair_runs(int count);
 
 struct PairedAgain {
-  std::vector<std::array<int, 2>> halves;
+  Halves halves;
   Integers same;  // index of each run in the known tree, -1 if it has changed
 };
 
 // Pair the runs of gaps most of which are gaps of a known tree: source[k] is the index there, or
 // -1. A gap that is not in the tree replaces one that is gone, if there is one between the same
 // neighbours; else it is paired with the gap before it.
-PairedAgain pair_again(const Tree& known, const Integers& source);
+PairedAgain pair_again(const Halves& known, const Integers& source);
 
-// Solve a y = x for the columns of x, both overwritten; returns whether det a is negative.
-bool eliminate(double* a, int n, double* x, int columns);
+// Solve a y = x for the columns of x, both overwritten.
+void eliminate(double* a, int n, double* x, int columns);
+
+// Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.
+//
+// By pivots of two rows, one of each half: where h r is small they are far from singular.
+int count_negative(double* h, double* r, int n);
 
 }  // namespace adhesis

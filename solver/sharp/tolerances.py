@@ -157,8 +157,9 @@ FORCES_FELL = 8.0
 """Times. Forces that have fallen by more on the way are near a saddle or minimum."""
 MODEL_SHARE = 0.1
 """Of the distance of an opening from its critical value: the error that is allowed in addition."""
-MODEL_STEP = 2.0
-"""Longest steps (0.1 λ_min) of one step through the model: longer ones leap over pinned minima."""
+MODEL_STEP = 1.0
+"""Longest steps (0.05 λ_min) of one step through the model: with four times this length one leaps
+over pinned minima, with twice this length the times of edges that compete are wrong."""
 LONG_CLOSING = 0.45
 """Share of a gap or patch by which each of its edges may shorten it in a long step."""
 MODEL_STEPS = 200
@@ -171,8 +172,6 @@ RUNNING = 0.01
 """C_c. Edges further out of balance run, those nearer to it follow by their tangent."""
 FOLLOWING = 0.2
 """Longest steps; edges that Newton's step of all edges moves further run."""
-SHORT_REACH = 3.0
-"""Longest steps: reach of a step near balance."""
 SHORTEST_REACH = 0.1
 """Longest steps; so short a step is not rejected."""
 FAINT_SADDLE = 0.01

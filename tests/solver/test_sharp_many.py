@@ -12,6 +12,7 @@ from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
 from adhesis.solver.sharp.field.tree_factor import (
+    count_negative,
     downward_pass,
     factor_tree,
     upward_pass,
@@ -328,8 +329,23 @@ def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
         downward_pass(tree, factor, whole_tree(tree), charges, potential)
         difference = np.abs(potential[:, :n] - response.potential[:, :n]).max(axis=1)
         assert (difference < 1e-4 * np.abs(potential[:, :n]).max(axis=1)).all()
-        # far from balance; of two eigenvalues that change sign in one pair none is counted
-        assert (factor.negative[-1] - response.factor.negative[-1]) % 2 == 0
+        assert factor.negative[-1] == response.factor.negative[-1]
+
+
+@pytest.mark.parametrize("negative", range(4))
+def test_negative_eigenvalues_that_appear_together_are_counted(negative):
+    """Of a pair of halves whose first one has none, and all directions of which are alike."""
+    rng = np.random.default_rng(negative)
+    n = 12
+    root, _ = np.linalg.qr(rng.standard_normal((n, n)))
+    softest = np.where(np.arange(n) < negative, 1.5, 0.5)  # of the interaction over the stiffness
+    response = root @ np.diag(np.linspace(1, 2, n)) @ root.T
+    inverse_root = np.linalg.inv(np.linalg.cholesky(response))
+    other, _ = np.linalg.qr(rng.standard_normal((n, n)))
+    interaction = inverse_root.T @ other @ np.diag(softest) @ other.T @ inverse_root
+    both = np.block([[interaction, np.eye(n)], [np.eye(n), response]])
+    assert (np.linalg.eigvalsh(both) < 0).sum() == n - negative
+    assert count_negative(interaction.copy(), response.copy()) == n - negative
 
 
 def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
