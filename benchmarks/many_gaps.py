@@ -12,21 +12,18 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from time import process_time
 from typing import Any
 
 import numpy as np
-from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.response_setup import set_up_response
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 
+from adhesis.solver._kernels import FieldModel, set_up_response, solve_field
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 
 _TOUGHNESS = 1e-3  # critical opening: that of edges which are hardly in balance
 
@@ -61,27 +58,24 @@ def main() -> None:
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
     source = StressSource(profile, given.tolerance)
     separation, digits = 0.5 * profile.h_max * profile.q0, -np.log(given.tolerance)
-    model = FieldModel(FIXED_SEPARATION, float(digits), GAUSS_RULES, source.panels)
+    model = FieldModel(FIXED_SEPARATION, float(digits), source.panels)
     law = EdgeMechanics(source, _TOUGHNESS, given.tolerance).law
     print(f"contact {given.contact}, tolerance {given.tolerance}; times in ms")
     print("  gaps  unknowns    field   per gap (µs)  exponent response     step")
     before = (0, 0.0)
     for count in given.gaps:
         gaps = random_gaps(count, given.contact)
-        orders = choose_orders(map_gaps(gaps), digits, GAUSS_RULES.counts)
-        arguments = (gaps, separation, orders, 2, model)
-        solve_many(*arguments)
-        time, (of, _) = _best(lambda a=arguments: solve_many(*a), given.repetitions)
-        new = (gaps, separation, orders, law, model)
-        set_up, (response, _) = _best(lambda a=new: set_up_response(*a), given.repetitions)
-        given_response = (response, separation, law, FIXED_SEPARATION)
-        step, _ = _best(lambda a=given_response: solve_response(*a), given.repetitions)
+        solve_field(gaps, separation, model)
+        time, of = _best(partial(solve_field, gaps, separation, model), given.repetitions)
+        new = partial(set_up_response, gaps, separation, None, law, model)
+        set_up, response = _best(new, given.repetitions)
+        step, _ = _best(partial(response.solve, separation, law, model), given.repetitions)
         exponent = ""
         if before[0]:
             exponent = f"{np.log(time / before[1]) / np.log(count / before[0]):.2f}"
         before = (count, time)
         print(
-            f"{count:6d} {len(of.nodes.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
+            f"{count:6d} {len(of.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
             f"{exponent:>9s} {1e3 * set_up:8.2f} {1e3 * step:8.2f}"
         )
 

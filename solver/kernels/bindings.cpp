@@ -834,6 +834,7 @@ void bind_parts(nb::module_& m) {
 }  // namespace adhesis
 
 NB_MODULE(_kernels, m) {
+  nb::set_leak_warnings(false);  // objects of a module live until the process ends
   m.doc() = "Kernels of the methods sharp and grid.";
   m.attr("COMPILER") = ADHESIS_COMPILER;
   adhesis::bind_model(m);

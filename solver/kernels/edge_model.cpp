@@ -106,15 +106,14 @@ void EdgeModel::advance(const Vector& step) {
   follow_lengths(step);
   for (int e = 0; e < count; ++e) {
     MovingEdge& edge = edges[e];
-    edge.opening += edge.own * step[e] - edge.half_plane +
+    const double end = edge.theta + outwards(edge.edge) * 0.5 * step[e];
+    const double half_plane = half_plane_opening(end, edge.edge % 2, panels_).value;
+    edge.opening += edge.own * step[e] + half_plane - edge.half_plane +
                     dot(&coupling_.values[e * count], by_motion.data(), count);
     edge.motion += step[e];
   }
   follow_lengths(step);
-  for (MovingEdge& edge : edges) {
-    evaluate(edge);
-    edge.opening += edge.half_plane;
-  }
+  for (MovingEdge& edge : edges) evaluate(edge);
 }
 
 void EdgeModel::follow_lengths(const Vector& step) {

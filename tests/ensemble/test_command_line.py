@@ -156,7 +156,6 @@ BAD = {
         ("--to text", "--to is text: "),
         ("--to text/below", "--to is text/below: "),
     ],
-    "warm": [("--own 3", "unrecognized arguments: 3")],
     "doctor": [
         ("--in none", "--in is none: it must be a folder that can be written"),
         ("--in text", "--in is text: it must be a folder"),

@@ -43,7 +43,6 @@ WORDS: dict[str, tuple[object, ...]] = {
     "sample": ("s.csv",),
     "validate": ("--method", "grid"),
     "bench": ("--quick", "--to", "bench"),
-    "warm": (),
     "doctor": (),
     "completion": ("bash",),
 }

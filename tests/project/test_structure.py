@@ -63,7 +63,7 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     lines = (line.split() for line in done.stdout.splitlines() if line.startswith("loaded "))
     loaded = {stage: set(names) for _, stage, *names in lines}
-    numeric = {"scipy", "numba", "llvmlite", "matplotlib", "mpi4py"}
+    numeric = {"scipy", "matplotlib", "mpi4py"}
     assert loaded["help"] & (numeric | {"numpy", "h5py", "pandas", "rich"}) == set()
     assert loaded["adhesis"] & (numeric | {"h5py", "xarray", "rich"}) == set()
     assert loaded["nothing_to_do"] & numeric == set()

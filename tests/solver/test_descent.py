@@ -6,31 +6,20 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from adhesis.solver.sharp.descent.edge_model import (
-    EdgeModel,
-    advance,
-    evaluate,
-    follow_lengths,
-    model_about,
-    model_forces,
-    model_hessian,
-)
-from adhesis.solver.sharp.descent.implicit_flow import (
-    AT_REST,
-    OUTGROWN,
-    STEP_LIMIT,
-    VANISHED,
-    Descent,
-    Running,
-    descend,
-)
-from adhesis.solver.sharp.descent.model_flow import ModelFlow, flow_through, implicit_step
-from adhesis.solver.sharp.descent.step_size import model_error, next_reach
-from adhesis.solver.sharp.field.cholesky import padded
-from adhesis.solver.sharp.field.solution import Solution
 from scipy.integrate import solve_ivp
 
 from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from adhesis.solver._kernels import (
+    Descent,
+    DescentEvent,
+    EdgeLaw,
+    EdgeModel,
+    ModelFlow,
+    Running,
+    implicit_step,
+    model_error,
+    next_reach,
+)
 from adhesis.solver.sharp.descent.saddle import leaving_step
 from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.errors import NoState
@@ -43,7 +32,7 @@ from adhesis.solver.sharp.tolerances import (
     REACH_CUT,
     REACH_GROWTH,
 )
-from tests.support.dense import dense_tangent, solve_densely
+from tests.support.dense import DenseSolution, dense_tangent, solve_densely
 
 SOLID = HalfSpace(1e6, 0.5)
 
@@ -73,12 +62,12 @@ class Solved(NamedTuple):
     gaps: np.ndarray
     separation: float
     edges: EdgeMechanics
-    solution: Solution
+    solution: DenseSolution
 
     @property
     def residual(self) -> np.ndarray:
         """C - C_c."""
-        return imbalance(self.solution, self.edges.law, self.edges.model.panels)[0]
+        return imbalance(self.solution.opening, self.gaps, self.edges.law, self.edges.model.panels)
 
     @property
     def force(self) -> np.ndarray:
@@ -108,16 +97,13 @@ class Solved(NamedTuple):
     def model(self) -> EdgeModel:
         """Make the model about the edges."""
         law, panels, every = self.edges.law, self.edges.model.panels, np.arange(self.gaps.size)
-        return model_about(every, self.gaps, self.residual, self.tangent, law, panels)
+        return EdgeModel(every, self.gaps, self.residual, self.tangent, law, panels)
 
     def model_openings(self, motion: np.ndarray, steps: int = 400) -> np.ndarray:
         """Openings of the model after outward motions in many equal steps."""
-        law, panels = self.edges.law, self.edges.model.panels
         model = self.model()
         for _ in range(steps):
-            advance(model, motion / steps)
-            evaluate(model, law, panels)
-        np.testing.assert_allclose(model.motion, motion)
+            model.advance(motion / steps)
         return model.opening
 
 
@@ -164,7 +150,7 @@ def test_neighbours_interact_by_the_length_between_them(rough, narrow):
     motion = np.zeros(10)
     motion[f] = 0.02 * WAVE
     there, model, first = here.moved(motion).model(), here.model(), here.model()
-    follow_lengths(model, motion)
+    model.advance(motion)
     coupling = there.coupling[e, f] - first.coupling[e, f]
     assert model.coupling[e, f] - first.coupling[e, f] == pytest.approx(coupling, rel=0.15)
     own = there.own[e] - first.own[e]
@@ -186,15 +172,12 @@ def test_openings_beside_a_narrow_patch_or_gap(rough, narrow, motion):
 def test_the_model_is_that_of_the_tangent_about_its_edges(rough):
     """Its forces are those of the field, and its Hessian their derivative, from the tangent."""
     opening, model = rough.solution.opening, rough.model()
-    edges = opening.size
-    matrix, force = np.empty((edges, edges)), np.empty(edges)
-    model_hessian(model, matrix)
-    model_forces(model, force)
-    np.testing.assert_allclose(force, rough.force, rtol=1e-12)
+    edges, matrix = opening.size, model.hessian
+    np.testing.assert_allclose(model.forces, rough.force, rtol=1e-12)
     np.testing.assert_allclose(matrix, matrix.T)
     # C² - C_c² from C - C_c: 2 C dC - 2 C_c dC_c
     by_tangent = 2 * opening[:, None] * rough.tangent
-    _, drift = imbalance(rough.solution, rough.edges.law, rough.edges.model.panels)
+    _, drift = rough.edges.law.critical_openings(rough.gaps.ravel(), rough.edges.model.panels)
     drift = drift * np.tile([1, -1], len(rough.gaps))
     by_tangent[np.diag_indices(edges)] += 2 * rough.residual * drift
     is_open = opening > 0  # edges beside an overlap act on no others
@@ -211,7 +194,8 @@ def exact_flow_through(rough: Solved, limit: np.ndarray) -> np.ndarray:
     """Motions when the first edge is at its limit, from ``scipy.integrate.solve_ivp``."""
     law, panels = rough.edges.law, rough.edges.model.panels
     opening, edges = rough.solution.opening, rough.gaps.size
-    start = rough.model()
+    start, places = rough.model(), rough.gaps.ravel()
+    sides = np.tile([1.0, -1.0], edges // 2)
     grows = np.tile([-1, 1], edges // 2)  # the gap or patch after an edge, when contact grows
     after = np.roll(np.arange(edges), -1)
 
@@ -220,20 +204,21 @@ def exact_flow_through(rough: Solved, limit: np.ndarray) -> np.ndarray:
 
     def rates(_: float, y: np.ndarray) -> np.ndarray:
         motion, now, own = y.reshape(3, edges)
-        model = rough.model()._replace(own=own)
-        model.theta[:] += motion * np.tile([1.0, -1.0], edges // 2)
-        length = lengths(model.theta)
+        theta, coupling = places + motion * sides, start.coupling
+        length = lengths(theta)
         for e, f in enumerate(after):
-            model.coupling[[e, f], [f, e]] *= lengths(start.theta)[e] / length[e]
-        evaluate(model, law, panels)
-        speed = model.critical**2 - now * np.abs(now)
+            coupling[[e, f], [f, e]] *= lengths(places)[e] / length[e]
+        critical, _ = law.critical_openings(theta, panels)
+        slopes = np.stack([panels.half_plane_opening(theta, side)[1] for side in (0, 1)])
+        rate = own + sides * slopes[np.arange(edges) % 2, np.arange(edges)]
+        speed = critical**2 - now * np.abs(now)
         turned = np.zeros(edges)
         for e, f in enumerate(after):
             for one, other in ((e, f), (f, e)):
-                coupling = model.coupling[one, other]
-                mixed = coupling**2 * now[one] - grows[e] * coupling / length[e] * now[other]
+                mutual = coupling[one, other]
+                mixed = mutual**2 * now[one] - grows[e] * mutual / length[e] * now[other]
                 turned[one] += mixed * (speed[other] if grows[e] < 0 else speed[e] + speed[f])
-        opened = model.rate * speed + model.coupling @ (now * speed)
+        opened = rate * speed + coupling @ (now * speed)
         return np.concatenate([speed, opened, turned])
 
     def at_limit(_: float, y: np.ndarray) -> float:
@@ -255,11 +240,11 @@ def test_steps_through_the_model_converge_to_its_flow(rough):
     limit = np.full(10, WAVE)
     exact = exact_flow_through(rough, limit)
     law = rough.edges.law
-    panels = rough.edges.model.panels
     errors = []
     for share in (1.0, 0.5, 0.25):
-        finer = law._replace(longest_step=share * law.longest_step)
-        flow = flow_through(rough.model(), limit, False, True, 0.0, finer, panels)
+        finer = EdgeLaw(law)
+        finer.longest_step *= share
+        flow = rough.model().flow(limit, False, True, 0.0, finer)
         assert np.diff(flow.lengths, prepend=0.0).max() <= MODEL_STEP * finer.longest_step * 1.001
         assert np.abs(flow.motion).max() == pytest.approx(WAVE)
         errors.append(np.abs(flow.motion - exact).max() / WAVE)
@@ -274,23 +259,20 @@ def test_an_implicit_step_is_downhill_and_within_its_length(seed, equal_speeds):
     count = int(rng.integers(1, 7))
     root = rng.normal(size=(count, count))
     matrix = root + root.T + np.diag(10.0 ** rng.uniform(0, 1.5, count))  # stiff, some unstable
-    force, step = rng.normal(size=count), np.empty(count)
-    factor = np.empty((count, padded(count)))
-    size, _ = implicit_step(matrix, force, 0.01, equal_speeds, factor, step)
-    assert size == pytest.approx(np.abs(step).max())
-    assert 0 < size <= 0.01 * (1 + 1e-12)
+    force = rng.normal(size=count)
+    step = implicit_step(matrix, force, 0.01, equal_speeds)
+    assert 0 < np.abs(step).max() <= 0.01 * (1 + 1e-12)
     assert force @ step > 0
     definite = root @ root.T + np.eye(count)
     # no limit in reach: Newton's step
-    implicit_step(definite, force, 1e9, equal_speeds, factor, step)
+    step = implicit_step(definite, force, 1e9, equal_speeds)
     np.testing.assert_allclose(step, np.linalg.solve(definite, force), rtol=1e-6)
 
 
 def test_with_equal_speeds_edges_move_alike_whatever_their_forces():
-    force, step = np.array([1.0, -0.3, 0.001]), np.empty(3)
+    force = np.array([1.0, -0.3, 0.001])
     for equal_speeds, wanted in ((True, [0.1, -0.1, 0.01]), (False, [0.1, -0.03, 0.0001])):
-        factor = np.empty((3, padded(3)))
-        implicit_step(np.zeros((3, 3)), force, 0.1, equal_speeds, factor, step)
+        step = implicit_step(np.zeros((3, 3)), force, 0.1, equal_speeds)
         np.testing.assert_allclose(step, wanted)
 
 
@@ -306,7 +288,7 @@ def test_openings_of_the_model_may_be_wrong_by_more_far_from_balance(rough):
         count = len(unbalance)
         lengths = np.arange(1.0, 1 + count) / count
         residuals = law.critical * np.transpose([unbalance, np.ones(count)])
-        flow = ModelFlow(np.ones(2), opened, lengths, residuals, False)
+        flow = ModelFlow(np.ones(2), opened, lengths, residuals)
         return float(model_error(flow, rough.residual[:2], edges, rough.gaps, law, panels))
 
     assert error(wrong, 0.0) > 1 > error(wrong, 1.0)
@@ -338,12 +320,14 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     """Descend on a single wave of amplitude 1 µm, at a separation in amplitudes."""
     edges, ends = method.edges, np.array(gaps, dtype=float)
     prescribed = separation * 2 * np.pi * 1e-3
-    none = Running(np.zeros(ends.size, dtype=bool), ends, FIRST_REACH)
+    none = Running(ends, FIRST_REACH)
     while True:
-        near = edges.responses.near(ends, prescribed, np.empty(0, dtype=np.int64))
+        near = edges.responses.near(ends, prescribed, None)
         assert near is not None
-        found = descend(near.response, ends, prescribed, most, False, none, edges.law, edges.model)
-        if found.event != OUTGROWN:
+        found = near.response.descend(
+            ends, prescribed, most, False, none, edges.law, edges.model
+        )
+        if found.event != DescentEvent.OUTGROWN:
             return found
         near.is_outgrown, ends = True, found.gaps
 
@@ -354,7 +338,7 @@ SLIVER = [[0.05, 2 * np.pi - 0.05]]
 
 def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     found = run(wave, NARROW, 0.5, 1000)
-    assert found.event == AT_REST
+    assert found.event == DescentEvent.AT_REST
     point = wave.edges.equilibrium(found.gaps, 0.5 * 2 * np.pi * 1e-3, 0.05 * wave.edges.wave)
     assert point is not None
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
@@ -362,13 +346,13 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
 
 def test_a_patch_vanishes_where_the_surfaces_are_far_apart(wave):
     found = run(wave, SLIVER, 5.0, 1000)
-    assert found.event == VANISHED
+    assert found.event == DescentEvent.VANISHED
     patch = found.gaps[0, 0] + 2 * np.pi - found.gaps[0, 1]
     assert 0 < patch < wave.edges.law.smallest
 
 
 def test_a_descent_ends_at_its_limit_of_steps_and_where_there_is_no_field(wave):
     found = run(wave, NARROW, 0.5, 3)
-    assert (found.event, found.steps) == (STEP_LIMIT, 3)
+    assert (found.event, found.steps) == (DescentEvent.STEP_LIMIT, 3)
     with pytest.raises(NoState, match="no field"):
         wave.edges.relax(np.array([[0.2, np.nan]]), 3e-3, 0.1)

@@ -55,7 +55,7 @@ def test_a_race_ends_where_gradient_flow_does(share):
     It gave a loss of 5.178224 with jumps located to 5e-5 h_max. The loss is that at accuracy 1e-6.
     """
     method = SharpMethod(race())
-    method.edges.law = method.edges.law._replace(longest_step=share * method.edges.law.longest_step)
+    method.edges.law.longest_step *= share
     result = run_loop(method, max_penetration=0.8, load_steps=20)
     assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=1e-4)
     assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
@@ -83,8 +83,7 @@ def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ra
 
     def loss_with(share: float) -> float:
         method = SharpMethod(Problem(profile, SOLID, gamma))
-        law = method.edges.law
-        method.edges.law = law._replace(longest_step=share * law.longest_step)
+        method.edges.law.longest_step *= share
         return run_loop(method, max_penetration=0.9, load_steps=20).loss
 
     losses = [loss_with(share) for share in (2.0, 1.0, 0.25)]
@@ -151,7 +150,7 @@ def test_nothing_races_where_the_rules_agree():
 def test_equal_speeds_end_elsewhere():
     """The comparison rule reaches contact 0.6011 from the same first touch."""
     method = SharpMethod(race())
-    method.edges.law = method.edges.law._replace(longest_step=0.2 * method.edges.law.longest_step)
+    method.edges.law.longest_step *= 0.2
     start, touches = method.nucleation.first_touch()
     gaps = method.nucleation.insert_seeds(np.empty((0, 2)), touches)
     found = gaps

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from adhesis.solver.precompile import small_problem
 from scipy.linalg import cython_lapack  # noqa: F401  # a library of its own
 from threadpoolctl import ThreadpoolController
 
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.registry import make_method
 from adhesis.solver.sharp.mechanics import EdgeMechanics
+from tests.support.scenes import small_problem
 
 
 def threads() -> set[int]:

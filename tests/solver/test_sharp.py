@@ -101,8 +101,7 @@ def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     losses = []
     for accuracy, share in ((1e-3, 1.0), (1e-5, 1.0), (1e-3, 0.4)):
         method = SharpMethod(Problem(profile, HALF_SPACE, gamma), accuracy=accuracy)
-        longest = share * method.edges.law.longest_step
-        method.edges.law = method.edges.law._replace(longest_step=longest)
+        method.edges.law.longest_step *= share
         losses.append(run_loop(method, max_penetration=0.9, load_steps=20).loss)
     assert losses == pytest.approx([losses[1]] * 3, rel=1e-3)
 

@@ -2,65 +2,60 @@
 
 from __future__ import annotations
 
-import numpy as np
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.solution import FieldModel, MeanResponse, Solution, edge_openings
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+from typing import NamedTuple
 
-from adhesis.solver.model.profile import Array
+import numpy as np
+
+from adhesis.solver._kernels import FieldModel, solve_field
+from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 
 _STEP = 1e-6  # of an edge in θ, to both sides
 
 
+class DenseSolution(NamedTuple):
+    """p, q0 s, Xᵀ (B + G)⁻¹ X, and C at each edge."""
+
+    pressure: float
+    separation: float
+    unit_mean: float
+    opening: Array
+
+
 def solve_densely(
     gaps: Array, prescribed: float, model: FieldModel, orders: Integers | None = None
-) -> Solution:
+) -> DenseSolution:
     """Solve (1) of ``gap_field``, the kernel between gaps written as it stands there."""
-    if orders is None:
-        orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-    tree, _ = solve_many(gaps, prescribed, orders, 2, model)
-    nodes, equations = tree.nodes, tree.equations  # of each gap by itself
-    half = 0.5 * (nodes.theta[:, None] - nodes.theta)
+    tree = solve_field(gaps, prescribed, model, orders)
+    theta, width, offset = tree.theta, tree.weight, tree.offset  # of each gap by itself
+    half = 0.5 * (theta[:, None] - theta)
     np.fill_diagonal(half, 1.0)
-    matrix = -nodes.weight[:, None] * nodes.weight / (4 * np.pi * np.sin(half) ** 2)
+    matrix = -width[:, None] * width / (4 * np.pi * np.sin(half) ** 2)
     for k in range(len(gaps)):
-        own = slice(nodes.offset[k], nodes.offset[k + 1])
-        matrix[own, own] = equations.matrix[own, : own.stop - own.start]
-    solved = np.linalg.solve(matrix, equations.load)
-    load_mean, unit_mean = equations.load[:, 1] @ solved[:, :2]
-    weight, compliance = model.device
+        own = slice(offset[k], offset[k + 1])
+        matrix[own, own] = tree.block(k)
+    solved = np.linalg.solve(matrix, np.stack([tree.load, width], axis=1))
+    load_mean, unit_mean = (float(mean) for mean in width @ solved)
+    weight, compliance = model.device.separation_weight, model.device.compliance
     resistance = weight * unit_mean + 2 * np.pi * compliance
     pressure = -(2 * np.pi * prescribed + weight * load_mean) / resistance
-    f = -solved[:, 0] - pressure * solved[:, 1]
-    opening = edge_openings(f[:, None], nodes, GAUSS_RULES)[:, 0]
-    opening -= (np.sqrt(2 * nodes.slope) * equations.end_terms[:, :, 0]).ravel()
-    return Solution(
-        nodes=nodes,
-        equations=equations,
-        solved=solved,
-        mean=MeanResponse(weight, unit_mean, resistance),
-        separation=-(load_mean + pressure * unit_mean) / (2 * np.pi),
-        pressure=pressure,
-        scaled_opening=f,
-        opening=opening,
-    )
+    opening = tree.edge_openings(-solved[:, 0] - pressure * solved[:, 1])
+    separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
+    return DenseSolution(pressure, separation, unit_mean, opening)
 
 
 def dense_residual(
     gaps: Array, prescribed: float, edges: EdgeMechanics, orders: Integers | None = None
 ) -> Array:
     """Compute C_e - C_c at all edges."""
-    of = solve_densely(gaps, prescribed, edges.model, orders)
-    residual: Array = imbalance(of, edges.law, edges.model.panels)[0]
-    return residual
+    opening = solve_densely(gaps, prescribed, edges.model, orders).opening
+    return imbalance(opening, gaps, edges.law, edges.model.panels)
 
 
 def dense_tangent(gaps: Array, prescribed: float, edges: EdgeMechanics) -> Array:
     """Compute ∂(C_e - C_c)/∂n_f between all edges, by central differences."""
-    columns, orders = [], choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
+    columns, orders = [], solve_field(gaps, prescribed, edges.model).orders
     for f in range(gaps.size):
         way = np.zeros(gaps.size)
         way[f] = _STEP * (1 - 2 * (f % 2))

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.solution import (
-    FIXED_SEPARATION,
-    FieldModel,
-    LoadingDevice,
-)
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 
+from adhesis.solver._kernels import FieldModel, LoadingDevice, solve_field
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 
 
 def solved_field(
@@ -25,9 +19,7 @@ def solved_field(
     device: LoadingDevice = FIXED_SEPARATION,
 ) -> GapField:
     """Solve the field of these gaps to a relative accuracy."""
-    model = FieldModel(device, float(-np.log(tolerance)), GAUSS_RULES, source.panels)
-    orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+    model = FieldModel(device, float(-np.log(tolerance)), source.panels)
     return GapField(
-        source, gaps, prescribed, tolerance, device,
-        lambda: solve_many(gaps, prescribed, orders, 2, model)[0],
-    )  # fmt: skip
+        source, gaps, prescribed, tolerance, device, lambda: solve_field(gaps, prescribed, model)
+    )
