@@ -191,7 +191,7 @@ def condense_gap(out: LinearResponse, k: int, rules: GaussRules) -> None:
     tangent, pressure = out.tangent[2 * k : 2 * k + 2], out.about_pressure[k]
     held, here = out.held[2 * k : 2 * k + 2], out.here[2 * k : 2 * k + 2]
     compliance[:] = 0.0
-    negative = 0
+    negative, nearest = 0, 1.0
     if not (held[0] or held[1]):
         a, b = tangent[0, 0], tangent[0, 1]
         c, d = tangent[1, 0], tangent[1, 1]
@@ -201,12 +201,13 @@ def condense_gap(out: LinearResponse, k: int, rules: GaussRules) -> None:
         negative = 1
         if not det < 0:
             negative = 2 if a + d < 0 else 0
+        nearest = abs(det) / (abs(a * d) + abs(b * c))
     else:
         for side in range(2):
             if not held[side]:
                 compliance[side, side] = 1 / tangent[side, side]
                 negative = 1 if tangent[side, side] < 0 else 0
-    out.factor.negative[k] = negative
+    out.factor.negative[k], out.factor.nearest[k] = negative, nearest
     pull0 = -out.residual[2 * k] - tangent[0, 0] * here[0] - tangent[0, 1] * here[1]
     pull1 = -out.residual[2 * k + 1] - tangent[1, 0] * here[0] - tangent[1, 1] * here[1]
     by_pressure, by_potential = out.opening_by_pressure, out.opening_by_potential

@@ -226,7 +226,8 @@ def _update_softness(
 
     That is the compliance with which edges follow their openings, over that of their gap by itself
     or by roughness of the shortest wave, at the prescribed d: edges by p, times how much more p
-    changes than with all edges held (and without the potentials of other gaps).
+    changes than with all edges held (and without the potentials of other gaps). Modes that p does
+    not excite, as of symmetric states, show in how near a gap's 2×2 or a pair of runs is to singular.
     """
     count, softness = response.softness.shape[0], response.softness
     held = 0.0
@@ -243,6 +244,12 @@ def _update_softness(
         for beside in range(-1, 2):
             k = (e // 2 + beside) % count
             softness[k] = max(softness[k], soft)
+    nearest, ranges = response.factor.nearest, response.tree.gap_range
+    for run in range(nearest.shape[0]):
+        soft = 1 / (SOFT_EDGE * nearest[run])
+        if soft > 1:
+            for k in range(ranges[run, 0], ranges[run, 1] + 1):
+                softness[k % count] = max(softness[k % count], soft)
 
 
 @compiled

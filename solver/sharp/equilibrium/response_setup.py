@@ -179,6 +179,7 @@ def _copy_run(known: LinearResponse, old: int, out: LinearResponse, new: int) ->
     theirs, own = run_span(source.response_start, old), run_span(tree.response_start, new)
     _copy(known.factor.response, theirs, out.factor.response, own)
     out.factor.negative[new] = known.factor.negative[old]
+    out.factor.nearest[new] = known.factor.nearest[old]
     theirs, own = run_span(source.pair_start, old), run_span(tree.pair_start, new)
     _copy(known.factor.pair_inverse, theirs, out.factor.pair_inverse, own)
     theirs, own = run_span(source.kernel_start, old), run_span(tree.kernel_start, new)

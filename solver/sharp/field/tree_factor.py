@@ -36,12 +36,16 @@ class TreeFactor(NamedTuple):
         D of both halves of every pair: their potentials by a potential outside.
     negative : int array, shape (runs,)
         Number of negative eigenvalues of every run; the whole is the last one.
+    nearest : array, shape (runs,)
+        Distance of each gap's 2×2, or of the pair of a run's halves, from singular: 1 without
+        interaction.
     """
 
     response: Array
     pair_inverse: Array
     inner_potential: Array
     negative: Integers
+    nearest: Array
 
 
 class Charges(NamedTuple):
@@ -92,19 +96,21 @@ def eliminate(a: Array, x: Array) -> None:
 
 
 @compiled_sums
-def count_negative(h: Array, r: Array) -> int:
+def count_negative(h: Array, r: Array) -> tuple[int, float]:
     """Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric and overwritten.
 
-    By pivots of two rows, one of each half: where h r is small they are far from singular.
+    By pivots of two rows, one of each half: where h r is small they are far from singular. Returns
+    also the least of their determinants, without sign: about the least of those of 1 - h r.
     """
     n = h.shape[0]
     x, columns = np.eye(n), np.empty((2, n))
     of_h, of_r = columns[0], columns[1]
-    negative = 0
+    negative, least = 0, 1.0
     for k in range(n):
         _take_pivot(h, r, x, k)
         a, b, c = h[k, k], x[k, k], r[k, k]
         det = a * c - b * b
+        least = min(least, abs(det))
         if det < 0:
             negative += 1
         elif a + c < 0:
@@ -120,7 +126,7 @@ def count_negative(h: Array, r: Array) -> int:
                 h[i, j] -= first * h[k, j] + second * of_h[j]
                 x[i, j] -= first * of_r[j] + second * r[k, j]
                 r[i, j] -= third * of_r[j] + fourth * r[k, j]
-    return negative
+    return negative, least
 
 
 @compiled
@@ -149,6 +155,7 @@ def empty_factor(tree: Tree) -> TreeFactor:
         pair_inverse=np.empty(tree.pair_start[runs]),
         inner_potential=np.empty(tree.interpolation_start[runs]),
         negative=np.zeros(runs, dtype=np.int64),
+        nearest=np.ones(runs),
     )
 
 
@@ -193,8 +200,8 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
         inverse[i, i] = 1.0
         matrix[i, i] += 1.0
     eliminate(matrix, inverse)
-    more = n - count_negative(reflected, first.copy())
-    negative[run] = negative[one] + negative[two] + more
+    counted, factor.nearest[run] = count_negative(reflected, first.copy())
+    negative[run] = negative[one] + negative[two] + n - counted
     if r == 0:
         return
     interpolation = tree.interpolation[run_span(tree.interpolation_start, run)].reshape(n + m, r)
