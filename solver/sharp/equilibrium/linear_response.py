@@ -227,7 +227,7 @@ def _update_softness(
     That is the compliance with which edges follow their openings, over that of their gap by itself
     or by roughness of the shortest wave, at the prescribed d: edges by p, times how much more p
     changes than with all edges held (and without the potentials of other gaps). Modes that p does
-    not excite, as of symmetric states, show in how near a gap's 2×2 or a pair of runs is to singular.
+    not excite, as of symmetric states, show in how near a 2×2 or a pair of runs is to singular.
     """
     count, softness = response.softness.shape[0], response.softness
     held = 0.0
