@@ -428,7 +428,7 @@ void bind_response(nb::module_& m) {
                      return hand_over(std::move(out), {2, size_t(r.nodes.size())});
                    }, new_array,
                    "Potentials of the last solution, without p and by a unit of p.")
-      .def_prop_ro("negative", [](const LinearResponse& r) { return r.tree.runs.back().negative; },
+      .def_prop_ro("negative", [](const LinearResponse& r) { return r.tree.runs.back().count.negative; },
                    "Number of negative eigenvalues.")
       .def("update",
            [](const LinearResponse& known, const Array& gaps, double prescribed,
@@ -694,7 +694,7 @@ void bind_parts(nb::module_& m) {
   m.def("count_negative",
         [](const Array& h, const Array& r) {
           Matrix one = matrix_of(h), two = matrix_of(r);
-          return count_negative(one.values.data(), two.values.data(), one.n);
+          return count_negative(one.values.data(), two.values.data(), one.n).negative;
         },
         "h"_a, "r"_a, "Count the negative eigenvalues of [[h, 1], [1, r]].");
   m.def("solve_definite",
@@ -734,7 +734,7 @@ void bind_parts(nb::module_& m) {
           std::copy_n(known.stretch.begin(), n, tree.stretch.begin());
           for (int k = 0; k < count; ++k) {
             const int m = response.nodes.size_of(k);
-            tree.runs[k].negative = known.runs[k].negative;
+            tree.runs[k].count = known.runs[k].count;
             std::copy_n(&known.response[known.runs[k].response], m * m,
                         &tree.response[tree.runs[k].response]);
           }
@@ -751,7 +751,7 @@ void bind_parts(nb::module_& m) {
             tree.pass_down(charges, potential);
             found.insert(found.end(), potential.begin(), potential.begin() + n);
           }
-          return std::pair(hand_over(std::move(found), {2, size_t(n)}), tree.runs.back().negative);
+          return std::pair(hand_over(std::move(found), {2, size_t(n)}), tree.runs.back().count.negative);
         },
         "response"_a, "digits"_a,
         "Solve for the potentials of a response on a tree that is built anew, and count its "

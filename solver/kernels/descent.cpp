@@ -27,7 +27,7 @@ double force_at(const Vector& residual, const Integers& edges, const Vector& end
 bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolution& now) {
   std::array<int, 2> range = {0, response.gap_count() - 1};
   for (const Run& run : response.tree.runs) {
-    if (run.negative > 0) {
+    if (run.count.negative > 0) {
       range = run.range;
       break;
     }

@@ -135,8 +135,9 @@ void LinearResponse::condense(int k) {
   const int m = nodes.size_of(k), first = nodes.offset[k];
   const double pressure = about_pressure[k];
   Edge &left = edges[2 * k], &right = edges[2 * k + 1];
-  int& negative = tree.runs[k].negative;
+  auto& [negative, nearest] = tree.runs[k].count;
   negative = 0;
+  nearest = 1;
   left.compliance = right.compliance = {0, 0};
   if (!(left.held || right.held)) {
     const auto [a, b] = left.tangent;
@@ -146,6 +147,7 @@ void LinearResponse::condense(int k) {
     right.compliance = {-c / det, a / det};
     negative = 1;
     if (!(det < 0)) negative = a + d < 0 ? 2 : 0;
+    nearest = std::abs(det) / (std::abs(a * d) + std::abs(b * c));
   } else {
     for (int side = 0; side < 2; ++side) {
       Edge& edge = edges[2 * k + side];

@@ -51,7 +51,7 @@ ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
   out.separation = prescribed;
   if (device.compliance != 0) out.separation = (mean[0] + out.pressure * mean[1]) / (2 * pi);
   out.slope = weight != 0 ? rate : rate * mean[1] / (2 * pi);
-  const int negative = tree.runs.back().negative;
+  const int negative = tree.runs.back().count.negative;
   out.stable = (negative == 0 && by_pressure < 0) || (negative == 1 && by_pressure > 0);
   update_softness(motion, by_pressure, law, device);
   out.by_pressure = motion[1];
@@ -66,7 +66,8 @@ void LinearResponse::update_softness(const Pair& motion, double by_pressure, con
                                      const Device& device) {
   // the compliance with which edges follow their openings, over that of their gap by itself or by
   // roughness of the shortest wave, at the prescribed d: edges by p, times how much more p changes
-  // than with all edges held
+  // than with all edges held. Modes that p does not excite, as of symmetric states, show in how near
+  // a 2×2 or a pair of runs is to singular.
   const int count = gap_count();
   double held_mean = dot(tree.stretch.data(), held_charge[1].data(), nodes.size());
   held_mean = device.separation_weight * held_mean - 2 * pi * device.compliance;
@@ -81,6 +82,11 @@ void LinearResponse::update_softness(const Pair& motion, double by_pressure, con
       double& of_gap = softness[(e / 2 + beside) % count];
       of_gap = std::max(of_gap, soft);
     }
+  }
+  for (const Run& run : tree.runs) {
+    const double soft = 1 / (SOFT_EDGE * run.count.nearest);
+    if (!(soft > 1)) continue;
+    for (int k = run.range[0]; k <= run.range[1]; ++k) softness[k] = std::max(softness[k], soft);
   }
 }
 

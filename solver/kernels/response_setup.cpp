@@ -63,7 +63,7 @@ void copy_run(const LinearResponse& known, int old, LinearResponse& out, int ind
   copy_part(source.theta, from.node, tree.theta, to.node, rank);
   copy_part(source.stretch, from.node, tree.stretch, to.node, rank);
   copy_part(source.response, from.response, tree.response, to.response, rank * rank);
-  to.negative = from.negative;
+  to.count = from.count;
   for (int column = 0; column < 2; ++column)
     copy_part(known.charges[column].isolated, from.node, out.charges[column].isolated, to.node,
               rank);

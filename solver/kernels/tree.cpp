@@ -160,19 +160,20 @@ void take_pivot(const std::array<double*, 3>& matrices, int k, int n) {
 
 }  // namespace
 
-int count_negative(double* h, double* r, int n) {
+NegativeCount count_negative(double* h, double* r, int n) {
   Vector unit(n * n), of_h(n), of_r(n);
   for (int i = 0; i < n; ++i) unit[i * n + i] = 1;
   double* x = unit.data();
-  int negative = 0;
+  NegativeCount out;
   for (int k = 0; k < n; ++k) {
     take_pivot({h, r, x}, k, n);
     const double a = h[k * n + k], b = x[k * n + k], c = r[k * n + k];
     const double det = a * c - b * b;
+    out.nearest = std::min(out.nearest, std::abs(det));
     if (det < 0)
-      negative += 1;
+      out.negative += 1;
     else if (a + c < 0)
-      negative += 2;
+      out.negative += 2;
     for (int i = k + 1; i < n; ++i) {
       of_h[i] = x[i * n + k];
       of_r[i] = x[k * n + i];
@@ -192,7 +193,7 @@ int count_negative(double* h, double* r, int n) {
       }
     }
   }
-  return negative;
+  return out;
 }
 
 Halves pair_runs(int count) {
@@ -267,7 +268,7 @@ Tree::Tree(const Nodes& nodes, const Halves& halves, const Integers& known, doub
     Run& run = runs[i];
     run = end;
     run.half = halves[i];
-    run.negative = 0;
+    run.count = {};
     int one = 0, two = 0;
     if (i < count) {
       run.range = {i, i};
@@ -358,8 +359,8 @@ void Tree::factor(int index) {
   // With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
   // than its halves: Haynsworth's formula, applied twice.
   Vector own_first(first, first + n * n);
-  run.negative = one.negative + two.negative + n -
-                 count_negative(reflected.data(), own_first.data(), n);
+  run.count = count_negative(reflected.data(), own_first.data(), n);
+  run.count.negative = one.count.negative + two.count.negative + n - run.count.negative;
   if (r == 0) return;
   const double *e1 = &interpolation[run.interpolation], *e2 = e1 + n * r;
   double *d1 = &inner_potential[run.interpolation], *d2 = d1 + n * r;

@@ -26,13 +26,20 @@ namespace adhesis {
 // The halves of every run; of a gap -1.
 using Halves = std::vector<std::array<int, 2>>;
 
+// Number of negative eigenvalues, and the distance of a gap's 2×2, or of the pair of a run's halves,
+// from singular: 1 without interaction.
+struct NegativeCount {
+  int negative = 0;
+  double nearest = 1;
+};
+
 // A run: one gap, or two neighbouring runs.
 struct Run {
   std::array<int, 2> half = {-1, -1};  // of a gap none
   std::array<int, 2> range;            // first and last gap
   Gap interval;                        // not used of a whole period
   int rank = 0;                        // number of charges
-  int negative = 0;                    // number of negative eigenvalues
+  NegativeCount count;                 // of its eigenvalues
 
   // Where the run's numbers begin in the arrays of the tree.
   int node = 0, response = 0, inverse = 0, kernel = 0, interpolation = 0;
@@ -102,7 +109,8 @@ void eliminate(double* a, int n, double* x, int columns);
 
 // Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.
 //
-// By pivots of two rows, one of each half: where h r is small they are far from singular.
-int count_negative(double* h, double* r, int n);
+// By pivots of two rows, one of each half: where h r is small they are far from singular. `nearest`
+// is the least of their determinants, without sign: about the least of those of 1 - h r.
+NegativeCount count_negative(double* h, double* r, int n);
 
 }  // namespace adhesis
