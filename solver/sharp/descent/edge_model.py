@@ -25,8 +25,12 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.griffith import critical_opening
+from adhesis.solver.sharp.equilibrium.edge_law import (
+    EdgeLaw,
+    Flags,
+    critical_of,
+    critical_opening,
+)
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, half_plane_opening
 from adhesis.solver.sharp.gap.quadrature import Integers
 
@@ -46,6 +50,8 @@ class EdgeModel(NamedTuple):
         R.
     critical, critical_rate : array, shape (n,)
         C_c, and its derivative by n.
+    pinned : bool array, shape (n,)
+        Edges that do not move, as C lies between both critical openings.
     own : array, shape (n,)
         ∂C_e/∂n_e, less that of a half-plane crack.
     coupling : array, shape (n, n)
@@ -61,6 +67,7 @@ class EdgeModel(NamedTuple):
     half_plane: Array
     critical: Array
     critical_rate: Array
+    pinned: Flags
     own: Array
     coupling: Array
 
@@ -99,10 +106,11 @@ def model_about(
             coupling[f, e] = value
     model = EdgeModel(
         edges, after, theta, np.zeros(count), np.zeros(count), np.empty(count), np.empty(count),
-        np.empty(count), np.empty(count), own, coupling,
+        np.empty(count), np.empty(count), np.zeros(count, dtype=np.bool_), own, coupling,
     )  # fmt: skip
     evaluate(model, law, panels)
     model.opening[:] = opening
+    apply_law(model, law, panels)
     return model
 
 
@@ -110,15 +118,24 @@ def model_about(
 def evaluate(model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
     """Evaluate R, C_c and the rates at the present edges, and add R to the openings."""
     theta, rate, half_plane, opening = model.theta, model.rate, model.half_plane, model.opening
-    critical, critical_rate, own = model.critical, model.critical_rate, model.own
+    own = model.own
     for e in range(theta.shape[0]):
         side = model.edges[e] % 2
         outwards = 1 - 2 * side
         half_plane[e], slope = half_plane_opening(theta[e], side, panels)
         opening[e] += half_plane[e]
         rate[e] = own[e] + outwards * slope
-        critical[e], drift = critical_opening(theta[e], law, panels)
-        critical_rate[e] = outwards * drift
+    apply_law(model, law, panels)
+
+
+@compiled
+def apply_law(model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
+    """Evaluate C_c and its rates at the present edges and openings."""
+    theta, opening, edges = model.theta, model.opening, model.edges
+    critical, critical_rate, pinned = model.critical, model.critical_rate, model.pinned
+    for e in range(theta.shape[0]):
+        critical[e], drift, pinned[e] = critical_of(edges[e], theta[e], opening[e], law, panels)
+        critical_rate[e] = (1 - 2 * (edges[e] % 2)) * drift
 
 
 @compiled_sums
@@ -174,7 +191,10 @@ def model_forces(model: EdgeModel, force: Array) -> None:
 
 @compiled
 def model_hessian(model: EdgeModel, matrix: Array) -> None:
-    """Build H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others."""
+    """Build H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others.
+
+    Pinned edges, which have no force, are kept where they are.
+    """
     opening, rate, coupling = model.opening, model.rate, model.coupling
     critical, critical_rate = model.critical, model.critical_rate
     edges = opening.shape[0]
@@ -183,3 +203,8 @@ def model_hessian(model: EdgeModel, matrix: Array) -> None:
         for f in range(edges):
             matrix[e, f] = twice * max(opening[f], 0.0) * coupling[e, f]
         matrix[e, e] = 2 * (abs(opening[e]) * rate[e] - critical[e] * critical_rate[e])
+    for e in range(edges):
+        if model.pinned[e]:
+            matrix[e, :] = 0.0
+            matrix[:, e] = 0.0
+            matrix[e, e] = 1.0

@@ -34,17 +34,23 @@ from adhesis.solver.sharp.equilibrium.condensed import (
     residual_of,
     tangent_of,
 )
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.griffith import (
+from adhesis.solver.sharp.equilibrium.edge_law import (
+    EdgeLaw,
+    Flags,
+    at_memory,
+    critical_of,
     critical_opening,
+    way_from_memory,
+)
+from adhesis.solver.sharp.equilibrium.griffith import (
     move_edges,
     shortest_length,
     step_limits,
 )
 from adhesis.solver.sharp.equilibrium.linear_response import (
-    Flags,
     LinearResponse,
     ResponseSolution,
+    imbalance_of,
     motion_to,
     pressure_at,
     solve_response,
@@ -137,7 +143,7 @@ def descend(
     which its own force would move it by the longest step.
     """
     runs, reach = running.edges, running.reach
-    held, before, flow = _beside(runs), gaps, no_flow()
+    held, before, flow = _held_edges(runs, gaps, law), gaps, no_flow()
     edges: Integers = np.flatnonzero(held)
     pressure = pressure_at(response, prescribed, model.device)
     strongest, event, steps = 0.0, STEP_LIMIT, 0
@@ -145,7 +151,7 @@ def descend(
     tangent = np.empty((0, 0))
     while steps < most:
         if not moved:
-            condense_gaps(response, hold_edges(response, gaps, held), model)
+            condense_gaps(response, hold_edges(response, gaps, held, law), law, model)
         elif not move_references(response, gaps, held, pressure, prescribed, law, model):
             event = OUTGROWN
             break
@@ -180,7 +186,7 @@ def descend(
             way[edges] = flow.motion  # without rounding
             is_cut, more = _limit_others(runs, held, way, gaps, law)
         if more:
-            held = _beside(runs)
+            held = _held_edges(runs, gaps, law)
             edges = np.flatnonzero(held)
             continue
         judges, moved = edges.shape[0] > 0, True
@@ -239,7 +245,7 @@ def _limit_others(
     """
     if law.critical == 0:
         return _cut(way, step_limits(map_gaps(gaps), law.longest_step)), False
-    return False, _run_far(runs, held, way, law)
+    return False, _run_far(runs, held, way, gaps, law)
 
 
 @compiled
@@ -277,8 +283,10 @@ def force_at(residual: Array, edges: Integers, gaps: Array, law: EdgeLaw, panels
     """Compute the norm of the forces C_c² - C |C| from C - C_c at some edges."""
     square = 0.0
     for i in range(edges.shape[0]):
-        critical, _ = critical_opening(gaps[edges[i] // 2, edges[i] % 2], law, panels)
-        opening = residual[i] + critical
+        theta = gaps[edges[i] // 2, edges[i] % 2]
+        advancing, _ = critical_opening(theta, law, panels)
+        opening = residual[i] + advancing
+        critical, _, _ = critical_of(edges[i], theta, opening, law, panels)
         square += (critical * critical - opening * abs(opening)) ** 2
     return float(np.sqrt(square))
 
@@ -319,7 +327,9 @@ def _run_more(runs: Flags, response: LinearResponse, ahead: Array, law: EdgeLaw)
     if law.critical == 0:
         return False
     for e in range(runs.shape[0]):
-        unbalanced = abs(response.residual[e]) > RUNNING * law.critical
+        residual, _ = imbalance_of(response, e, law.pinning)
+        pinned = law.pinning > 0 and response.held[e]
+        unbalanced = abs(residual) > RUNNING * law.critical and not pinned
         far = abs(ahead[e]) > FOLLOWING * law.longest_step
         if (unbalanced or (none and far)) and not runs[e]:
             runs[e], more = True, True
@@ -327,12 +337,15 @@ def _run_more(runs: Flags, response: LinearResponse, ahead: Array, law: EdgeLaw)
 
 
 @compiled
-def _run_far(runs: Flags, held: Flags, way: Array, law: EdgeLaw) -> bool:
-    """Let edges run that would follow too far; returns whether there are any."""
+def _run_far(runs: Flags, held: Flags, way: Array, gaps: Array, law: EdgeLaw) -> bool:
+    """Let edges run that would follow too far, or across their memory; returns whether any do."""
     more = False
     for e in range(runs.shape[0]):
         # written so that NaN is too far
         near = abs(way[e]) <= FURTHEST_FOLLOWING * law.longest_step
+        if law.pinning > 0:
+            gone = way_from_memory(e, gaps[e // 2, e % 2], law)
+            near = near and gone * (gone + way[e]) >= 0
         if not (held[e] or near):
             runs[e], more = True, True
     return more
@@ -349,12 +362,16 @@ def _cut(way: Array, limit: Array) -> bool:
 
 
 @compiled
-def _beside(runs: Flags) -> Flags:
-    """Mark the edges that run, and those beside them."""
+def _held_edges(runs: Flags, gaps: Array, law: EdgeLaw) -> Flags:
+    """Mark the edges that run, those beside them, and those at their memory, which may be pinned.
+
+    All of these are in the model of the openings.
+    """
     count = runs.shape[0]
-    some = runs.copy()
+    some = at_memory(gaps, law)
     for e in range(count):
         if runs[e]:
+            some[e] = True
             some[(e + 1) % count] = True
             some[e - 1] = True
     return some

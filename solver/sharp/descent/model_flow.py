@@ -21,7 +21,7 @@ from adhesis.solver.sharp.descent.edge_model import (
     model_forces,
     model_hessian,
 )
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw, stop_at_memory
 from adhesis.solver.sharp.field.cholesky import factor_rows, padded, solve_column
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
@@ -96,6 +96,9 @@ def flow_through(
             break
         model_hessian(model, matrix)
         size = implicit_step(matrix, force, longest, equal_speeds, factor, step)
+        if law.pinning > 0:
+            stop_at_memory(model.edges, model.theta, force, step, law)
+            size = largest(step)
         shortest = RUNNING_ENDS * law.longest_step
         if not size > shortest:
             distance = distance_to_minimum(matrix, force, factor)

@@ -12,8 +12,7 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.model_flow import ModelFlow
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.griffith import critical_opening
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw, critical_opening
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (

@@ -12,9 +12,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw, Flags, at_memory
 from adhesis.solver.sharp.equilibrium.linear_response import (
-    Flags,
     LinearResponse,
     ResponseSolution,
     solve_response,
@@ -32,7 +31,7 @@ class HeldEdges(NamedTuple):
     ----------
     edges : int array, shape (n,)
     residual : array, shape (n,)
-        C - C_c.
+        C - C_c, of edges that advance.
     tangent : array, shape (n, n)
         ∂(C_e - C_c)/∂n_f.
     """
@@ -101,7 +100,7 @@ def opening_change(response: LinearResponse, e: int, motion: Array, potential: A
 
 @compiled
 def residual_of(response: LinearResponse, edges: Integers, now: ResponseSolution) -> Array:
-    """Compute C_e - C_c at held edges in a solution."""
+    """Compute C_e - C_c at held edges in a solution, C_c that of edges that advance."""
     out = np.empty(edges.shape[0])
     potential = response.potential[0] + now.pressure * response.potential[1]
     for c in range(edges.shape[0]):
@@ -198,9 +197,16 @@ def tangent_between(
     law: EdgeLaw,
     model: FieldModel,
 ) -> Array:
-    """Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps, all others following."""
-    held = np.zeros(gaps.size, dtype=np.bool_)
+    """Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.
+
+    All others follow, but those at their memory, which are pinned.
+    """
+    held = at_memory(gaps, law)
     held[edges] = True
-    condense_gaps(response, hold_edges(response, gaps, held), model)
+    condense_gaps(response, hold_edges(response, gaps, held, law), law, model)
     now = solve_response(response, prescribed, law, model.device)
-    return tangent_of(response, edges, now, model.device)
+    out = tangent_of(response, edges, now, model.device)
+    for c in range(edges.shape[0]):
+        if response.recedes[edges[c]]:
+            out[c, c] -= law.pinning * response.drift[edges[c]]
+    return out

@@ -10,9 +10,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.griffith import critical_opening
-from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw, critical_opening
+from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse, imbalance_of
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.field.weight_function import end_charges
 from adhesis.solver.sharp.gap.conformal_map import LEFT
@@ -34,7 +33,7 @@ def linearise_gap(out: LinearResponse, k: int, law: EdgeLaw, model: FieldModel) 
     _open_edges(out, k, solved, ends, model)
     _differentiate_edges(out, k, ends, law, model)
     _charge_edges(out, k, solved, singular, ends[:, 5], model.rules)
-    condense_gap(out, k, model.rules)
+    condense_gap(out, k, law.pinning, model.rules)
 
 
 @compiled_sums
@@ -160,6 +159,7 @@ def _differentiate_edges(
         out.tangent[e, 1 - side] = far * ends[1 - side, 5]
         # the sum over both edges is the motion of the gap
         sign = 1 - 2 * side
+        out.drift[e] = sign * drift
         out.tangent[e, side] = sign * (ends[side, 2] - drift) + out.tangent[e, 1 - side]
 
 
@@ -180,7 +180,7 @@ def _charge_edges(
 
 
 @compiled_sums
-def condense_gap(out: LinearResponse, k: int, rules: GaussRules) -> None:
+def condense_gap(out: LinearResponse, k: int, pinning: float, rules: GaussRules) -> None:
     """Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
 
     Edges that are held stay where they are.
@@ -192,9 +192,10 @@ def condense_gap(out: LinearResponse, k: int, rules: GaussRules) -> None:
     held, here = out.held[2 * k : 2 * k + 2], out.here[2 * k : 2 * k + 2]
     compliance[:] = 0.0
     negative, nearest = 0, 1.0
+    residual0, a = imbalance_of(out, 2 * k, pinning)
+    residual1, d = imbalance_of(out, 2 * k + 1, pinning)
+    b, c = tangent[0, 1], tangent[1, 0]
     if not (held[0] or held[1]):
-        a, b = tangent[0, 0], tangent[0, 1]
-        c, d = tangent[1, 0], tangent[1, 1]
         det = a * d - b * c
         compliance[0, 0], compliance[0, 1] = d / det, -b / det
         compliance[1, 0], compliance[1, 1] = -c / det, a / det
@@ -205,11 +206,12 @@ def condense_gap(out: LinearResponse, k: int, rules: GaussRules) -> None:
     else:
         for side in range(2):
             if not held[side]:
-                compliance[side, side] = 1 / tangent[side, side]
-                negative = 1 if tangent[side, side] < 0 else 0
+                own = a if side == 0 else d
+                compliance[side, side] = 1 / own
+                negative = 1 if own < 0 else 0
     out.factor.negative[k], out.factor.nearest[k] = negative, nearest
-    pull0 = -out.residual[2 * k] - tangent[0, 0] * here[0] - tangent[0, 1] * here[1]
-    pull1 = -out.residual[2 * k + 1] - tangent[1, 0] * here[0] - tangent[1, 1] * here[1]
+    pull0 = -residual0 - a * here[0] - b * here[1]
+    pull1 = -residual1 - c * here[0] - d * here[1]
     by_pressure, by_potential = out.opening_by_pressure, out.opening_by_potential
     potential, follows = out.about[first:behind], out.motion_by_potential[first:behind]
     for side in range(2):

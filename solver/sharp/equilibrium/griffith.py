@@ -6,10 +6,10 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw, critical_of
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT
-from adhesis.solver.sharp.gap.full_contact_stress import Panels, measure_at
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import CLOSING_SHARE
 
@@ -35,14 +35,6 @@ def total_length(gaps: Array) -> float:
 
 
 @compiled
-def critical_opening(theta: float, law: EdgeLaw, panels: Panels) -> tuple[float, float]:
-    """Compute C_c at θ of an edge that advances, and its derivative."""
-    measure, slope = measure_at(theta, panels)
-    root = np.sqrt(measure)
-    return law.critical * root, law.critical * slope / (2 * root)
-
-
-@compiled
 def imbalance(state: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Array]:
     """Compute C_e - C_c at every edge, positive where contact recedes, and dC_c/dθ."""
     opening, table = state.opening, state.nodes.table
@@ -50,7 +42,8 @@ def imbalance(state: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Arr
     residual = np.empty(edges)
     drift = np.empty(edges)
     for e in range(edges):
-        critical, drift[e] = critical_opening(table[e // 2, LEFT + e % 2], law, panels)
+        theta = table[e // 2, LEFT + e % 2]
+        critical, drift[e], _ = critical_of(e, theta, opening[e], law, panels)
         residual[e] = opening[e] - critical
     return residual, drift
 

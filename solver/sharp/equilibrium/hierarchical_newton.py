@@ -7,11 +7,19 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled_for_both
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.equilibrium.condensed import closing_by_pressure, residual_of
+from adhesis.solver.sharp.equilibrium.edge_law import (
+    EdgeLaw,
+    Flags,
+    at_memory,
+    critical_opening,
+    way_from_memory,
+)
 from adhesis.solver.sharp.equilibrium.griffith import move_edges, shortest_length
 from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
+    ResponseSolution,
     motion_to,
     no_motion,
     pressure_at,
@@ -23,9 +31,12 @@ from adhesis.solver.sharp.equilibrium.renewal import (
 )
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
     HIERARCHICAL_NEWTON_GROWTH,
     MOST_CORRECTIONS,
+    PINNED_CORRECTIONS,
+    PINNED_SLACK,
     STALLED_SHARE,
 )
 
@@ -48,6 +59,10 @@ class EquilibriumOfMany(NamedTuple):
     slope : float
         dY/dd along the branch: Y is p, under a load q0 s.
     corrections : int
+    pinned_share, pinned_rate : array, shape (2L,)
+        Place of C between both critical openings, 0 where an edge begins to advance and 1 where it
+        begins to recede, and its derivative by d; NaN for edges that are not pinned. Empty with one
+        work of adhesion.
     """
 
     found: bool
@@ -59,6 +74,8 @@ class EquilibriumOfMany(NamedTuple):
     separation: float
     slope: float
     corrections: int
+    pinned_share: Array
+    pinned_rate: Array
 
 
 @compiled_for_both
@@ -84,15 +101,21 @@ def equilibrium_many(
     is_outgrown = False
     steps = 0
     pressure = pressure_at(response, prescribed, model.device)
-    none_held = np.zeros(gaps.size, dtype=np.bool_)
+    pinned = at_memory(gaps, law)
+    most = MOST_CORRECTIONS * (PINNED_CORRECTIONS if law.pinning > 0 else 1)
     now = no_motion(gaps.shape[0])
     while True:
         steps += 1
-        if not move_references(response, gaps, none_held, pressure, prescribed, law, model):
+        if not move_references(response, gaps, pinned, pressure, prescribed, law, model):
             is_outgrown = True
             break
         now = solve_response(response, prescribed, law, model.device)
         pressure = now.pressure
+        if law.pinning > 0 and np.isfinite(pressure):
+            before, gaps = gaps, pin_edges(response, gaps, pinned, now, law, model.panels)
+            if (gaps != before).any() and steps < most:
+                last = np.inf
+                continue
         step = now.motion - motion_to(response, gaps)
         size = np.abs(step).max()
         if not np.isfinite(pressure):
@@ -106,8 +129,8 @@ def equilibrium_many(
         # as in ``newton.equilibrium``
         stalled = size <= law.field_error and size > STALLED_SHARE * last
         # not written as > : a size that is no number is a failure, too
-        most = max(HIERARCHICAL_NEWTON_GROWTH * last, law.rest_step)
-        within = size <= min(reach, most)
+        longest = max(HIERARCHICAL_NEWTON_GROWTH * last, law.rest_step)
+        within = size <= min(reach, longest)
         moved = move_edges(response.nodes.table[:, :2], now.motion)
         if not (within and np.abs(travelled).max() <= reach and shortest_length(moved) > 0):
             break
@@ -116,12 +139,64 @@ def equilibrium_many(
         if at_rest or not outdated_references(response, map_gaps(gaps), law)[0].any():
             found = True
             break
-        if steps == MOST_CORRECTIONS:
+        if steps >= most:
             break
         last = size
     potential = np.empty(response.nodes.theta.shape[0])
     for i in range(potential.shape[0]):
         potential[i] = response.potential[0, i] + pressure * response.potential[1, i]
+    share, share_rate = np.empty(0), np.empty(0)
+    if found and law.pinning > 0:
+        share, share_rate = pinned_shares(response, gaps, pinned, now, law, model)
     return EquilibriumOfMany(
-        found, is_outgrown, gaps, potential, now.rate, pressure, now.separation, now.slope, steps
-    )
+        found, is_outgrown, gaps, potential, now.rate, pressure, now.separation, now.slope, steps,
+        share, share_rate,
+    )  # fmt: skip
+
+
+@compiled
+def pin_edges(
+    response: LinearResponse, gaps: Array, pinned: Flags, now: ResponseSolution, law: EdgeLaw,
+    panels: Panels,
+) -> Array:  # fmt: skip
+    """Pin edges that come to their memory, and release those whose opening no longer holds them.
+
+    Returns the gaps with these at their memory, or a little to the side to which they are released;
+    ``pinned`` is changed likewise.
+    """
+    edges = np.flatnonzero(pinned)
+    residual = residual_of(response, edges, now)
+    step = now.motion - motion_to(response, gaps)
+    out = gaps.copy()
+    for e in range(pinned.shape[0]):
+        way = way_from_memory(e, gaps[e // 2, e % 2], law)
+        if not pinned[e] and way * (way + step[e]) < 0:
+            out[e // 2, e % 2], pinned[e] = law.memory[e // 2, e % 2], True
+    slack = PINNED_SLACK * law.force_error / law.critical
+    for c in range(edges.shape[0]):
+        k, side = edges[c] // 2, edges[c] % 2
+        critical, _ = critical_opening(gaps[k, side], law, panels)
+        outwards = (1 - 2 * side) * law.newton_tolerance
+        if residual[c] < -slack:
+            out[k, side], pinned[edges[c]] = gaps[k, side] + outwards, False
+        elif residual[c] > law.pinning * critical + slack:
+            out[k, side], pinned[edges[c]] = gaps[k, side] - outwards, False
+    return out
+
+
+@compiled
+def pinned_shares(
+    response: LinearResponse, gaps: Array, pinned: Flags, now: ResponseSolution, law: EdgeLaw,
+    model: FieldModel,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Compute where the openings of pinned edges lie between both critical ones, and the rates."""
+    edges, device = np.flatnonzero(pinned), model.device
+    residual = residual_of(response, edges, now)
+    closing = closing_by_pressure(response, edges, now)
+    by_pressure = device.separation_weight * response.mean[1] - 2 * np.pi * device.compliance
+    share, rate = np.full(gaps.size, np.nan), np.full(gaps.size, np.nan)
+    for c in range(edges.shape[0]):
+        critical, _ = critical_opening(gaps[edges[c] // 2, edges[c] % 2], law, model.panels)
+        share[edges[c]] = residual[c] / (law.pinning * critical)
+        rate[edges[c]] = -closing[c] * 2 * np.pi / by_pressure / (law.pinning * critical)
+    return share, rate

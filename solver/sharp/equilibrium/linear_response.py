@@ -16,11 +16,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw, Flags
 from adhesis.solver.sharp.field.cluster_tree import Tree
 from adhesis.solver.sharp.field.solution import Equations, LoadingDevice, Nodes
 from adhesis.solver.sharp.field.tree_factor import (
@@ -31,8 +30,6 @@ from adhesis.solver.sharp.field.tree_factor import (
 )
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT
 from adhesis.solver.sharp.tolerances import SOFT_EDGE
-
-Flags = NDArray[np.bool_]
 
 
 class LinearResponse(NamedTuple):
@@ -52,12 +49,17 @@ class LinearResponse(NamedTuple):
         Without potentials and p, and by a unit of p (two rows).
     held, here : bool array and array, shape (2L,)
         Edges that are held, and their motion from the reference to where they are; 0 for others.
+    recedes : bool array, shape (2L,)
+        Edges behind their memory, with two works of adhesion.
     about, about_pressure : array, shape (N,) and (L,)
         Potentials and p of the references.
     scaled_opening : array, shape (N,)
         f there.
     opening, residual, opening_by_pressure : array, shape (2L,)
-        C_e and C_e - C_c in the reference, and ∂C_e/∂p between held edges.
+        C_e and C_e - C_c in the reference, C_c that of an edge that advances, and ∂C_e/∂p between
+        held edges.
+    drift : array, shape (2L,)
+        ∂C_c/∂n_e there.
     tangent : array, shape (2L, 2)
         ∂(C_e - C_c)/∂n_f between both edges of a gap, in the potential of the others.
     opening_by_potential, charge_by_edge : array, shape (N, 2)
@@ -91,12 +93,14 @@ class LinearResponse(NamedTuple):
     charges: Charges
     held: Flags
     here: Array
+    recedes: Flags
     about: Array
     about_pressure: Array
     scaled_opening: Array
     opening: Array
     residual: Array
     opening_by_pressure: Array
+    drift: Array
     tangent: Array
     opening_by_potential: Array
     charge_by_edge: Array
@@ -160,12 +164,14 @@ def allocate_response(
         charges=Charges(np.zeros((2, size)), np.zeros((2, size))),
         held=np.zeros(2 * count, dtype=np.bool_),
         here=np.zeros(2 * count),
+        recedes=np.zeros(2 * count, dtype=np.bool_),
         about=np.zeros(n),
         about_pressure=np.zeros(count),
         scaled_opening=np.zeros(n),
         opening=np.zeros(2 * count),
         residual=np.zeros(2 * count),
         opening_by_pressure=np.zeros(2 * count),
+        drift=np.zeros(2 * count),
         tangent=np.zeros((2 * count, 2)),
         opening_by_potential=np.zeros((n, 2)),
         charge_by_edge=np.zeros((n, 2)),
@@ -250,6 +256,19 @@ def _update_softness(
         if soft > 1:
             for k in range(ranges[run, 0], ranges[run, 1] + 1):
                 softness[k % count] = max(softness[k % count], soft)
+
+
+@compiled
+def imbalance_of(response: LinearResponse, e: int, pinning: float) -> tuple[float, float]:
+    """Compute C_e - C_c and its derivative by n_e in the reference, by the law of where e is now.
+
+    The law is asked at every use, so a response stays valid where an edge begins to recede.
+    """
+    residual, own = response.residual[e], response.tangent[e, e % 2]
+    if response.recedes[e]:
+        own -= pinning * response.drift[e]
+        residual -= pinning * (response.opening[e] - residual)
+    return residual, own
 
 
 @compiled

@@ -12,11 +12,11 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
+from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw, Flags, at_memory, way_from_memory
 from adhesis.solver.sharp.equilibrium.gap_response import condense_gap, linearise_gap
 from adhesis.solver.sharp.equilibrium.linear_response import (
-    Flags,
     LinearResponse,
+    imbalance_of,
     motion_to,
     pressure_at,
     solve_response,
@@ -117,7 +117,9 @@ def outdated_references(
         changed[k], far[k] = is_outdated(known, table[k], softness, law)
         # in other potentials than those of its reference its edges follow otherwise
         for e in range(2 * k, 2 * k + 2):
-            if abs(response.residual[e]) * softness > REFERENCE_BALANCE * law.critical > 0:
+            residual, _ = imbalance_of(response, e, law.pinning)
+            pinned = law.pinning > 0 and response.held[e]
+            if abs(residual) * softness > REFERENCE_BALANCE * law.critical > 0 and not pinned:
                 changed[k] = True
     return changed, far
 
@@ -156,9 +158,9 @@ def move_references(
     for e in range(held.shape[0]):
         if far[e // 2]:
             both[e] = True
-    others = hold_edges(response, gaps, both)
+    others = hold_edges(response, gaps, both, law)
     if indices.shape[0] == 0:
-        condense_gaps(response, others, model)
+        condense_gaps(response, others, law, model)
         return True
     fill_gaps(indices, nodes, response.equations, model)
     renewed = True
@@ -166,7 +168,7 @@ def move_references(
         if changed[k] and renewed:
             renewed = _renew_gap(response, k, before[k], pressure, law, model)
         elif others[k]:
-            condense_gap(response, k, model.rules)
+            condense_gap(response, k, law.pinning, model.rules)
             changed[k] = True
     if not (renewed and _replace_runs(response, indices, model)):
         nodes.table[indices] = np.nan  # they serve for no other response
@@ -175,7 +177,7 @@ def move_references(
     if far.any():
         # their potentials are not those of the old edges: solved with these held
         pressure = solve_response(response, prescribed, law, model.device).pressure
-        hold_edges(response, gaps, held)
+        hold_edges(response, gaps, held, law)
         for k in range(far.shape[0]):
             if far[k]:
                 linearise_in_current_potential(response, k, pressure, law, model)
@@ -184,24 +186,31 @@ def move_references(
 
 
 @compiled
-def hold_edges(response: LinearResponse, gaps: Array, held: Flags) -> Flags:
-    """Hold some edges where they are, and no others; marks the gaps that are to be condensed."""
+def hold_edges(response: LinearResponse, gaps: Array, held: Flags, law: EdgeLaw) -> Flags:
+    """Hold some edges where they are, and no others, and note which of all recede.
+
+    Marks the gaps that are to be condensed.
+    """
     motion = motion_to(response, gaps)
     changed = np.zeros(gaps.shape[0], dtype=np.bool_)
     for e in range(held.shape[0]):
-        here = motion[e] if held[e] else 0.0
+        here, recedes = motion[e] if held[e] else 0.0, False
+        if law.pinning > 0:
+            recedes = way_from_memory(e, gaps[e // 2, e % 2], law) < 0
         if held[e] != response.held[e] or here != response.here[e]:
             changed[e // 2] = True
-        response.held[e], response.here[e] = held[e], here
+        if recedes != response.recedes[e]:
+            changed[e // 2] = True
+        response.held[e], response.here[e], response.recedes[e] = held[e], here, recedes
     return changed
 
 
 @compiled
-def condense_gaps(response: LinearResponse, some: Flags, model: FieldModel) -> None:
+def condense_gaps(response: LinearResponse, some: Flags, law: EdgeLaw, model: FieldModel) -> None:
     """Eliminate the edges of some gaps anew, and factor the runs that hold them."""
     for k in range(some.shape[0]):
         if some[k]:
-            condense_gap(response, k, model.rules)
+            condense_gap(response, k, law.pinning, model.rules)
     if some.any():
         factor_runs(response, some)
 
@@ -258,9 +267,9 @@ def settle_response(
     response: LinearResponse, gaps: Array, prescribed: float, law: EdgeLaw, model: FieldModel
 ) -> bool:
     """Renew the response for a known equilibrium; returns False as :func:`move_references` does."""
-    none = np.zeros(gaps.size, dtype=np.bool_)
+    held = at_memory(gaps, law)
     pressure = pressure_at(response, prescribed, model.device)
-    if not move_references(response, gaps, none, pressure, prescribed, law, model):
+    if not move_references(response, gaps, held, pressure, prescribed, law, model):
         return False
     solve_response(response, prescribed, law, model.device)
     return True

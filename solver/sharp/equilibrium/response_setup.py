@@ -64,6 +64,7 @@ def set_up_response(
     out.mean[1] = -state.mean.unit_mean
     out.mean[0] -= state.pressure * out.mean[1]
     changed = np.ones(count, dtype=np.bool_)
+    out.held[:] = law.pinning > 0  # which edges are pinned is not known yet
     for k in range(count):
         linearise_gap(out, k, law, model)
     factor_runs(out, changed)
@@ -128,7 +129,7 @@ def update_response(
         return out, False
     for k in range(fresh.shape[0]):
         if fresh[k]:
-            out.held[2 * k : 2 * k + 2] = False
+            out.held[2 * k : 2 * k + 2] = law.pinning > 0
             linearise_in_current_potential(out, k, pressure, law, model)
     factor_runs(out, fresh)
     return out, True
@@ -228,7 +229,8 @@ def _copy_edges(known: LinearResponse, j: int, out: LinearResponse, k: int) -> N
         e, f = 2 * j + side, 2 * k + side
         out.opening[f], out.residual[f] = known.opening[e], known.residual[e]
         out.opening_by_pressure[f] = known.opening_by_pressure[e]
-        out.held[f], out.here[f] = known.held[e], known.here[e]
+        out.held[f], out.here[f], out.recedes[f] = known.held[e], known.here[e], known.recedes[e]
+        out.drift[f] = known.drift[e]
         out.isolated_correction[f] = known.isolated_correction[e]
         for column in range(2):
             out.tangent[f, column] = known.tangent[e, column]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
 from adhesis.solver.sharp.field.solution import (
@@ -87,6 +88,7 @@ class EdgeProblem:
             force_error=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
             origin=source.highest,
             pinning=float(pinning),
+            memory=np.empty((0, 2)),
         )
         self.model = FieldModel(
             device=device,
@@ -100,6 +102,10 @@ class EdgeProblem:
     def pins(self) -> bool:
         """Whether edges are pinned, as works of adhesion differ."""
         return self.law.pinning > 0
+
+    def law_at(self, memory: Array) -> EdgeLaw:
+        """Return the law of edges that were at ``memory`` in the state before."""
+        return self.law._replace(memory=memory) if self.pins else self.law
 
     @property
     def largest_opening(self) -> float:

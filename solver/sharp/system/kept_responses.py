@@ -97,12 +97,12 @@ class KeptResponses:
     def _unknown(self, known: KeptResponse, gaps: Array) -> int:
         """Count the gaps that would be new to a response."""
         problem = self._problem
-        return int(count_unknown(known.response, gaps, problem.law, problem.model))
+        return int(count_unknown(known.response, gaps, problem.law_at(gaps), problem.model))
 
     def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
         """Set up a response of these gaps, from the last one if there is one."""
         problem = self._problem
-        law, model = problem.law, problem.model
+        law, model = problem.law_at(gaps), problem.model
         problem.count.fields += 1
         if self._kept:
             last = self._kept[-1].response
@@ -124,7 +124,9 @@ class KeptResponses:
             near = self.near(gaps, prescribed, _ANY)
             if near is None:
                 return None
-            if settle_response(near.response, gaps, prescribed, problem.law, problem.model):
+            if settle_response(
+                near.response, gaps, prescribed, problem.law_at(gaps), problem.model
+            ):
                 near.settled = gaps
                 return near
             near.is_outgrown = True
