@@ -118,8 +118,21 @@ class EdgeLaw:
     @pinning.setter
     def pinning(self, arg: float, /) -> None: ...
 
+    @property
+    def memory(self) -> NDArray[numpy.float64]:
+        """Gaps at the last state."""
+
+    @memory.setter
+    def memory(self, arg: NDArray[numpy.float64], /) -> None: ...
+
+    def at_memory(self, gaps: NDArray[numpy.float64]) -> NDArray[numpy.bool_]:
+        """Mark the edges at their memory; none with one work of adhesion."""
+
+    def critical_of(self, gaps: NDArray[numpy.float64], opening: NDArray[numpy.float64], panels: Panels) -> NDArray[numpy.float64]:
+        """Compute C_c at every edge with the opening C."""
+
     def critical_openings(self, theta: NDArray[numpy.float64], panels: Panels) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
-        """Evaluate C_c and its θ-derivative."""
+        """Evaluate C_c of edges that advance, and its θ-derivative."""
 
 def map_gaps(gaps: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
     """
@@ -248,6 +261,14 @@ class Equilibrium:
     @property
     def slope(self) -> float: ...
 
+    @property
+    def pinned_share(self) -> NDArray[numpy.float64]:
+        """Place of C of pinned edges between both critical openings."""
+
+    @property
+    def pinned_rate(self) -> NDArray[numpy.float64]:
+        """Its derivative by d."""
+
     def solve_field(self, prescribed: float, model: FieldModel) -> Field:
         """Solve every gap by itself in the potential of the others."""
 
@@ -321,7 +342,9 @@ class LinearResponse:
 
     def tangent_between(self, gaps: NDArray[numpy.float64], edges: NDArray[numpy.int64], prescribed: float, law: EdgeLaw, model: FieldModel) -> NDArray[numpy.float64]:
         """
-        Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps, all others following.
+        Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.
+
+        All others follow, but those at their memory, which are pinned.
         """
 
     def find_equilibrium(self, gaps: NDArray[numpy.float64], prescribed: float, reach: float, strict: bool, law: EdgeLaw, model: FieldModel) -> Equilibrium:

@@ -41,6 +41,7 @@ using IntegerArray = nb::ndarray<const int64_t, nb::c_contig, nb::device::cpu>;
 using Changed = nb::ndarray<double, nb::c_contig, nb::device::cpu>;  // in place
 using Values = nb::ndarray<nb::numpy, double>;
 using Whole = nb::ndarray<nb::numpy, int64_t>;
+using Truth = nb::ndarray<nb::numpy, bool>;
 constexpr auto new_array = nb::rv_policy::automatic;  // a property's
 
 Vector vector_of(const Array& array) { return {array.data(), array.data() + array.size()}; }
@@ -253,7 +254,7 @@ void bind_model(nb::module_& m) {
               double force_error, double pinning) {
              new (law) EdgeLaw{critical, newton_tolerance, field_error, rest_step,
                                longest_step, smallest, overlap_limit, force_error,
-                               pinning};
+                               pinning, {}};
            },
            nb::kw_only(), "critical"_a, "newton_tolerance"_a, "field_error"_a, "rest_step"_a,
            "longest_step"_a, "smallest"_a, "overlap_limit"_a, "force_error"_a, "pinning"_a)
@@ -267,12 +268,33 @@ void bind_model(nb::module_& m) {
       .def_rw("overlap_limit", &EdgeLaw::overlap_limit)
       .def_rw("force_error", &EdgeLaw::force_error)
       .def_rw("pinning", &EdgeLaw::pinning)
+      .def_prop_rw("memory", [](const EdgeLaw& law) { return pairs_of(law.memory); },
+                   [](EdgeLaw& law, const Array& gaps) { law.memory = vector_of(gaps); },
+                   nb::for_getter(new_array), "Gaps at the last state.")
+      .def("at_memory",
+           [](const EdgeLaw& law, const Array& gaps) {
+             const Flags found = at_memory(vector_of(gaps), law);
+             auto* kept = new std::vector<char>(found);
+             nb::capsule owner(
+                 kept, [](void* p) noexcept { delete static_cast<std::vector<char>*>(p); });
+             return Truth(reinterpret_cast<bool*>(kept->data()), {kept->size()}, owner);
+           },
+           "gaps"_a, "Mark the edges at their memory; none with one work of adhesion.")
+      .def("critical_of",
+           [](const EdgeLaw& law, const Array& gaps, const Array& opening, const Panels& panels) {
+             Vector out, ends = vector_of(gaps);
+             for (int e = 0; e < int(ends.size()); ++e)
+               out.push_back(critical_of(e, ends[e], opening.data()[e], law, panels).value);
+             return array_of(out);
+           },
+           "gaps"_a, "opening"_a, "panels"_a, "Compute C_c at every edge with the opening C.")
       .def("critical_openings",
            [](const EdgeLaw& law, const Array& theta, const Panels& panels) {
              return evaluate_at(theta,
                                 [&](double at) { return critical_opening(at, law, panels); });
            },
-           "theta"_a, "panels"_a, "Evaluate C_c and its θ-derivative.");
+           "theta"_a, "panels"_a,
+           "Evaluate C_c of edges that advance, and its θ-derivative.");
   m.def("map_gaps", [](const Array& gaps) { return table_of(map_gaps(vector_of(gaps))); }, "gaps"_a,
         "Make the table of gaps: both ends, widths of the patches beside them, α.");
   m.def("shortest_length", [](const Array& gaps) { return shortest_length(vector_of(gaps)); },
@@ -385,6 +407,10 @@ void bind_response(nb::module_& m) {
       .def_prop_ro("pressure", [](const Equilibrium& e) { return e.at.pressure; })
       .def_prop_ro("separation", [](const Equilibrium& e) { return e.at.separation; })
       .def_prop_ro("slope", [](const Equilibrium& e) { return e.at.slope; })
+      .def_prop_ro("pinned_share", [](const Equilibrium& e) { return array_of(e.pinned_share); },
+                   new_array, "Place of C of pinned edges between both critical openings.")
+      .def_prop_ro("pinned_rate", [](const Equilibrium& e) { return array_of(e.pinned_rate); },
+                   new_array, "Its derivative by d.")
       .def("solve_field",
            [](const Equilibrium& e, double prescribed, const Model& model) {
              return unlocked([&] {
@@ -471,15 +497,21 @@ void bind_response(nb::module_& m) {
              const Vector ends = vector_of(gaps);
              const Integers some = integers_of(edges);
              return array_of(unlocked([&] {
-               Flags held(ends.size());
+               Flags held = at_memory(ends, law);
                for (int e : some) held[e] = true;
-               condense_gaps(r, hold_edges(r, ends, held));
+               condense_gaps(r, hold_edges(r, ends, held, law), law);
                const ResponseSolution now = r.solve(prescribed, law, model.device);
-               return HeldEdges(r, some, now, model.device).tangent();
+               Matrix out = HeldEdges(r, some, now, model.device).tangent();
+               for (int c = 0; c < out.n; ++c) {
+                 const Edge& edge = r.edges[some[c]];
+                 if (edge.recedes) out(c, c) -= law.pinning * edge.drift;
+               }
+               return out;
              }));
            },
            "gaps"_a, "edges"_a, "prescribed"_a, "law"_a, "model"_a,
-           "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps, all others following.")
+           "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.\n\n"
+           "All others follow, but those at their memory, which are pinned.")
       .def("find_equilibrium",
            [](LinearResponse& r, const Array& gaps, double prescribed, double reach, bool strict,
               const EdgeLaw& law, const Model& model) {

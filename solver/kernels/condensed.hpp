@@ -25,8 +25,11 @@ class HeldEdges {
             const Device& device)
       : response_(response), edges_(edges), now_(now), device_(device) {}
 
-  // C_e - C_c at the edges.
+  // C_e - C_c at the edges, C_c that of edges that advance.
   Vector residual() const;
+
+  // -∂C_e/∂p at the edges.
+  Vector closing_by_pressure() const;
 
   // ∂(C_e - C_c)/∂n_f between the edges at the prescribed d.
   Matrix tangent() const;
@@ -41,7 +44,6 @@ class HeldEdges {
   const ResponseSolution& now_;
   const Device& device_;
 
-  Vector closing_by_pressure() const;                     // -∂C_e/∂p
   Vector pressure_by_motion(const Vector& closing) const;  // ∂p/∂n_e at the prescribed d
 };
 

@@ -14,8 +14,9 @@ double force_at(const Vector& residual, const Integers& edges, const Vector& end
                 const EdgeLaw& law, const Panels& panels) {
   double square = 0;
   for (size_t i = 0; i < edges.size(); ++i) {
-    const double critical = critical_opening(ends[edges[i]], law, panels).value;
-    const double opening = residual[i] + critical;
+    const int e = edges[i];
+    const double opening = residual[i] + critical_opening(ends[e], law, panels).value;
+    const double critical = critical_of(e, ends[e], opening, law, panels).value;
     const double force = critical * critical - opening * std::abs(opening);
     square += force * force;
   }
@@ -57,19 +58,26 @@ bool run_more(Flags& runs, const LinearResponse& response, const ResponseSolutio
   bool more = false;
   for (int e = 0; e < int(runs.size()); ++e) {
     const Edge& edge = response.edges[e];
-    const bool unbalanced = std::abs(edge.residual) > RUNNING * law.critical;
+    const bool pinned = law.pinning > 0 && edge.held;
+    const double residual = edge.imbalance(e % 2, law.pinning).value;
+    const bool unbalanced = std::abs(residual) > RUNNING * law.critical && !pinned;
     const bool far = std::abs(now.motion[e] - edge.here) > FOLLOWING * law.longest_step;
     if ((unbalanced || (none && far)) && !runs[e]) runs[e] = more = true;
   }
   return more;
 }
 
-// Let edges run that would follow too far; returns whether there are any.
-bool run_far(Flags& runs, const LinearResponse& response, const Vector& way, const EdgeLaw& law) {
+// Let edges run that would follow too far, or across their memory; returns whether there are any.
+bool run_far(Flags& runs, const LinearResponse& response, const Vector& way, const Vector& ends,
+             const EdgeLaw& law) {
   bool more = false;
   for (int e = 0; e < int(runs.size()); ++e) {
     // written so that NaN is too far
-    const bool near = std::abs(way[e]) <= FURTHEST_FOLLOWING * law.longest_step;
+    bool near = std::abs(way[e]) <= FURTHEST_FOLLOWING * law.longest_step;
+    if (law.pinning > 0) {
+      const double gone = way_from_memory(e, ends[e], law);
+      near = near && gone * (gone + way[e]) >= 0;
+    }
     if (!(response.edges[e].held || near)) runs[e] = more = true;
   }
   return more;
@@ -88,12 +96,13 @@ bool cut(Vector& way, const std::vector<Gap>& gaps, const EdgeLaw& law) {
   return is_cut;
 }
 
-// Mark the edges that run, and those beside them.
-Flags beside(const Flags& runs) {
+// Mark the edges that run, those beside them, and those at their memory, which may be pinned: all
+// that are in the model of the openings.
+Flags held_edges(const Flags& runs, const Vector& ends, const EdgeLaw& law) {
   const int count = int(runs.size());
-  Flags some(runs);
+  Flags some = at_memory(ends, law);
   for (int e = 0; e < count; ++e)
-    if (runs[e]) some[(e + 1) % count] = some[(e + count - 1) % count] = true;
+    if (runs[e]) some[e] = some[(e + 1) % count] = some[(e + count - 1) % count] = true;
   return some;
 }
 
@@ -170,7 +179,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   Flags& runs = running.edges;
   Descent out;
   double& reach = out.reach = running.reach;
-  Flags held = beside(runs);
+  Flags held = held_edges(runs, ends, law);
   Integers edges = indices(held);
   Vector before = ends;
   ModelFlow flow;
@@ -180,7 +189,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   while (out.steps < most_steps) {
     check_signals();
     if (!moved) {
-      condense_gaps(response, hold_edges(response, ends, held));
+      condense_gaps(response, hold_edges(response, ends, held, law), law);
     } else if (!move_references(response, ends, held, pressure, prescribed, law, model)) {
       out.event = DescentEvent::outgrown;
       break;
@@ -225,10 +234,10 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
       if (law.critical == 0)
         is_cut = cut(way, map_gaps(ends), law);
       else
-        more = run_far(runs, response, way, law);
+        more = run_far(runs, response, way, ends, law);
     }
     if (more) {
-      held = beside(runs);
+      held = held_edges(runs, ends, law);
       edges = indices(held);
       continue;
     }

@@ -2,6 +2,12 @@
 //
 // Edges are numbered along the profile: 2k and 2k + 1 are the left and the right end of gap k.
 // Motions are outwards of the contact: a left end of a gap moves to the right.
+//
+// With one work of adhesion every edge has C_e = C_c in equilibrium. With two of them an edge
+// advances at C_c and recedes at C_c sqrt(γ_open/γ); between both it is pinned. Its memory is the
+// place where it was at the last state: ahead of it the edge advances, behind it the edge recedes,
+// and there it is held while C lies between both openings. A path of states therefore depends on
+// its past, and within a jump an edge that ran too far comes back as it went.
 #pragma once
 
 #include "model.hpp"
@@ -20,6 +26,7 @@ struct EdgeLaw {
   double overlap_limit;     // an opening this far below zero is one that descent cannot weigh
   double force_error;       // a force C_c² - C² this small is that of rounding
   double pinning;           // sqrt(γ_open/γ) - 1, by which C_c of a receding edge is larger
+  Vector memory;            // ends at the last state; empty for one work of adhesion
 };
 
 inline double outwards(int edge) { return edge % 2 == 0 ? 1 : -1; }
@@ -30,6 +37,24 @@ inline ValueAndSlope critical_opening(double theta, const EdgeLaw& law, const Pa
   double root = std::sqrt(measure);
   return {law.critical * root, law.critical * slope / (2 * root)};
 }
+
+// How far an edge has advanced from its memory; exactly 0 where it may be pinned.
+inline double way_from_memory(int edge, double theta, const EdgeLaw& law) {
+  const double way = outwards(edge) * (theta - law.memory[edge]);
+  return std::abs(way) > 0.5 * law.newton_tolerance ? way : 0;
+}
+
+// C_c of an edge with the opening C, and its derivative by θ; of a pinned edge it is C.
+struct CriticalOpening {
+  double value, slope;
+  bool pinned;
+};
+
+CriticalOpening critical_of(int edge, double theta, double opening, const EdgeLaw& law,
+                            const Panels& panels);
+
+// Mark the edges at their memory; none with one work of adhesion.
+Flags at_memory(const Vector& ends, const EdgeLaw& law);
 
 inline Vector move_edges(const Vector& ends, const Vector& motion) {
   Vector out(ends);

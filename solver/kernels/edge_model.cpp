@@ -23,6 +23,20 @@ double share_within(const EdgeModel& model, const Vector& step, const Vector& li
   return share;
 }
 
+// Shorten steps that lead across the memory: there an edge may be pinned. From there it moves with
+// its force only.
+void stop_at_memory(const EdgeModel& model, const Vector& force, Vector& step,
+                    const EdgeLaw& law) {
+  for (size_t c = 0; c < step.size(); ++c) {
+    const double way = way_from_memory(model.edges[c].edge, model.edges[c].theta, law);
+    if (way == 0) {
+      if (step[c] * force[c] <= 0) step[c] = 0;
+    } else if (way * (way + step[c]) < 0) {
+      step[c] = -way;
+    }
+  }
+}
+
 // Compute the largest motion to the minimum of a quadratic model; infinite without one.
 double distance_to_minimum(const Matrix& hessian, const Vector& force) {
   Matrix factor = hessian;
@@ -92,8 +106,10 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
 
 void EdgeModel::evaluate(MovingEdge& edge) const {
   auto [half_plane, slope] = half_plane_opening(edge.theta, edge.edge % 2, panels_);
-  auto [critical, drift] = critical_opening(edge.theta, law_, panels_);
+  auto [critical, drift, pinned] =
+      critical_of(edge.edge, edge.theta, edge.opening, law_, panels_);
   edge.half_plane = half_plane;
+  edge.pinned = pinned;
   edge.rate = edge.own + outwards(edge.edge) * slope;
   edge.critical = critical;
   edge.critical_rate = outwards(edge.edge) * drift;
@@ -151,6 +167,10 @@ void EdgeModel::hessian(Matrix& out) const {
       out(e, f) = twice * std::max(edges[f].opening, 0.0) * coupling_(e, f);
     out(e, e) = 2 * (std::abs(edge.opening) * edge.rate - edge.critical * edge.critical_rate);
   }
+  for (int e = 0; e < out.n; ++e) {
+    if (!edges[e].pinned) continue;
+    for (int f = 0; f < out.n; ++f) out(e, f) = out(f, e) = e == f ? 1 : 0;
+  }
 }
 
 ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds, bool is_long,
@@ -169,6 +189,7 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
     if (is_long ? near_balance(total, strongest, law) : FORCES_FELL * total < first) break;
     model.hessian(hessian);
     Vector step = implicit_step(hessian, force, longest, equal_speeds);
+    if (law.pinning > 0) stop_at_memory(model, force, step, law);
     const double shortest = RUNNING_ENDS * law.longest_step;
     if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
                                         total < FAINT_SADDLE * law.force_error))

@@ -28,6 +28,7 @@ struct MovingEdge {
   double opening, rate;   // C, and ∂C/∂n
   double half_plane;      // R
   double critical, critical_rate;  // C_c, and its derivative by n
+  bool pinned;                     // whether C lies between both critical openings
   double own;             // ∂C/∂n, less that of a half-plane crack
 };
 
@@ -45,7 +46,8 @@ class EdgeModel {
   // Forces C_c² - C |C|.
   void forces(Vector& force) const;
 
-  // H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others.
+  // H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others. Pinned
+  // edges, which have no force, are kept where they are.
   void hessian(Matrix& out) const;
 
   // ∂C_e/∂n_f over C_f; zero on the diagonal.

@@ -111,6 +111,7 @@ void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
     edge.opening = opening[side][by_field];
     edge.opening_by_pressure = opening[side][by_pressure];
     edge.residual = edge.opening - critical;
+    edge.drift = outwards(side) * drift;
     // by the opening of the other end
     const double far = opening[side][by_left_end + 1 - side] + std::sqrt(nodes.slope[k][side] / 2);
     edge.tangent[1 - side] = far * strength[1 - side];
@@ -127,10 +128,10 @@ void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
       charge_by_edge[side][first + i] =
           strength[side] * (w * space.solved[by_left_end + side][i] + space.singular[side][i]);
   }
-  condense(k);
+  condense(k, law.pinning);
 }
 
-void LinearResponse::condense(int k) {
+void LinearResponse::condense(int k, double pinning) {
   const Vector& w = gauss_rules()[nodes.orders[k]].weights;
   const int m = nodes.size_of(k), first = nodes.offset[k];
   const double pressure = about_pressure[k];
@@ -139,9 +140,10 @@ void LinearResponse::condense(int k) {
   negative = 0;
   nearest = 1;
   left.compliance = right.compliance = {0, 0};
+  const auto [residual_left, a] = left.imbalance(0, pinning);
+  const auto [residual_right, d] = right.imbalance(1, pinning);
+  const double b = left.tangent[1], c = right.tangent[0];
   if (!(left.held || right.held)) {
-    const auto [a, b] = left.tangent;
-    const auto [c, d] = right.tangent;
     const double det = a * d - b * c;
     left.compliance = {d / det, -b / det};
     right.compliance = {-c / det, a / det};
@@ -152,14 +154,13 @@ void LinearResponse::condense(int k) {
     for (int side = 0; side < 2; ++side) {
       Edge& edge = edges[2 * k + side];
       if (edge.held) continue;
-      edge.compliance[side] = 1 / edge.tangent[side];
-      negative = edge.tangent[side] < 0;
+      const double own = side == 0 ? a : d;
+      edge.compliance[side] = 1 / own;
+      negative = own < 0;
     }
   }
-  const double pull_left =
-      -left.residual - left.tangent[0] * left.here - left.tangent[1] * right.here;
-  const double pull_right =
-      -right.residual - right.tangent[0] * left.here - right.tangent[1] * right.here;
+  const double pull_left = -residual_left - a * left.here - b * right.here;
+  const double pull_right = -residual_right - c * left.here - d * right.here;
   const double* potential_here = &about[first];
   const double *by_left = &opening_by_potential[0][first], *by_right = &opening_by_potential[1][first];
   for (int side = 0; side < 2; ++side) {

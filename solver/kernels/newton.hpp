@@ -14,6 +14,10 @@ struct Equilibrium {
   int corrections = 0;
   std::vector<Gap> references;  // of the gaps, and the orders of their rules
   Integers orders;
+  // Place of C between both critical openings, 0 where an edge begins to advance and 1 where it
+  // begins to recede, and its derivative by d; NaN for edges that are not pinned. Empty with one
+  // work of adhesion.
+  Vector pinned_share, pinned_rate;
 };
 
 // Find the equilibrium next to these edges. The references of gaps follow where they move by more

@@ -79,9 +79,12 @@ Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, cons
   Outdated out = is_outdated(response.nodes.gaps[k], gap, softness, law);
   // in other potentials than those of its reference its edges follow otherwise
   const double allowed = REFERENCE_BALANCE * law.critical;
-  for (int e = 2 * k; e < 2 * k + 2; ++e)
-    if (std::abs(response.edges[e].residual) * softness > allowed && allowed > 0)
-      out.changed = true;
+  for (int side = 0; side < 2; ++side) {
+    const Edge& edge = response.edges[2 * k + side];
+    const bool pinned = law.pinning > 0 && edge.held;
+    const double residual = edge.imbalance(side, law.pinning).value;
+    if (std::abs(residual) * softness > allowed && allowed > 0 && !pinned) out.changed = true;
+  }
   return out;
 }
 
@@ -118,9 +121,9 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
   Flags both(held);
   for (int e = 0; e < 2 * count; ++e)
     if (far[e / 2]) both[e] = true;
-  const Flags others = hold_edges(response, ends, both);
+  const Flags others = hold_edges(response, ends, both, law);
   if (!any(changed)) {
-    condense_gaps(response, others);
+    condense_gaps(response, others, law);
     return true;
   }
   for (int k = 0; k < count; ++k)
@@ -131,7 +134,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
     if (changed[k] && renewed) {
       renewed = renew_gap(response, k, before[k], pressure, law, model);
     } else if (others[k]) {
-      response.condense(k);
+      response.condense(k, law.pinning);
       again[k] = true;
     }
   }
@@ -145,7 +148,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
   if (any(far)) {
     // their potentials are not those of the old edges: solved with these held
     pressure = response.solve(prescribed, law, model.device).pressure;
-    hold_edges(response, ends, held);
+    hold_edges(response, ends, held, law);
     for (int k = 0; k < count; ++k)
       if (far[k]) response.linearise_in_current_potential(k, pressure, law, model);
     response.factor_runs(far);
@@ -153,30 +156,33 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
   return true;
 }
 
-Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held) {
+Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held,
+                 const EdgeLaw& law) {
   const Vector motion = response.motion_to(ends);
   Flags changed(ends.size() / 2);
   for (int e = 0; e < int(ends.size()); ++e) {
     Edge& edge = response.edges[e];
     const double here = held[e] ? motion[e] : 0;
-    if (bool(held[e]) != edge.held || here != edge.here) changed[e / 2] = true;
+    const bool recedes = law.pinning > 0 && way_from_memory(e, ends[e], law) < 0;
+    if (bool(held[e]) != edge.held || here != edge.here || recedes != edge.recedes)
+      changed[e / 2] = true;
+    edge.recedes = recedes;
     edge.held = held[e];
     edge.here = here;
   }
   return changed;
 }
 
-void condense_gaps(LinearResponse& response, const Flags& some) {
+void condense_gaps(LinearResponse& response, const Flags& some, const EdgeLaw& law) {
   for (int k = 0; k < response.gap_count(); ++k)
-    if (some[k]) response.condense(k);
+    if (some[k]) response.condense(k, law.pinning);
   if (any(some)) response.factor_runs(some);
 }
 
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
                      const EdgeLaw& law, const Model& model) {
   const double pressure = response.pressure_at(prescribed, model.device);
-  const Flags none(ends.size());
-  if (!move_references(response, ends, none, pressure, prescribed, law, model)) return false;
+  if (!move_references(response, ends, at_memory(ends, law), pressure, prescribed, law, model)) return false;
   response.solve(prescribed, law, model.device);
   return true;
 }

@@ -34,11 +34,13 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 bool move_references(LinearResponse& response, const Vector& ends, const Flags& held,
                      double pressure, double prescribed, const EdgeLaw& law, const Model& model);
 
-// Hold some edges where they are, and no others; marks the gaps that are to be condensed.
-Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held);
+// Hold some edges where they are, and no others, and note which of all recede; marks the gaps that
+// are to be condensed.
+Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held,
+                 const EdgeLaw& law);
 
 // Eliminate the edges of some gaps anew, and factor the runs that hold them.
-void condense_gaps(LinearResponse& response, const Flags& some);
+void condense_gaps(LinearResponse& response, const Flags& some, const EdgeLaw& law);
 
 // Renew the response for a known equilibrium; returns false as move_references does.
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,

@@ -19,7 +19,9 @@ namespace adhesis {
 
 // An edge in its reference.
 struct Edge {
-  double opening = 0, residual = 0;   // C and C - C_c
+  double opening = 0, residual = 0;   // C and C - C_c, C_c that of an edge that advances
+  double drift = 0;                   // ∂C_c/∂n
+  bool recedes = false;               // whether it is behind its memory, with two works of adhesion
   double opening_by_pressure = 0;     // ∂C/∂p between held edges
   std::array<double, 2> tangent = {};  // ∂(C - C_c)/∂n of both edges of its gap, at the others' g
   bool held = false;                  // whether it stays where it is,
@@ -27,6 +29,13 @@ struct Edge {
   std::array<double, 2> compliance = {};  // inverse of the tangents of edges that are not held
   double isolated_correction = 0;     // motion that would balance the gap by itself
   std::array<double, 2> motion = {};  // without potentials and p, and by a unit of p
+
+  // C - C_c and its derivative by the edge's own motion, by the law of where the edge is now. The
+  // law is asked at every use, so a response stays valid where an edge begins to recede.
+  ValueAndSlope imbalance(int side, double pinning) const {
+    if (!recedes) return {residual, tangent[side]};
+    return {residual - pinning * (opening - residual), tangent[side] - pinning * drift};
+  }
 };
 
 // All edges as the response has them at a prescribed quantity d.
@@ -68,7 +77,7 @@ struct LinearResponse {
                                       const Model& model);
 
   // Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
-  void condense(int k);
+  void condense(int k, double pinning);
 
   // Factor the runs that have changed, or hold gaps that have.
   void factor_runs(Flags changed);

@@ -122,6 +122,7 @@ NewResponse set_up_response(const Vector& ends, double prescribed, const Integer
   out.mean[1] = -field.unit_mean;
   out.mean[0] = dot(out.nodes.weight.data(), out.scaled_opening.data(), n) -
                 field.pressure * out.mean[1];
+  for (Edge& edge : out.edges) edge.held = law.pinning > 0;  // which are pinned is not known yet
   for (int k = 0; k < count; ++k) out.linearise(k, law, model);
   out.factor_runs(Flags(count, true));
   return made;
@@ -194,7 +195,7 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
   if (!std::isfinite(pressure)) return made;
   for (int k = 0; k < count; ++k) {
     if (new_gaps[k]) {
-      out.edges[2 * k].held = out.edges[2 * k + 1].held = false;
+      out.edges[2 * k].held = out.edges[2 * k + 1].held = law.pinning > 0;
       out.linearise_in_current_potential(k, pressure, law, model);
     }
   }

@@ -20,7 +20,7 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.descent.saddle import leaving_step, positions
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, move_edges, step_limits
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import (
@@ -101,22 +101,26 @@ class EdgeMechanics(EdgeProblem):
         orders: Integers | None = None,
         *,
         strict: bool = True,
+        memory: Array | None = None,
     ) -> Point | None:
         """Return the stable equilibrium near these gaps, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
         equilibrium is not stable. ``orders`` are the least orders of the gaps. Unless
-        ``strict``, gaps that are nearly in equilibrium are taken as they are.
+        ``strict``, gaps that are nearly in equilibrium are taken as they are. ``memory`` is where
+        the edges were in the state before, which matters with two works of adhesion; here if not
+        given.
         """
         if not shortest_length(gaps) > 0:
             return None
         reach = max(reach, self.settled)
+        law = self.law_at(gaps if memory is None else memory)
         for _ in range(RESPONSE_TRIALS):
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
                 break
             found = near.response.find_equilibrium(
-                gaps, prescribed, reach, strict, self.law, self.model
+                gaps, prescribed, reach, strict, law, self.model
             )
             self.count.add_newton(found.corrections)
             if found.found:
@@ -136,7 +140,8 @@ class EdgeMechanics(EdgeProblem):
             self.source, gaps, prescribed, self.tolerance, self.model.device,
             lambda: found.solve_field(prescribed, self.model), (found.pressure, found.separation),
         )  # fmt: skip
-        return Point(prescribed, field, found.rate, found.slope)
+        pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
+        return Point(prescribed, field, found.rate, found.slope, pinned=pinned)
 
     def forget(self) -> None:
         """Forget what results would depend on within the error of the field."""
@@ -164,7 +169,7 @@ class EdgeMechanics(EdgeProblem):
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
-        law = self.law
+        law = self.law_at(gaps)
         left, rests, raced = DESCENT_LIMIT, 0, False
         orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
@@ -188,14 +193,16 @@ class EdgeMechanics(EdgeProblem):
                     rests = max(rests, RESTS + 1)  # no patience changes anything
                 rested = gaps
                 strict = rests <= RESTS
-                point = self.equilibrium(gaps, prescribed, reach, orders, strict=strict)
+                point = self.equilibrium(
+                    gaps, prescribed, reach, orders, strict=strict, memory=law.memory
+                )
                 if point is not None:
                     return point, raced
-                left_saddle = self._leave_saddle(gaps, prescribed)
+                left_saddle = self._leave_saddle(gaps, prescribed, law)
                 if left_saddle is not None:
                     gaps = left_saddle
                 elif not strict and rests <= 2 * RESTS:
-                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS)
+                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
     def _descend(
@@ -226,36 +233,38 @@ class EdgeMechanics(EdgeProblem):
             gaps = end.gaps
             near.is_outgrown = True
 
-    def _leave_saddle(self, gaps: Array, prescribed: float) -> Array | None:
+    def _leave_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> Array | None:
         """Move edges without force off a saddle of the energy; None where they are stable.
 
         Both directions along the softest modes are tried, and that on which energy falls more is
         taken, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
-        near = self.responses.at(gaps, prescribed)
-        if near is None or self.critical == 0:
+        near, free = self.responses.at(gaps, prescribed), np.flatnonzero(~law.at_memory(gaps))
+        if near is None or self.critical == 0 or len(free) == 0:
             return None
-        every = np.arange(gaps.size)
-        tangent = near.response.tangent_between(gaps, every, prescribed, self.law, self.model)
-        by_edge = near.response.opening[:, None] * tangent
-        limit = step_limits(gaps, self.law.longest_step)
-        step = leaving_step(by_edge + by_edge.T, limit, positions(gaps, self.source.highest))
-        if step is None:
+        tangent = near.response.tangent_between(gaps, free, prescribed, law, self.model)
+        by_edge = near.response.opening[free, None] * tangent
+        limit = step_limits(gaps, law.longest_step)[free]
+        order = positions(gaps, self.source.highest)[free]
+        found = leaving_step(by_edge + by_edge.T, limit, order)
+        if found is None:
             return None
-        while np.abs(step).max() >= self.law.rest_step:
+        step = np.zeros(gaps.size)
+        step[free] = found
+        while np.abs(step).max() >= law.rest_step:
             ways: list[Array] = [move_edges(gaps, way) for way in (step, -step)]
-            onwards = self._force_along(ways[0], step, prescribed)
-            backwards = self._force_along(ways[1], -step, prescribed)
+            onwards = self._force_along(ways[0], step, prescribed, law)
+            backwards = self._force_along(ways[1], -step, prescribed, law)
             if max(onwards, backwards) > 0:
                 return ways[0] if onwards >= backwards * (1 - EQUAL_GAINS) else ways[1]
             step = 0.5 * step
         return None
 
-    def _force_along(self, gaps: Array, step: Array, prescribed: float) -> float:
+    def _force_along(self, gaps: Array, step: Array, prescribed: float, law: EdgeLaw) -> float:
         """Compute the force along a ``step`` at its end: positive where the energy falls."""
         opening = self.solution(gaps, prescribed).opening
-        residual = imbalance(opening, gaps, self.law, self.source.panels)
+        residual = imbalance(opening, gaps, law, self.source.panels)
         return -float((residual * (2 * opening - residual)) @ step)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
@@ -275,18 +284,20 @@ class EdgeMechanics(EdgeProblem):
             raise FullContact
         return min(smallest, LAST_GAP * float(length[0]))
 
-    def _perturb_most_unbalanced(self, gaps: Array, prescribed: float, times: int) -> Array:
+    def _perturb_most_unbalanced(
+        self, gaps: Array, prescribed: float, times: int, law: EdgeLaw
+    ) -> Array:
         """Move the most unbalanced edge on by ``times`` half a longest step.
 
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
         minimum: the flow stands still there. A minimum draws the edge back.
         """
         opening = self.solution(gaps, prescribed).opening
-        residual = imbalance(opening, gaps, self.law, self.source.panels)
+        residual = imbalance(opening, gaps, law, self.source.panels)
         e = int(np.argmax(np.abs(residual)))
         length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
-        step[e] = min(0.5 * times * self.law.longest_step, 0.25 * length[e // 2], 0.25 * beside)
+        step[e] = min(0.5 * times * law.longest_step, 0.25 * length[e // 2], 0.25 * beside)
         onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
         return onwards

@@ -238,8 +238,6 @@ class SharpMethod(Method):
         self.edges.forget()
         control = self.problem.control
         at = self.states.prescribed_of(state)
-        # the separation of a state at the target, where it is known without rounding
-        exact = target.prescribed if control.is_fixed else None
         point = self.follower.recall_point(state.internal)
         if not state.patches:
             touch, highest = self.nucleation.first_touch()
@@ -265,7 +263,7 @@ class SharpMethod(Method):
                 history.states.append(before)
                 point = self._jump(history, before, gaps, at, target)
             elif at == target.at:
-                history.states.append(self.states.of_point(point, exact))
+                history.states.append(state)
         while point is not None and at != target.at:
             at, point = self.follower.run(history, point, target)
         if point is None and at != target.at and not control.is_load:

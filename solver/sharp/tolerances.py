@@ -60,6 +60,11 @@ LEAST_FAINT_FORCE = 1e-12
 
 MOST_CORRECTIONS = 8
 """Corrections by Newton's iteration before an equilibrium counts as lost."""
+PINNED_CORRECTIONS = 4
+"""Times as many with two works of adhesion, where edges begin to move and are pinned on the way."""
+PINNED_SLACK = 10.0
+"""Faintest forces (``FAINT_FORCE``) by which the opening of a pinned edge may lie outside of both
+critical ones: where a path turns back those of edges that moved are as accurate as that."""
 
 
 STALLED_SHARE = 0.3

@@ -18,7 +18,7 @@ from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
-from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
+from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
@@ -92,6 +92,7 @@ class Branch:
         # straight after a jump or turn: short steps there keep the integral exact
         self._predictor = Predictor(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
+        self._free_step, self._begins_to_move = 0.0, False  # with two works of adhesion
         self._two_folds: TwoFolds | None = None
         self._folds_apart = math.inf  # by the last prediction that saw two
 
@@ -161,7 +162,21 @@ class Branch:
     def _next_step(self) -> float:
         predictor = self._predictor
         motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
-        return self.steps.next(predictor, self._target.at, motion * self._edges.wave)
+        step = self.steps.next(predictor, self._target.at, motion * self._edges.wave)
+        self._free_step, self._begins_to_move = step, False
+        return step if self.point.pinned is None else self._step_to_kink(step, self.point.pinned)
+
+    def _step_to_kink(self, step: float, pinned: PinnedEdges) -> float:
+        """Shorten a step to where a pinned edge begins to move, or let it lead just across.
+
+        The branch has a kink there, and the state on either side belongs to the path.
+        """
+        distance, finest = pinned.distance(step), self.steps.finest
+        if not distance < abs(step) + finest:
+            return step
+        self._begins_to_move = True
+        size = distance - finest if distance > 2 * finest else distance + finest
+        return step if size >= abs(step) else math.copysign(size, step)
 
     def _examine(self, reached: Point, step: float) -> tuple[Accepted, float] | None:
         """Return a point as an accepted one, and how far a gap may have closed on the way.
@@ -175,7 +190,7 @@ class Branch:
         remaining = without_small(gaps, smallest) if shortest_length(gaps) < smallest else None
         closed = self._closing.between(self.point, reached, self._target.branch)
         may_touch = self.trail.closed + closed >= self.trail.clearance or remaining is not None
-        is_output = error > 1 or reached.at == self._target.at
+        is_output = error > 1 or reached.at == self._target.at or self._begins_to_move
         # A step that crossed a fold is not halved.
         can_halve = abs(step) > 2 * self._resolution.finest and not self.steps.crosses_fold
         if error > TRAPEZOID_FAR and can_halve:
@@ -192,9 +207,11 @@ class Branch:
             self._output = event.point
         if event.point.at == self._target.at:
             return  # no further step is taken
-        self._predictor = Predictor(event.point)
+        # what lies before a kink predicts nothing beyond it
+        known = event.point.with_previous(None) if self._begins_to_move else event.point
+        self._predictor = Predictor(known)
         self._look_for_two_folds()
-        self.steps.accept(step, self._predictor)
+        self.steps.accept(self._free_step if self._begins_to_move else step, self._predictor)
 
     def _look_for_two_folds(self) -> None:
         """Note whether two folds ahead are nearer to each other than jumps are located.

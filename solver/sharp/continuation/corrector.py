@@ -19,4 +19,4 @@ def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | No
     # not written as > : a prediction that is no number is none
     if not np.abs(gaps - predictor.point.gaps).max() <= LONGEST_PREDICTION * edges.wave:
         return None
-    return edges.equilibrium(gaps, at, CORRECTED * edges.wave)
+    return edges.equilibrium(gaps, at, CORRECTED * edges.wave, memory=predictor.point.gaps)

@@ -10,6 +10,7 @@ import numpy as np
 from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
+from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
@@ -64,17 +65,19 @@ class Follower:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
+        self._came_on: BranchName | None = None
         self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, memory: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
         self.nucleation.searched = SearchedGaps() if memory is None else memory.searched
         self.openings.healed = []
+        self._came_on = None if memory is None else memory.branch
         if memory is None or memory.branch_data is None:
             return None
-        at, nearly, rate, slope, previous = memory.branch_data
+        at, nearly, rate, slope, previous, pinned = memory.branch_data
         field = self.edges.field(memory.gaps, at, nearly)
-        return Point(at, field, rate, slope, memory.clearance, previous)
+        return Point(at, field, rate, slope, memory.clearance, previous, pinned)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
         """Follow a stable branch to the target or through its next jump.
@@ -84,6 +87,10 @@ class Follower:
         at, point
             d reached and the stable point there, None if no contact is left.
         """
+        if self.edges.pins and self._came_on not in (None, target.branch):
+            point = self._turned_back(point)
+            history.states.append(self.states.of_point(point))
+        self._came_on = None
         jump = self._opening_at(history, point, target)
         if jump is not None:
             history.commit(jump)
@@ -99,8 +106,13 @@ class Follower:
             if jump is not None:
                 history.commit(jump)
                 return jump.at, branch.after_jump(jump)
-        self._remember(history, branch)
+        self._remember(history, branch, target.branch)
         return target.at, branch.point
+
+    def _turned_back(self, point: Point) -> Point:
+        """Return the point at which a path turns back: all its edges are pinned there at first."""
+        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.settled)
+        return point.with_previous(None) if pinned is None else pinned
 
     def _imbalance(self, output: Point, point: Point) -> float:
         """Compute the change of energy between two points of a branch, less the work, in J/m²."""
@@ -108,7 +120,7 @@ class Follower:
             self._output = output, self.states.of_point(output)
         return self.states.energy_residual(self._output[1], self.states.of_point(point))
 
-    def _remember(self, history: History, branch: Branch) -> None:
+    def _remember(self, history: History, branch: Branch, name: BranchName) -> None:
         """Let the last state remember its point."""
         # What has not closed since the last search need not be searched again.
         point = branch.point.with_clearance(max(branch.trail.clearance - branch.trail.closed, 0.0))
@@ -116,8 +128,11 @@ class Follower:
         memory = ContinuationData(
             point.field.gaps,
             point.clearance,
-            BranchData(point.at, point.field.nearly, point.rate, point.slope, point.previous),
+            BranchData(
+                point.at, point.field.nearly, point.rate, point.slope, point.previous, point.pinned
+            ),
             self.nucleation.searched,
+            name,
         )
         history.states[-1] = with_values(history.states[-1], internal=memory)
 

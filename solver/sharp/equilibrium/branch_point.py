@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
+import numpy as np
+
 from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import outward
@@ -18,6 +20,24 @@ class PreviousPoint(NamedTuple):
     at: float
     rate: Array
     gaps: Array
+
+
+class PinnedEdges(NamedTuple):
+    """Place of C of every pinned edge between both critical openings, and its derivative by d.
+
+    It is 0 where an edge begins to advance and 1 where it begins to recede; NaN for other edges.
+    """
+
+    share: Array
+    rate: Array
+
+    def distance(self, step: float) -> float:
+        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
+        rate = self.rate * np.sign(step)
+        left = np.where(rate > 0, 1 - self.share, self.share)
+        moving = np.isfinite(rate) & (rate != 0)
+        ways = np.maximum(left[moving], 0.0) / np.abs(rate[moving])
+        return float(ways.min(initial=np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +57,8 @@ class Point:
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     previous : PreviousPoint, optional
         The point before it on its branch.
+    pinned : PinnedEdges, optional
+        With two works of adhesion.
     """
 
     at: float
@@ -45,6 +67,7 @@ class Point:
     slope: float
     clearance: float = 0.0
     previous: PreviousPoint | None = None
+    pinned: PinnedEdges | None = None
 
     @property
     def gaps(self) -> Array:

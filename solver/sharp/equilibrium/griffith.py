@@ -12,8 +12,7 @@ from adhesis.solver.sharp.tolerances import CLOSING_SHARE
 
 def imbalance(opening: Array, gaps: Array, law: EdgeLaw, panels: Panels) -> Array:
     """Compute C_e - C_c from C at every edge, positive where contact recedes, shape (2L,)."""
-    critical, _ = law.critical_openings(gaps.ravel(), panels)
-    return np.asarray(opening - critical)
+    return np.asarray(opening - law.critical_of(gaps, opening, panels))
 
 
 def move_edges(gaps: Array, step: Array) -> Array:

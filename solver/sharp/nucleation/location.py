@@ -131,10 +131,12 @@ def locate(
         point = None
         reach = CORRECTED * edges.wave
         if many:
-            point = edges.equilibrium(last.interpolate(hit, trial), trial, reach)
+            gaps = last.interpolate(hit, trial)
+            point = edges.equilibrium(gaps, trial, reach, memory=last.gaps)
         for start in (last, hit) if share < 0.5 else (hit, last):
             if point is None:
-                point = edges.equilibrium(start.extrapolate(trial), trial, reach)
+                gaps = start.extrapolate(trial)
+                point = edges.equilibrium(gaps, trial, reach, memory=last.gaps)
         if point is None:
             break
         value, candidates = criterion.minimum(point.field)

@@ -13,7 +13,7 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
+from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
 from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -28,6 +28,7 @@ class BranchData(NamedTuple):
     rate: Array
     slope: float
     previous: PreviousPoint | None
+    pinned: PinnedEdges | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +45,15 @@ class ContinuationData:
         If a path stopped at the state.
     searched : SearchedGaps
         The gaps as they were when they were last searched for touches.
+    branch : {"loading", "unloading"}, optional
+        Branch on which the path stopped.
     """
 
     gaps: Array
     clearance: float
     branch_data: BranchData | None = None
     searched: SearchedGaps = field(default_factory=SearchedGaps)
+    branch: Branch | None = None
 
 
 def loading_device(problem: Problem) -> LoadingDevice:

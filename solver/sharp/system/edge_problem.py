@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver._kernels import EdgeLaw, FieldModel, LoadingDevice
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
@@ -94,6 +95,14 @@ class EdgeProblem:
     def pins(self) -> bool:
         """Whether edges are pinned, as works of adhesion differ."""
         return self.law.pinning > 0
+
+    def law_at(self, memory: Array) -> EdgeLaw:
+        """Return the law of edges that were at ``memory`` in the state before."""
+        if not self.pins:
+            return self.law
+        law = EdgeLaw(self.law)
+        law.memory = memory
+        return law
 
     @property
     def largest_opening(self) -> float:

@@ -86,14 +86,14 @@ class KeptResponses:
     def _unknown(self, known: KeptResponse, gaps: Array) -> int:
         """Count the gaps that would be new to a response."""
         problem = self._problem
-        return known.response.count_unknown(gaps, problem.law, problem.model)
+        return known.response.count_unknown(gaps, problem.law_at(gaps), problem.model)
 
     def _new(
         self, gaps: Array, prescribed: float, least: Integers | None
     ) -> LinearResponse | None:
         """Set up a response of these gaps, from the last one if there is one."""
         problem = self._problem
-        given = gaps, prescribed, least, problem.law, problem.model
+        given = gaps, prescribed, least, problem.law_at(gaps), problem.model
         problem.count.fields += 1
         if self._kept:
             return self._kept[-1].response.update(*given)
@@ -109,7 +109,7 @@ class KeptResponses:
             near = self.near(gaps, prescribed, None)
             if near is None:
                 return None
-            if near.response.settle(gaps, prescribed, problem.law, problem.model):
+            if near.response.settle(gaps, prescribed, problem.law_at(gaps), problem.model):
                 near.settled = gaps
                 return near
             near.is_outgrown = True
