@@ -119,6 +119,8 @@ class Jumps:
         """Difference of the energies of two ends in J/m²; None if they are one."""
         if self._is_same_minimum(rival, point):
             return None
+        if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
+            return 0.0
         ends = (self._after(before, end, at) for end in (point, rival))
         return self.states.energy_difference(*ends)
 
