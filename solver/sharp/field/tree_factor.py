@@ -21,6 +21,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
 from adhesis.solver.sharp.field.cluster_tree import Tree, run_halves, run_span
 from adhesis.solver.sharp.gap.quadrature import Integers
+from adhesis.solver.sharp.tolerances import WEAK_INTERACTION
 
 
 class TreeFactor(NamedTuple):
@@ -123,8 +124,10 @@ def count_negative(h: Array, r: Array) -> tuple[int, float]:
             own, cross = r[i, k], of_r[i]
             third, fourth = (c * cross - b * own) / det, (a * own - b * cross) / det
             for j in range(k + 1, n):
-                h[i, j] -= first * h[k, j] + second * of_h[j]
                 x[i, j] -= first * of_r[j] + second * r[k, j]
+            for j in range(k + 1, n):
+                h[i, j] -= first * h[k, j] + second * of_h[j]
+            for j in range(k + 1, n):
                 r[i, j] -= third * of_r[j] + fourth * r[k, j]
     return negative, least
 
@@ -180,7 +183,8 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
     """Compute the response of a run from those of its halves.
 
     With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
-    than its halves, n that of nodes of the first half: Haynsworth's formula, applied twice.
+    than its halves, n that of nodes of the first half: Haynsworth's formula, applied twice. These
+    are none where the eigenvalues of H R1, real if one of both is definite, are below one.
     """
     responses, negative = factor.response, factor.negative
     one, two, n, m = run_halves(tree, run)
@@ -193,6 +197,7 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
     half = np.dot(kernel, second)
     reflected = np.dot(half, kernel.T)
     matrix = np.dot(reflected, first)
+    squares = _trace_of_square(matrix)
     for i in range(n):
         for j in range(n):
             inverse[i, j] = 0.0
@@ -200,8 +205,10 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
         inverse[i, i] = 1.0
         matrix[i, i] += 1.0
     eliminate(matrix, inverse)
-    counted, factor.nearest[run] = count_negative(reflected, first.copy())
-    negative[run] = negative[one] + negative[two] + n - counted
+    negative[run], factor.nearest[run] = negative[one] + negative[two], 1.0
+    if squares > WEAK_INTERACTION or (negative[one] > 0 and negative[two] > 0):
+        counted, factor.nearest[run] = count_negative(reflected, first.copy())
+        negative[run] += n - counted
     if r == 0:
         return
     interpolation = tree.interpolation[run_span(tree.interpolation_start, run)].reshape(n + m, r)
@@ -222,6 +229,17 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
             mean = 0.5 * (response[i, j] + response[j, i])
             response[i, j] = mean
             response[j, i] = mean
+
+
+@compiled_sums
+def _trace_of_square(a: Array) -> float:
+    """Add up the squares of the eigenvalues of a matrix."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        for j in range(i):
+            total += 2 * a[i, j] * a[j, i]
+        total += a[i, i] * a[i, i]
+    return total
 
 
 @compiled
