@@ -138,6 +138,14 @@ void eliminate(double* a, int n, double* x, int columns) {
 
 namespace {
 
+// Add up the squares of the eigenvalues of a matrix.
+double trace_of_square(const double* a, int n) {
+  double total = 0;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) total += a[i * n + j] * a[j * n + i];
+  return total;
+}
+
 // Bring the pivot of two rows with the largest determinant to row and column k.
 void take_pivot(const std::array<double*, 3>& matrices, int k, int n) {
   auto [h, r, x] = matrices;
@@ -348,6 +356,7 @@ void Tree::factor(int index) {
   add_product(k12, second, n, m, m, half.data());
   add_product(half.data(), k21.data(), n, m, n, reflected.data());
   add_product(reflected.data(), first, n, n, n, matrix.data());
+  const double squares = trace_of_square(matrix.data(), n);
   double* unit = &inverse[run.inverse];
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
@@ -357,10 +366,15 @@ void Tree::factor(int index) {
   }
   eliminate(matrix.data(), n, unit, n);
   // With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
-  // than its halves: Haynsworth's formula, applied twice.
-  Vector own_first(first, first + n * n);
-  run.count = count_negative(reflected.data(), own_first.data(), n);
-  run.count.negative = one.count.negative + two.count.negative + n - run.count.negative;
+  // than its halves: Haynsworth's formula, applied twice. These are none where the eigenvalues of
+  // H R1, real if one of both is definite, are below one.
+  run.count = {one.count.negative + two.count.negative, 1};
+  if (squares > WEAK_INTERACTION || (one.count.negative > 0 && two.count.negative > 0)) {
+    Vector own_first(first, first + n * n);
+    const NegativeCount pair = count_negative(reflected.data(), own_first.data(), n);
+    run.count.negative += n - pair.negative;
+    run.count.nearest = pair.nearest;
+  }
   if (r == 0) return;
   const double *e1 = &interpolation[run.interpolation], *e2 = e1 + n * r;
   double *d1 = &inner_potential[run.interpolation], *d2 = d1 + n * r;

@@ -198,9 +198,9 @@ class EdgeMechanics(EdgeProblem):
                 )
                 if point is not None:
                     return point, raced
-                left_saddle = self._leave_saddle(gaps, prescribed, law)
-                if left_saddle is not None:
-                    gaps = left_saddle
+                ways = self.ways_off_saddle(gaps, prescribed, law)
+                if ways:
+                    gaps = ways[0]
                 elif not strict and rests <= 2 * RESTS:
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
@@ -233,23 +233,23 @@ class EdgeMechanics(EdgeProblem):
             gaps = end.gaps
             near.is_outgrown = True
 
-    def _leave_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> Array | None:
-        """Move edges without force off a saddle of the energy; None where they are stable.
+    def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
+        """Move edges without force off a saddle of the energy; an empty list where they are stable.
 
-        Both directions along the softest modes are tried, and that on which energy falls more is
-        taken, of equal ones that in which the leading edge goes outwards. Where energy rises on
+        Both directions along the softest modes are tried. That on which energy falls more is the
+        first, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
         near, free = self.responses.at(gaps, prescribed), np.flatnonzero(~law.at_memory(gaps))
         if near is None or self.critical == 0 or len(free) == 0:
-            return None
+            return []
         tangent = near.response.tangent_between(gaps, free, prescribed, law, self.model)
         by_edge = near.response.opening[free, None] * tangent
         limit = step_limits(gaps, law.longest_step)[free]
         order = positions(gaps, self.source.highest)[free]
         found = leaving_step(by_edge + by_edge.T, limit, order)
         if found is None:
-            return None
+            return []
         step = np.zeros(gaps.size)
         step[free] = found
         while np.abs(step).max() >= law.rest_step:
@@ -257,9 +257,9 @@ class EdgeMechanics(EdgeProblem):
             onwards = self._force_along(ways[0], step, prescribed, law)
             backwards = self._force_along(ways[1], -step, prescribed, law)
             if max(onwards, backwards) > 0:
-                return ways[0] if onwards >= backwards * (1 - EQUAL_GAINS) else ways[1]
+                return ways if onwards >= backwards * (1 - EQUAL_GAINS) else ways[::-1]
             step = 0.5 * step
-        return None
+        return []
 
     def _force_along(self, gaps: Array, step: Array, prescribed: float, law: EdgeLaw) -> float:
         """Compute the force along a ``step`` at its end: positive where the energy falls."""

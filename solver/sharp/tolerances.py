@@ -95,6 +95,9 @@ SOFT_EDGE = 6.0
 softer edge is taken to be next to a fold, where its tangent changes fast, too: it may leave its
 reference by less. In loops at the paper's scale half of all edges have 2 to 4. Without this folds
 were found up to 6e-4 h_max late."""
+WEAK_INTERACTION = 0.7
+"""Sum of the squares of the eigenvalues by which two runs act on each other, instability being at
+one: below it none is within a sixth (``SOFT_EDGE``) of that, and none is counted."""
 REFERENCE_BALANCE = 0.01
 """C_c. Edges further out of balance in the reference of their gap, in the potentials that it had,
 follow otherwise than its response has it. Without this rates were wrong by 2e-3 after some gaps had

@@ -330,7 +330,7 @@ class Clearance:
         """Seed at a place."""
         return [place]
 
-    def is_located(self, value: float, many: bool, near: bool) -> bool:
+    def is_located(self, value: float, near: bool) -> bool:
         """Whether the overlap is small."""
         return near and value > -0.5 * self.tolerance
 

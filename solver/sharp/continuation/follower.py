@@ -29,6 +29,7 @@ from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import (
+    CORRECTED,
     EQUAL_AMPLITUDES,
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
@@ -311,10 +312,8 @@ class Follower:
             states = (last,)
         response = self.edges.response_before_fold(point)
         before = self.states.at_fixed_edges(last, point.field, response, fold.at)
-        jump = self.jumps.compute(
-            before, self._start_at_fold(fold), fold.at, target.branch, known=point,
-            orders=self._orders_of_folds(fold),
-        )  # fmt: skip
+        start, orders = self._start_at_fold(fold)
+        jump = self.jumps.compute(before, start, fold.at, target.branch, known=point, orders=orders)
         after = jump.states[-1]
         late = self.states.work(before, after, way)
         drop = jump.jump.energy_drop
@@ -342,22 +341,31 @@ class Follower:
         starts = tuple(self._moved_on(point.gaps, edge, way * longest) for edge, way in ahead)
         return Orders(furthest, starts)
 
-    def _start_at_fold(self, fold: Fold) -> Array:
-        """Return the edges from which a descent at a fold starts.
+    def _start_at_fold(self, fold: Fold) -> tuple[Array, Orders | None]:
+        """Return the edges from which a descent at a fold starts, and other orders of events.
 
-        Of edges that are mirror images in a state that is its own image, one is moved on a little:
-        the first to the right of the highest crest. If they hold each other back, it goes first, as
-        one does in any other profile; if they help each other, they go together all the same.
+        A state that is its own mirror image may go on as a saddle. That is left to either side;
+        which of them counts as an order, as these may differ where several modes soften at once.
+        Else of edges that are mirror images one is moved on a little: the first to the right of the
+        highest crest. If they hold each other back, it goes first, as one does in any other
+        profile; if they help each other, they go together all the same.
         """
         point = fold.point
         if not self.jumps.mirror.is_symmetric(point.gaps):
-            return point.gaps
+            return point.gaps, self._orders_of_folds(fold)
+        reach = CORRECTED * self.edges.wave
+        saddle = self.edges.equilibrium(point.extrapolate(fold.at), fold.at, reach, strict=False)
+        if saddle is not None:
+            ways = self.edges.ways_off_saddle(saddle.gaps, fold.at, self.edges.law_at(point.gaps))
+            if ways:
+                return ways[0], Orders(fold.at, tuple(ways))
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
         away = positions(point.gaps, self.edges.source.highest)[fastest]
         edge = int(fastest[np.argmin(away)])
         way = np.sign(point.rate[edge] * (fold.at - point.at))
-        return self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
+        moved = self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
+        return moved, self._orders_of_folds(fold)
 
     def _moved_on(self, gaps: Array, edge: int, length: float) -> Array:
         """Return gaps with one edge moved outwards by a length in θ, or to its limit."""

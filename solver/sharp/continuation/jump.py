@@ -119,6 +119,8 @@ class Jumps:
         """Difference of the energies of two ends in J/m²; None if they are one."""
         if self._is_same_minimum(rival, point):
             return None
+        if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
+            return 0.0
         ends = (self._after(before, end, at) for end in (point, rival))
         return self.states.energy_difference(*ends)
 
@@ -185,7 +187,10 @@ class Jumps:
         """Whether two descents led to one minimum."""
         if one is None or other is None:
             return one is other
-        here, there = one.field.gaps, other.field.gaps
+        return self._is_same(one.gaps, other.gaps)
+
+    def _is_same(self, here: Array, there: Array) -> bool:
+        """Whether gaps are those of one minimum."""
         apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.coarse)
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
@@ -207,7 +212,9 @@ class Jumps:
         if not rivals and self.edges.critical > 0 and raced:
             try:
                 rival, _ = self._relax(gaps, at, equal_speeds=True)
-                if not self._is_same_minimum(rival, point):
+                # next to a fold the field's error may show a minimum where the edges are
+                has_left = rival is None or not self._is_same(rival.gaps, gaps)
+                if has_left and not self._is_same_minimum(rival, point):
                     rivals.append(rival)
             except FullContact as full:
                 rivals.append(full)

@@ -27,17 +27,24 @@ class MirrorCheck:
 
     def is_symmetric(self, gaps: Array) -> bool:
         """Whether these gaps are their own mirror image."""
-        return any(self._is_image(gaps, axis) for axis in self._axes)
+        return self.are_images(gaps, gaps)
+
+    def are_images(self, one: Array, other: Array) -> bool:
+        """Whether two states are mirror images of each other."""
+        return one.shape == other.shape and any(
+            self._is_image(one, other, axis) for axis in self._axes
+        )
 
     def is_broken(self, before: Array, after: Array) -> bool:
         """Whether a symmetry of the gaps ``before`` is not one of those ``after``."""
         return any(
-            self._is_image(before, axis) and not self._is_image(after, axis) for axis in self._axes
+            self._is_image(before, before, axis) and not self._is_image(after, after, axis)
+            for axis in self._axes
         )
 
-    def _is_image(self, gaps: Array, axis: float) -> bool:
-        """Whether these gaps are their own image about this axis."""
-        image = 2 * axis - gaps[:, ::-1]
-        apart = np.abs((image[:, None] - gaps[None] + np.pi) % (2 * np.pi) - np.pi)
+    def _is_image(self, one: Array, other: Array, axis: float) -> bool:
+        """Whether the image of some gaps about this axis are others."""
+        image = 2 * axis - one[:, ::-1]
+        apart = np.abs((image[:, None] - other[None] + np.pi) % (2 * np.pi) - np.pi)
         nearest = apart.max(axis=2).min(axis=1, initial=np.inf)
         return bool((nearest < self._near).all())

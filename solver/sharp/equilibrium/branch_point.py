@@ -116,6 +116,8 @@ class Point:
             vectors.
         """
         left = (self.field.opening.ravel() * self.rate)[edges]
+        if not left.any():
+            return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))
 
     def interpolate(self, other: Point, at: float) -> Array:

@@ -126,9 +126,9 @@ class Nucleation:
         self.edges.count.openings += count
         return least, Minima(*found)
 
-    def is_located(self, value: float, many: bool, near: bool) -> bool:
+    def is_located(self, value: float, near: bool) -> bool:
         """Return whether a touch is located finely enough; see ``location.Criterion``."""
-        return value == 0 or ((many or near) and value > -0.5 * self.tolerance)
+        return value > -0.5 * self.tolerance
 
     def validate_location(self, value: float, at: float) -> None:
         """Raise if surfaces overlap at the touch that was located."""

@@ -105,7 +105,7 @@ class Openings:
         self.healed += cracks
         self.heals += len(cracks)
 
-    def is_located(self, value: float, many: bool, near: bool) -> bool:
+    def is_located(self, value: float, near: bool) -> bool:
         """Return whether a maximum with this value is located finely enough.
 
         A maximum may appear with a tension above the strength: then no point of the branch is.
