@@ -19,7 +19,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 # What h5py is built with, without isolation; Cython and pkgconfig are needed for nothing else.
-BUILD = ("setuptools", "Cython", "pkgconfig", "packaging")
+BUILD = ("setuptools", "Cython", "pkgconfig", "packaging", "scikit_build_core", "nanobind")
 TEST_EXTRAS = ("dev", "instruments")
 
 

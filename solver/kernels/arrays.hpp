@@ -10,6 +10,14 @@
 #include <span>
 #include <vector>
 
+// Functions of long loops, made for vectors of four numbers, too, and chosen when the module is
+// loaded. Sums in fixed lanes and no contracted a·b + c: both have the same bits.
+#if defined(__x86_64__)
+#define WIDE [[gnu::target_clones("avx2", "default")]]
+#else
+#define WIDE
+#endif
+
 namespace adhesis {
 
 using Vector = std::vector<double>;
@@ -24,10 +32,14 @@ inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 // Four numbers that are computed together, by whatever vectors the processor has.
 typedef double Four __attribute__((vector_size(32)));
 
-inline Four load_four(const double* from) {
+[[gnu::always_inline]] inline Four load_four(const double* from) {
   Four out;
   std::memcpy(&out, from, sizeof out);
   return out;
+}
+
+[[gnu::always_inline]] inline void store_four(Four value, double* to) {
+  std::memcpy(to, &value, sizeof value);
 }
 
 // Sum a_i b_i: every fourth product apart, in two turns, then these eight in pairs.

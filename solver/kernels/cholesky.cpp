@@ -59,7 +59,7 @@ void solve_forward(const double* f, int n, int stride, double* x, int columns) {
 
 }  // namespace
 
-bool factor_rows(double* a, int n, int stride) {
+WIDE bool factor_rows(double* a, int n, int stride) {
   for (int last = n; last > 0;) {
     const int first = std::max(last - block, 0);
     for (int k = last - 1; k >= first; --k) {
@@ -80,7 +80,7 @@ bool factor_rows(double* a, int n, int stride) {
   return true;
 }
 
-void solve_column(const double* factor, int n, int stride, double* x) {
+WIDE void solve_column(const double* factor, int n, int stride, double* x) {
   for (int i = n - 1; i >= 0; --i) {
     x[i] /= factor[i * stride + i];
     subtract(x[i], factor + i * stride, x, i);
@@ -89,7 +89,7 @@ void solve_column(const double* factor, int n, int stride, double* x) {
     x[i] = (x[i] - dot(factor + i * stride, x, i)) / factor[i * stride + i];
 }
 
-bool invert_definite(const double* matrix, int n, double* inverse) {
+WIDE bool invert_definite(const double* matrix, int n, double* inverse) {
   Vector factor(matrix, matrix + n * n), unit(n * n, 0.0);
   if (!factor_rows(factor.data(), n, n)) return false;
   for (int i = 0; i < n; ++i) unit[i * n + i] = 1;

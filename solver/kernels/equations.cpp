@@ -135,7 +135,7 @@ double mapped_kernel(double alpha, double x) {
   return 4 * (4 * alpha * alpha / (twice * twice) - 1 / (x * x));
 }
 
-void end_charges(const Nodes& nodes, const Equations& equations, int k, int side,
+WIDE void end_charges(const Nodes& nodes, const Equations& equations, int k, int side,
                  const GaussRule& rule, double* density, double* load, double* charge) {
   const int m = rule.count, first = nodes.offset[k];
   const double* block = &equations.blocks[nodes.square[k]];

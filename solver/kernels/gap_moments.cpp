@@ -212,11 +212,11 @@ MomentNodes place_moment_nodes(const Gap& gap, int modes, int fields, const Pane
   return nodes;
 }
 
-double sum_lanes(Four x) { return (x[0] + x[1]) + (x[2] + x[3]); }
+[[gnu::always_inline]] inline double sum_lanes(Four x) { return (x[0] + x[1]) + (x[2] + x[3]); }
 
 }  // namespace
 
-void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
+WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
                  std::array<std::array<double, 2>, 2>& ends) {
   MomentNodes nodes = place_moment_nodes(gap, modes, fields, panels);
   for (; nodes.count % 4 != 0; ++nodes.count) {  // whole vectors, the last ones without weight
@@ -224,7 +224,7 @@ void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, do
     for (int field = 0; field < fields; ++field) nodes.source[field][nodes.count] = 0;
   }
   // sin((n+1)t), cos t = η, by its recurrence; four nodes at a time, for all modes
-  std::vector<std::array<Four, 2>> total(modes, {Four{}, Four{}});
+  Vector total(8 * modes);  // four of each field
   std::array<Four, 2> low = {}, high = {};
   for (int i = 0; i < nodes.count; i += 4) {
     const Four minus = load_four(&nodes.from_end[1][i]), plus = load_four(&nodes.from_end[0][i]);
@@ -242,8 +242,9 @@ void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, do
       high[field] += share * plus;
     }
     for (int n = 0; n < modes; ++n) {
-      total[n][0] += source[0] * now;
-      if (fields > 1) total[n][1] += source[1] * now;
+      double* sums = &total[8 * n];
+      store_four(load_four(sums) + source[0] * now, sums);
+      if (fields > 1) store_four(load_four(sums + 4) + source[1] * now, sums + 4);
       const Four next = twice * now - previous;
       previous = now;
       now = next;
@@ -252,7 +253,7 @@ void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, do
   for (int field = 0; field < fields; ++field) {
     ends[0][field] = sum_lanes(low[field]);
     ends[1][field] = sum_lanes(high[field]);
-    for (int n = 0; n < modes; ++n) s[n * fields + field] = sum_lanes(total[n][field]) * (2 / pi);
+    for (int n = 0; n < modes; ++n) s[n * fields + field] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
   }
 }
 

@@ -29,7 +29,7 @@ struct Space {
 //
 // They change it most sharply. Without them the derivative of the interpolated potential is more
 // accurate, for uneven gaps by an order of magnitude.
-void add_near_potential(const Nodes& nodes, const Vector& opening, int k, Space& space) {
+WIDE void add_near_potential(const Nodes& nodes, const Vector& opening, int k, Space& space) {
   const int count = nodes.gap_count(), first = nodes.offset[k], m = nodes.size_of(k);
   const double *sine = &nodes.sine[first], *cosine = &nodes.cosine[first];
   double *__restrict near = space.near.data(), *__restrict slope = space.near_slope.data();
@@ -75,7 +75,7 @@ void load_gap(const LinearResponse& response, int k, const GaussRule& rule, Spac
 
 }  // namespace
 
-void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
+WIDE void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   const double* own = &inverse[nodes.square[k]];
@@ -131,7 +131,7 @@ void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
   condense(k, law.pinning);
 }
 
-void LinearResponse::condense(int k, double pinning) {
+WIDE void LinearResponse::condense(int k, double pinning) {
   const Vector& w = gauss_rules()[nodes.orders[k]].weights;
   const int m = nodes.size_of(k), first = nodes.offset[k];
   const double pressure = about_pressure[k];

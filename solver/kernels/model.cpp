@@ -19,7 +19,7 @@ ValueAndSlope evaluate_series(const Vector& coefficients, double theta, const Pa
   return {x * b1 - b2 + c[0], (b1 + x * d1 - d2) * 2 / panels.width};
 }
 
-void interpolate(const Vector& coefficients, const double* position, int count,
+WIDE void interpolate(const Vector& coefficients, const double* position, int count,
                  const Panels& panels, double* out) {
   const int terms = int(coefficients.size()) / panels.finest_count;
   const int last = panels.finest_count - 1;

@@ -22,7 +22,7 @@ int wanted_rank(const Gap& interval, double digits) {
 }
 
 // Compute K between two sets of charges.
-void fill_kernel(const double* theta, const double* stretch, int rows, const double* other,
+WIDE void fill_kernel(const double* theta, const double* stretch, int rows, const double* other,
                  const double* other_stretch, int columns, double* out) {
   Vector sine(columns), cosine(columns);
   for (int j = 0; j < columns; ++j) {
@@ -60,7 +60,7 @@ void fill_interpolation(const Gap& interval, const Vector& node, const Vector& s
 }
 
 // out += a b, a of (rows, inner), b of (inner, columns).
-void add_product(const double* a, const double* __restrict b, int rows, int inner, int columns,
+WIDE void add_product(const double* a, const double* __restrict b, int rows, int inner, int columns,
                  double* __restrict out) {
   for (int i = 0; i < rows; ++i) {
     double* row = out + i * columns;
@@ -77,7 +77,7 @@ void add_product(const double* a, const double* __restrict b, int rows, int inne
 }
 
 // out += aᵀ b, a of (inner, rows), b of (inner, columns).
-void add_transposed_product(const double* a, const double* __restrict b, int inner, int rows,
+WIDE void add_transposed_product(const double* a, const double* __restrict b, int inner, int rows,
                             int columns, double* __restrict out) {
   int k = 0;
   for (; k + 4 <= inner; k += 4) {
@@ -112,7 +112,7 @@ void add(const double* a, double* out, int count) {
 
 }  // namespace
 
-void eliminate(double* a, int n, double* x, int columns) {
+WIDE void eliminate(double* a, int n, double* x, int columns) {
   for (int k = 0; k < n; ++k) {
     int best = k;
     for (int i = k + 1; i < n; ++i)
@@ -168,7 +168,7 @@ void take_pivot(const std::array<double*, 3>& matrices, int k, int n) {
 
 }  // namespace
 
-NegativeCount count_negative(double* h, double* r, int n) {
+WIDE NegativeCount count_negative(double* h, double* r, int n) {
   Vector unit(n * n), of_h(n), of_r(n);
   for (int i = 0; i < n; ++i) unit[i * n + i] = 1;
   double* x = unit.data();
@@ -308,7 +308,7 @@ Tree::Tree(const Nodes& nodes, const Halves& halves, const Integers& known, doub
   inner_potential.resize(end.interpolation);
 }
 
-void Tree::place_charges(int index) {
+WIDE void Tree::place_charges(int index) {
   const Run& run = runs[index];
   const int rank = run.rank;
   Vector node(rank), share(rank);  // Chebyshev nodes, and their barycentric weights
@@ -395,7 +395,7 @@ void Tree::factor(int index) {
       own[i * r + j] = own[j * r + i] = 0.5 * (own[i * r + j] + own[j * r + i]);
 }
 
-void Tree::charge(int index, Charges& charges) const {
+WIDE void Tree::charge(int index, Charges& charges) const {
   const Run& run = runs[index];
   const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
   const int n = one.rank, m = two.rank, r = run.rank;
@@ -424,7 +424,7 @@ void Tree::charge(int index, Charges& charges) const {
   for (int i = 0; i < m; ++i) add_scaled(q2[i], up + (n + i) * r, q, r);
 }
 
-void Tree::pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const {
+WIDE void Tree::pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const {
   for (int index = run_count() - 1; index >= count; --index) {
     if (!wanted[index]) continue;
     const Run& run = runs[index];
