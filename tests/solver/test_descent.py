@@ -27,7 +27,12 @@ from adhesis.solver.sharp.descent.implicit_flow import (
     Running,
     descend,
 )
-from adhesis.solver.sharp.descent.model_flow import ModelFlow, flow_through, implicit_step
+from adhesis.solver.sharp.descent.model_flow import (
+    ModelFlow,
+    distance_to_minimum,
+    flow_through,
+    implicit_step,
+)
 from adhesis.solver.sharp.descent.saddle import leaving_step
 from adhesis.solver.sharp.descent.step_size import model_error, next_reach
 from adhesis.solver.sharp.equilibrium.griffith import imbalance
@@ -276,7 +281,7 @@ def test_an_implicit_step_is_downhill_and_within_its_length(seed, equal_speeds):
     matrix = root + root.T + np.diag(10.0 ** rng.uniform(0, 1.5, count))  # stiff, some unstable
     force, step = rng.normal(size=count), np.empty(count)
     factor = np.empty((count, padded(count)))
-    size, _ = implicit_step(matrix, force, 0.01, equal_speeds, factor, step)
+    size = implicit_step(matrix, force, 0.01, equal_speeds, factor, step)
     assert size == pytest.approx(np.abs(step).max())
     assert 0 < size <= 0.01 * (1 + 1e-12)
     assert force @ step > 0
@@ -284,6 +289,16 @@ def test_an_implicit_step_is_downhill_and_within_its_length(seed, equal_speeds):
     # no limit in reach: Newton's step
     implicit_step(definite, force, 1e9, equal_speeds, factor, step)
     np.testing.assert_allclose(step, np.linalg.solve(definite, force), rtol=1e-6)
+
+
+def test_a_model_without_a_minimum_has_none_at_any_distance():
+    """A soft mode with a small force is far from rest, though its step in the time of all is short."""
+    matrix, force = np.diag([1.0, 1e-6]), np.array([1e-3, 1e-7])
+    factor, step = np.empty((2, padded(2))), np.empty(2)
+    size = implicit_step(matrix, force, 1e-3, False, factor, step)
+    assert size < 1e-2 * distance_to_minimum(matrix, force, factor)
+    assert distance_to_minimum(matrix, force, factor) == pytest.approx(0.1)
+    assert distance_to_minimum(-matrix, force, factor) == np.inf
 
 
 def test_with_equal_speeds_edges_move_alike_whatever_their_forces():
