@@ -292,7 +292,7 @@ def test_an_implicit_step_is_downhill_and_within_its_length(seed, equal_speeds):
 
 
 def test_a_model_without_a_minimum_has_none_at_any_distance():
-    """A soft mode with a small force is far from rest, though its step in the time of all is short."""
+    """A soft mode with a small force is far from rest, though its first step is short."""
     matrix, force = np.diag([1.0, 1e-6]), np.array([1e-3, 1e-7])
     factor, step = np.empty((2, padded(2))), np.empty(2)
     size = implicit_step(matrix, force, 1e-3, False, factor, step)
