@@ -44,6 +44,7 @@ from adhesis.solver.sharp.equilibrium.edge_law import (
 )
 from adhesis.solver.sharp.equilibrium.griffith import (
     move_edges,
+    rest_within,
     shortest_length,
     step_limits,
 )
@@ -194,7 +195,7 @@ def descend(
         if shortest_length(gaps) < law.smallest:
             event = VANISHED
             break
-        if largest(way) < law.rest_step and not (flow.is_at_limit or is_cut):
+        if largest(way) < rest_within(gaps, law) and not (flow.is_at_limit or is_cut):
             event = AT_REST
             break
     raced = law.critical > 0 and _may_race(edges, tangent, running.start, gaps, law)

@@ -99,7 +99,7 @@ def flow_through(
         if law.pinning > 0:
             stop_at_memory(model.edges, model.theta, force, step, law)
             size = largest(step)
-        shortest = RUNNING_ENDS * law.longest_step
+        shortest = RUNNING_ENDS * min(law.longest_step, limit.min())
         if not size > shortest:
             distance = distance_to_minimum(matrix, force, factor)
             if distance <= shortest or total < FAINT_SADDLE * law.force_error:

@@ -26,6 +26,13 @@ def shortest_length(gaps: Array) -> float:
 
 
 @compiled
+def rest_within(gaps: Array, law: EdgeLaw) -> float:
+    """Longest step that counts as rest: less where gaps or patches are short."""
+    share: float = CLOSING_SHARE * shortest_length(gaps) / law.longest_step
+    return law.rest_step * min(1.0, share)
+
+
+@compiled
 def total_length(gaps: Array) -> float:
     """Add up the lengths of all gaps."""
     total = 0.0

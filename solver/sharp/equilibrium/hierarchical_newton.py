@@ -16,7 +16,11 @@ from adhesis.solver.sharp.equilibrium.edge_law import (
     critical_opening,
     way_from_memory,
 )
-from adhesis.solver.sharp.equilibrium.griffith import move_edges, shortest_length
+from adhesis.solver.sharp.equilibrium.griffith import (
+    move_edges,
+    rest_within,
+    shortest_length,
+)
 from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
     ResponseSolution,
@@ -135,7 +139,7 @@ def equilibrium_many(
         if not (within and np.abs(travelled).max() <= reach and shortest_length(moved) > 0):
             break
         gaps = moved
-        at_rest = stalled or (not strict and size <= law.rest_step)
+        at_rest = stalled or (not strict and size <= rest_within(gaps, law))
         if at_rest or not outdated_references(response, map_gaps(gaps), law)[0].any():
             found = True
             break
