@@ -88,6 +88,9 @@ def flow_through(
     factor = np.empty((edges, padded(edges)))
     longest = (MODEL_STEP if is_long else MODEL_SHORT_STEP) * law.longest_step
     count, length, share, first = 0, 0.0, 1.0, 0.0
+    shortest = RUNNING_ENDS * law.longest_step
+    for e in range(edges):
+        shortest = min(shortest, RUNNING_ENDS * limit[e])
     while count < MODEL_STEPS and share == 1:
         model_forces(model, force)
         total = norm(force)
@@ -99,7 +102,6 @@ def flow_through(
         if law.pinning > 0:
             stop_at_memory(model.edges, model.theta, force, step, law)
             size = largest(step)
-        shortest = RUNNING_ENDS * min(law.longest_step, limit.min())
         if not size > shortest:
             distance = distance_to_minimum(matrix, force, factor)
             if distance <= shortest or total < FAINT_SADDLE * law.force_error:
