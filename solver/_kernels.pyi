@@ -549,6 +549,11 @@ class ModelFlow:
 def implicit_step(hessian: NDArray[numpy.float64], force: NDArray[numpy.float64], longest: float, equal_speeds: bool) -> NDArray[numpy.float64]:
     """Take a linearly implicit step."""
 
+def distance_to_minimum(hessian: NDArray[numpy.float64], force: NDArray[numpy.float64]) -> float:
+    """
+    Compute the largest motion to the minimum of a quadratic model; infinite without one.
+    """
+
 def model_error(flow: ModelFlow, residual: NDArray[numpy.float64], edges: NDArray[numpy.int64], gaps: NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> float: ...
 
 def next_reach(before: float, length: float, error: float) -> float: ...

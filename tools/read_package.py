@@ -44,8 +44,11 @@ def main(wheel: str, sdist: str, commit: str) -> None:
     with tarfile.open(sdist) as archive:
         held = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
     own = {re.sub("^adhesis/(?=solver|ensemble)", "", name) for name in sources()}
-    kernels = {str(path.relative_to(ROOT)) for path in (ROOT / "solver" / "kernels").iterdir()}
-    for name in (*own, *kernels, "CMakeLists.txt", "LICENSE", "CITATION.cff", "CHANGELOG.md", "CONTRIBUTING.md"):
+    sources_of_kernels = {
+        str(path.relative_to(ROOT)) for path in (ROOT / "solver" / "kernels").iterdir()
+    }
+    named = ("LICENSE", "CITATION.cff", "CHANGELOG.md", "CONTRIBUTING.md", "CMakeLists.txt")
+    for name in (*own, *sources_of_kernels, *named):
         assert name in held, name
     for name in ("docs/theory.md", "tests/conftest.py", "jobs/paper.toml", "tools/setup.sh"):
         assert name in held, name

@@ -851,6 +851,12 @@ void bind_parts(nb::module_& m) {
         },
         "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a,
         "Take a linearly implicit step.");
+  m.def("distance_to_minimum",
+        [](const Array& hessian, const Array& force) {
+          return distance_to_minimum(matrix_of(hessian), vector_of(force));
+        },
+        "hessian"_a, "force"_a,
+        "Compute the largest motion to the minimum of a quadratic model; infinite without one.");
   m.def("model_error",
         [](const ModelFlow& flow, const Array& residual, const IntegerArray& edges,
            const Array& gaps, const EdgeLaw& law, const Panels& panels) {

@@ -249,7 +249,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
       out.event = DescentEvent::vanished;
       break;
     }
-    if (largest(way) < law.rest_step && !(flow.is_at_limit || is_cut)) {
+    if (largest(way) < rest_within(ends, law) && !(flow.is_at_limit || is_cut)) {
       out.event = DescentEvent::at_rest;
       break;
     }

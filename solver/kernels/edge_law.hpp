@@ -68,6 +68,11 @@ inline double shortest_length(const Vector& ends) {
   return std::min(least, 2 * pi);
 }
 
+// Longest step that counts as rest: less where gaps or patches are short.
+inline double rest_within(const Vector& ends, const EdgeLaw& law) {
+  return law.rest_step * std::min(1.0, CLOSING_SHARE * shortest_length(ends) / law.longest_step);
+}
+
 // Limit the motion of an edge: `longest`, or a share of the gap or patch that it may close.
 inline double motion_limit(const Gap& gap, int side, double longest, double share) {
   return std::min(longest, share * std::min(gap.length(), gap.patch[side]));

@@ -37,7 +37,8 @@ void stop_at_memory(const EdgeModel& model, const Vector& force, Vector& step,
   }
 }
 
-// Compute the largest motion to the minimum of a quadratic model; infinite without one.
+}  // namespace
+
 double distance_to_minimum(const Matrix& hessian, const Vector& force) {
   Matrix factor = hessian;
   if (!factor_rows(factor.values.data(), factor.n, factor.n)) return infinity;
@@ -45,8 +46,6 @@ double distance_to_minimum(const Matrix& hessian, const Vector& force) {
   solve_column(factor.values.data(), factor.n, factor.n, step.data());
   return largest(step);
 }
-
-}  // namespace
 
 Vector implicit_step(const Matrix& hessian, const Vector& force, double longest,
                      bool equal_speeds) {
@@ -180,7 +179,8 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
   Matrix hessian(count);
   Vector force(count);
   const double longest = (is_long ? MODEL_STEP : MODEL_SHORT_STEP) * law.longest_step;
-  double length = 0, share = 1, first = 0;
+  double length = 0, share = 1, first = 0, shortest = RUNNING_ENDS * law.longest_step;
+  for (double own : limit) shortest = std::min(shortest, RUNNING_ENDS * own);
   while (int(out.lengths.size()) < MODEL_STEPS && share == 1) {
     model.forces(force);
     const double total = norm(force);
@@ -190,7 +190,6 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
     model.hessian(hessian);
     Vector step = implicit_step(hessian, force, longest, equal_speeds);
     if (law.pinning > 0) stop_at_memory(model, force, step, law);
-    const double shortest = RUNNING_ENDS * law.longest_step;
     if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
                                         total < FAINT_SADDLE * law.force_error))
       break;

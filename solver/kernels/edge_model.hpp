@@ -73,6 +73,9 @@ class EdgeModel {
 // not positive definite: the step would not be downhill.
 Vector implicit_step(const Matrix& hessian, const Vector& force, double longest, bool equal_speeds);
 
+// Compute the largest motion to the minimum of a quadratic model; infinite without one.
+double distance_to_minimum(const Matrix& hessian, const Vector& force);
+
 // Flow through the model.
 struct ModelFlow {
   Vector motion;    // outward motion of the contact at every edge

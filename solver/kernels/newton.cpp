@@ -110,7 +110,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     const bool within = size <= std::min(reach, longest);
     if (!(within && largest(travelled) <= reach && shortest_length(moved) > 0)) break;
     ends = moved;
-    const bool at_rest = stalled || (!strict && size <= law.rest_step);
+    const bool at_rest = stalled || (!strict && size <= rest_within(ends, law));
     if (at_rest || !any_outdated(response, ends, law)) {
       out.found = true;
       break;

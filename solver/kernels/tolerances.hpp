@@ -12,7 +12,7 @@ inline constexpr int MOST_CORRECTIONS = 8, PINNED_CORRECTIONS = 4;
 inline constexpr double PINNED_SLACK = 10.0;
 inline constexpr double STALLED_SHARE = 0.3, HIERARCHICAL_NEWTON_GROWTH = 0.7;
 inline constexpr double CLOSING_SHARE = 0.25;
-inline constexpr double REFERENCE_SHARE = 0.05, REFERENCE_SCALE = 0.1, SOFT_EDGE = 6.0;
+inline constexpr double REFERENCE_SHARE = 0.01, REFERENCE_SCALE = 0.1, SOFT_EDGE = 6.0;
 inline constexpr double WEAK_INTERACTION = 0.7;
 inline constexpr double REFERENCE_BALANCE = 0.01, REFERENCE_FAR = 0.1, REFERENCE_MOST_FAR = 0.25;
 inline constexpr double REFERENCE_PATCH = 0.2, FURTHER_CHARGES = 1.25;

@@ -16,6 +16,7 @@ from adhesis.solver._kernels import (
     EdgeModel,
     ModelFlow,
     Running,
+    distance_to_minimum,
     implicit_step,
     model_error,
     next_reach,
@@ -267,6 +268,15 @@ def test_an_implicit_step_is_downhill_and_within_its_length(seed, equal_speeds):
     # no limit in reach: Newton's step
     step = implicit_step(definite, force, 1e9, equal_speeds)
     np.testing.assert_allclose(step, np.linalg.solve(definite, force), rtol=1e-6)
+
+
+def test_a_model_without_a_minimum_has_none_at_any_distance():
+    """A soft mode with a small force is far from rest, though its first step is short."""
+    matrix, force = np.diag([1.0, 1e-6]), np.array([1e-3, 1e-7])
+    size = np.abs(implicit_step(matrix, force, 1e-3, False)).max()
+    assert size < 1e-2 * distance_to_minimum(matrix, force)
+    assert distance_to_minimum(matrix, force) == pytest.approx(0.1)
+    assert distance_to_minimum(-matrix, force) == np.inf
 
 
 def test_with_equal_speeds_edges_move_alike_whatever_their_forces():

@@ -146,7 +146,8 @@ def test_scale_mirror_and_shift_do_not_matter(name):
     value = getattr(rough_loop(), name)
     assert value > 0
     assert getattr(rough_loop(3.0), name) / 3 == pytest.approx(value, rel=1e-8)
-    assert getattr(rough_loop(mirrored=True), name) == pytest.approx(value, rel=1e-8)
+    # the tree pairs other gaps in a mirror: to the error of the field, which is 1e-6 here
+    assert getattr(rough_loop(mirrored=True), name) == pytest.approx(value, rel=1e-6)
     assert getattr(rough_loop(shift=0.7), name) == pytest.approx(value, rel=1e-5)
 
 
