@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-// Functions of long loops, made for vectors of four numbers, too, and chosen when the module is
-// loaded. Sums in fixed lanes and no contracted a·b + c: both have the same bits.
-#if defined(__x86_64__)
+// Functions of long loops, which g++ makes for vectors of four numbers, too, and chooses when the
+// module is loaded. Sums in fixed lanes and no contracted a·b + c: both have the same bits.
+#if defined(__x86_64__) && !defined(__clang__)
 #define WIDE [[gnu::target_clones("avx2", "default")]]
 #else
 #define WIDE
