@@ -1,4 +1,4 @@
-"""Equilibrium of many gaps by Newton's iteration on their linear response, compiled."""
+"""Equilibrium of the edges by Newton's iteration on their linear response, compiled."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def equilibrium_many(
             judged_again = True  # the first time the tangent was that of an outdated reference
             continue
         travelled += step
-        # as in ``newton.equilibrium``
+        # to and fro across a step of the field, where panels or modes change
         stalled = size <= law.field_error and size > STALLED_SHARE * last
         # not written as > : a size that is no number is a failure, too
         longest = max(HIERARCHICAL_NEWTON_GROWTH * last, law.rest_step)

@@ -1,7 +1,6 @@
-"""Solve the field of many gaps: equation (1) of ``gap_field`` on a tree of gaps.
+"""Solve the field of the gaps: equation (1) of ``gap_field`` on a tree of gaps.
 
-Equation and nodes are those of the dense solver; the gaps interact through ``cluster_tree``. The
-work grows as the number of gaps.
+Gaps interact through ``cluster_tree``, so that the work grows as their number.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Compute openings at fine nodes, and the energy of a gap field: all modes, by sine transforms.
 
-A gap's opening is T = Σ_n b_n sin((n+1)t), cos t = η. Below the M modes of (1) in ``dense_solver``
+A gap's opening is T = Σ_n b_n sin((n+1)t), cos t = η. Below the M modes of (1) in ``gap_field``
 b_n come from f; above them the straight crack gives b_n = -s_n/(n+1), with s_n the Chebyshev
 moments of S_full over the gap. With p = 2p̄/E* the elastic energy of one period is
 
