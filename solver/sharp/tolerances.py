@@ -73,14 +73,14 @@ and fro across a step of the field, where panels or modes change: the iteration 
 
 
 HIERARCHICAL_NEWTON_GROWTH = 0.7
-"""The same for many gaps, where an iteration that hardly shrinks is given up early. Corrections no
+"""Share of the last correction. An iteration that shrinks less is given up early. Corrections no
 longer than ``DESCENT_HANDS_OVER`` are not judged so: the error of references takes part in them."""
 
 
 CLOSING_SHARE = 0.25
 """Share of a gap or patch by which one step of one edge may shorten it."""
 
-# ---------------------------------------------------------------- linear response of many gaps
+# ---------------------------------------------------------------- linear response of the gaps
 
 REFERENCE_SHARE = 0.01
 """Share of a gap, or of the patch beside it, by which an edge may leave the reference of its gap's
@@ -203,9 +203,8 @@ EQUAL_GAINS = 1e-3
 """Of the gain; two ways off that differ by less are equal."""
 
 FURTHEST_FOLLOWING = 5.0
-"""Longest steps, a quarter of λ_min: where an edge outside would follow further the window is
-given up. Of 639 windows (40 gaps, waves to m = 10,000) 5 % are; where another patch near its fold
-followed by 6 λ_min, the wrong one vanished, and the loss was wrong by 4e-3."""
+"""Longest steps, a quarter of λ_min: an edge that would follow further runs. Where another patch
+near its fold followed by 6 λ_min, the wrong one vanished, and the loss was wrong by 4e-3."""
 
 # ---------------------------------------------------------------- nucleation
 
