@@ -1,6 +1,6 @@
 # make help lists what there is. tools/setup.sh does nothing when nothing has changed.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test setup-slurm run test test-kills fuzz lint study bench docs figures-of-docs check-package clean lock
+.PHONY: help setup setup-test setup-slurm run test test-kills fuzz lint study bench docs figures-of-docs wheel sanitize check-package clean lock
 SHELL := /bin/bash
 # Byte code is kept, or each process compiles all that it imports: a second or two of CPU.
 unexport PYTHONDONTWRITEBYTECODE
@@ -52,6 +52,12 @@ bench: setup  ## speed against error of each method
 
 docs: setup  ## the documentation site in docs/_build, its examples run
 	@tools/docs.sh
+
+wheel: setup  ## a wheel of this system and Python in dist/, for machines without a compiler
+	$(bin)/python -m pip wheel --no-deps --no-build-isolation --wheel-dir dist .
+
+sanitize: setup-test  ## tests of the kernels with bounds, addresses and arithmetic checked
+	@tools/sanitize.sh
 
 check-package: setup  ## wheel and source distribution, used in a bare environment
 	@tools/check_package.sh

@@ -135,10 +135,7 @@ class Campaign:
         if path is not None:
             check_results_file("out", path)
         from adhesis.ensemble.run.price import price
-        from adhesis.ensemble.task.compute import methods_of
-        from adhesis.ensemble.warm import warm_up
 
-        warm_up(methods_of(self.tables, self.tables.tasks().of_cells()), lambda text: None)
         return price(self.tables, path, seconds=seconds)
 
     def run(

@@ -18,7 +18,6 @@ from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import self_affine_profile
-from adhesis.solver.precompile import warm
 from adhesis.solver.sharp.method import SharpMethod
 
 
@@ -30,7 +29,6 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--accuracy", type=float, default=1e-3)
     given = parser.parse_args()
-    warm(["sharp"])
     print(
         "     γ  seed      loss   error    audit  jumps  fields  descent  Newton  energies    CPU s"
     )

@@ -1,38 +1,31 @@
-"""Cost of a field of many gaps: on the tree of gaps, and by the dense factor.
+"""Cost of a field of many gaps on the tree of gaps.
 
     python benchmarks/many_gaps.py --gaps 30 100 300 1000 3000
 
 Random gaps and patches (log-normal widths, spread 0.7) over the paper's spectrum. Best of a few
 repetitions, in CPU time; the exponent is that between one number of gaps and the next. On the tree
 the linear response of all edges is set up from nothing, with the field; a step is Newton's of all
-edges on it, with their stability. By dense matrices a step is what follows the field.
+edges on it, with their stability.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from time import process_time
 from typing import Any
 
 import numpy as np
 
+from adhesis.solver._kernels import FieldModel, set_up_response, solve_field
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.runtime.malloc import keep_freed
-from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.response_setup import set_up_response
-from adhesis.solver.sharp.field.dense_solver import solve
-from adhesis.solver.sharp.field.edge_derivatives import derivatives
-from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, Solution
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 
 _TOUGHNESS = 1e-3  # critical opening: that of edges which are hardly in balance
-_FEW = 100  # gaps up to which dense matrices are timed as often as the tree
 
 
 def random_gaps(count: int, contact: float, spread: float = 0.7, seed: int = 1) -> Array:
@@ -53,61 +46,37 @@ def _best(work: Callable[[], Any], repetitions: int) -> tuple[float, Any]:
     return min(times), result
 
 
-def _dense_step(of: Solution) -> Array:
-    by_edge, by_mean = derivatives(of, GAUSS_RULES)
-    return np.linalg.solve(by_edge, by_mean)
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--gaps", type=int, nargs="+", default=[30, 100, 300, 1000, 3000])
     parser.add_argument("--contact", type=float, default=0.3)
     parser.add_argument("--tolerance", type=float, default=1e-5)
-    parser.add_argument("--dense", type=int, default=300, help="most gaps for the dense factor")
     parser.add_argument("--repetitions", type=int, default=5)
     given = parser.parse_args()
     keep_freed()  # as in a loop
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
     source = StressSource(profile, given.tolerance)
     separation, digits = 0.5 * profile.h_max * profile.q0, -np.log(given.tolerance)
-    model = FieldModel(FIXED_SEPARATION, float(digits), GAUSS_RULES, source.panels)
+    model = FieldModel(FIXED_SEPARATION, float(digits), source.panels)
     law = EdgeMechanics(source, _TOUGHNESS, given.tolerance).law
     print(f"contact {given.contact}, tolerance {given.tolerance}; times in ms")
-    print(
-        "  gaps  unknowns    field   per gap (µs)  exponent response     step    dense     step"
-        "  difference"
-    )
+    print("  gaps  unknowns    field   per gap (µs)  exponent response     step")
     before = (0, 0.0)
     for count in given.gaps:
         gaps = random_gaps(count, given.contact)
-        orders = choose_orders(map_gaps(gaps), digits, GAUSS_RULES.counts)
-        arguments = (gaps, separation, orders, 2, model)
-        solve_many(*arguments)
-        time, (of, _) = _best(lambda a=arguments: solve_many(*a), given.repetitions)
-        new = (gaps, separation, orders, law, model)
-        set_up, (response, _) = _best(lambda a=new: set_up_response(*a), given.repetitions)
-        given_response = (response, separation, FIXED_SEPARATION)
-        step, _ = _best(lambda a=given_response: solve_response(*a), given.repetitions)
+        solve_field(gaps, separation, model)
+        time, of = _best(partial(solve_field, gaps, separation, model), given.repetitions)
+        new = partial(set_up_response, gaps, separation, None, law, model)
+        set_up, response = _best(new, given.repetitions)
+        step, _ = _best(partial(response.solve, separation, law, model), given.repetitions)
         exponent = ""
         if before[0]:
             exponent = f"{np.log(time / before[1]) / np.log(count / before[0]):.2f}"
         before = (count, time)
-        dense = dense_step = difference = "-"
-        if count <= given.dense:
-            few = (gaps, separation, orders, 2, model, NO_EXTERIOR)
-            repetitions = given.repetitions if count <= _FEW else 2
-            solution = solve(*few)
-            _dense_step(solution)
-            dense_time, _ = _best(lambda a=few: solve(*a), repetitions)
-            step_time, _ = _best(lambda s=solution: _dense_step(s), repetitions)
-            dense, dense_step = f"{1e3 * dense_time:.2f}", f"{1e3 * step_time:.2f}"
-            opening = solution.opening
-            difference = f"{np.abs(of.opening - opening).max() / np.abs(opening).max():.0e}"
         print(
-            f"{count:6d} {len(of.nodes.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
-            f"{exponent:>9s} {1e3 * set_up:8.2f} {1e3 * step:8.2f} {dense:>8s} {dense_step:>8s} "
-            f"{difference:>11s}"
+            f"{count:6d} {len(of.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
+            f"{exponent:>9s} {1e3 * set_up:8.2f} {1e3 * step:8.2f}"
         )
 
 

@@ -46,17 +46,9 @@ def imported(*names: str) -> Callable[[], object]:
 step("Python")(lambda: None)
 step("numpy")(imported("numpy"))
 step("scipy: what the solver uses")(imported("scipy.fft", "scipy.linalg"))
-step("numba, the compiler")(imported("numba"))
 step("mpi4py and h5py")(imported("mpi4py.MPI", "h5py"))
-packages = ("adhesis.ensemble.command.campaigns.run", "adhesis.solver.precompile")
+packages = ("adhesis.ensemble.command.campaigns.run", "adhesis.solver.sharp.method")
 step("solver and ensemble")(imported(*packages))
-
-
-@step("code for loops, from its cache")
-def _load() -> None:
-    from adhesis.solver.precompile import warm
-
-    warm(("sharp",))
 
 
 @step("a loop, m = 10 … 1000, γ = 0.04")

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-_PACKAGES = ("adhesis", "numpy", "scipy", "numba", "llvmlite", "pyfftw", "h5py", "mpi4py")
+_PACKAGES = ("adhesis", "numpy", "scipy", "pyfftw", "h5py", "mpi4py")
 
 
 def versions() -> dict[str, str]:
@@ -21,7 +21,8 @@ def software() -> dict[str, str]:
         "adhesis_version": _package("adhesis", missing="unknown"),
         "commit": commit(),
         "python": platform.python_version(),
-        **{name: _package(name) for name in ("numpy", "scipy", "numba", "llvmlite")},
+        **{name: _package(name) for name in ("numpy", "scipy")},
+        "kernels": _kernels(),
         "processor": processor(),
     }
 
@@ -41,6 +42,7 @@ def installed() -> dict[str, str]:
     return {
         "python": platform.python_version(),
         **{name: _package(name) for name in _PACKAGES},
+        "kernels": _or_reason(_kernels),
         "hdf5": _or_reason(_hdf5),
         "fftw": _or_reason(_fftw),
         "mpi": _short(mpi.Get_library_version()) if mpi else "not loaded",
@@ -113,10 +115,20 @@ def _mpi() -> str:
 
 
 def processor() -> str:
-    """Return the name of this processor, as LLVM knows it."""
-    from llvmlite import binding
+    """Return the name of this processor, as the system knows it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:  # not Linux
+        lines = []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.processor() or platform.machine())
 
-    return str(binding.get_host_cpu_name())
+
+def _kernels() -> str:
+    """Return what compiled the kernels."""
+    from adhesis.solver._kernels import COMPILER
+
+    return COMPILER
 
 
 def _hdf5() -> str:

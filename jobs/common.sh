@@ -72,7 +72,7 @@ choose_launcher() {
         launcher=(srun "${@:1:2}")
     fi
     # One thread a rank: the ranks share the cores among themselves.
-    export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
+    export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 }
 
 # follow COMMAND…: runs it and sets code. USR1, TERM, INT and HUP stop it in order, by USR1, which

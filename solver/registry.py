@@ -75,10 +75,7 @@ def make_method(
 
 @uninterrupted  # an interrupted import leaves incomplete modules behind
 def _load(name: Literal["grid", "sharp"]) -> None:
-    """Import a method, and with it the compiler."""
-    from adhesis.solver.runtime.compile_log import log_compilation
-
-    log_compilation()
+    """Import a method."""
     import_module(f"adhesis.solver.{name}.method")
 
 

@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK=1
 unset PYTHONPATH PYTHONHOME HDF5_DIR MPIRUN
 
 echo "package: source distribution, and the wheel from it"
-"$python" -c "import sys; from setuptools.build_meta import build_sdist as b; b(sys.argv[1])" \
+"$python" -c "import sys; from scikit_build_core.build import build_sdist as b; b(sys.argv[1])" \
     "$place" >"$place/build.log" 2>&1 || { tail -n 20 "$place/build.log" >&2; exit 1; }
 tar -xzf "$place"/adhesis-*.tar.gz -C "$place"
 "$python" -m pip --no-input wheel --quiet --no-deps --no-build-isolation \
@@ -36,15 +36,10 @@ printf '%s\n' '[profile]' 'period = 1e-3' 'n0 = 1' 'ratio = 4' 'h_rms = 1e-6' '[
     >"$place/small.toml"
 adhesis --version
 adhesis sample trace.csv && adhesis new my.toml
-echo "package: loop (compiles first), run, status, report"
+echo "package: loop, run, status, report"
 adhesis loop --hurst 0.8 --seed 1 --period 1e-3 --n0 1 --ratio 4 --max-penetration 0.6 \
-    --load-steps 4 --json loop.json 2>&1 >/dev/null | tee "$place/compiling"
+    --load-steps 4 --json loop.json >/dev/null
 test -s "$place/loop.json"
-# The bar is as long as the compilation: what was announced is what was compiled.
-awk '/about [0-9]+ functions, once/ { sub(/.*about /, ""); announced = $1 }
-    /^compiled / { compiled = $2 }
-    END { exit !(compiled > 0.9 * announced && compiled < 1.1 * announced) }' "$place/compiling" ||
-    { say "the announced number of functions is off by more than a tenth"; exit 1; }
 adhesis run my.toml --dry-run >/dev/null
 adhesis run small.toml
 adhesis status small.h5 >/dev/null

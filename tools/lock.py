@@ -18,8 +18,11 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
-# What h5py is built with, without isolation; Cython and pkgconfig are needed for nothing else.
-BUILD = ("setuptools", "Cython", "pkgconfig", "packaging")
+# What h5py and the kernels are built with, without isolation.
+BUILD = (
+    *("setuptools", "Cython", "pkgconfig", "packaging"),
+    *("scikit_build_core", "nanobind", "cmake", "ninja", "ziglang"),
+)
 TEST_EXTRAS = ("dev", "instruments")
 
 

@@ -19,8 +19,7 @@ def sources() -> set[str]:
         for top in (ROOT / "adhesis", ROOT)
         for folder in ((top,) if top.name == "adhesis" else (ROOT / "solver", ROOT / "ensemble"))
         for path in folder.rglob("*")
-        if path.suffix in (".py", ".typed", ".mplstyle", ".csv")
-        and "__compiled__" not in path.parts
+        if path.suffix in (".py", ".pyi", ".typed", ".mplstyle", ".csv")
     }
     return found | {"adhesis/ensemble/commit.txt"}
 
@@ -32,7 +31,8 @@ def main(wheel: str, sdist: str, commit: str) -> None:
         reported = archive.read("adhesis/ensemble/commit.txt").decode().strip()
         (metadata,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
         about = message_from_string(archive.read(metadata).decode())
-    assert names == sources(), names ^ sources()
+    (kernels,) = (name for name in names if name.endswith(".so"))
+    assert names - {kernels} == sources(), names ^ sources()
     assert reported == commit, reported
     text = str(about.get_payload())
     assert "# adhesis" in text
@@ -43,7 +43,12 @@ def main(wheel: str, sdist: str, commit: str) -> None:
     assert not any(line.startswith("mpi4py") for line in required)
     with tarfile.open(sdist) as archive:
         held = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
-    for name in (*sources(), "LICENSE", "CITATION.cff", "CHANGELOG.md", "CONTRIBUTING.md"):
+    own = {re.sub("^adhesis/(?=solver|ensemble)", "", name) for name in sources()}
+    sources_of_kernels = {
+        str(path.relative_to(ROOT)) for path in (ROOT / "solver" / "kernels").iterdir()
+    }
+    named = ("LICENSE", "CITATION.cff", "CHANGELOG.md", "CONTRIBUTING.md", "CMakeLists.txt")
+    for name in (*own, *sources_of_kernels, *named):
         assert name in held, name
     for name in ("docs/theory.md", "tests/conftest.py", "jobs/paper.toml", "tools/setup.sh"):
         assert name in held, name

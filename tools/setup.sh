@@ -35,7 +35,7 @@ warnings=()
 
 H5PY=$(sed -n "s/^h5py==//p" requirements.lock)
 MPICH=5.0.2
-SYSTEM="gcc libc6-dev openmpi-bin libopenmpi-dev libhdf5-openmpi-dev"
+SYSTEM="g++ libc6-dev openmpi-bin libopenmpi-dev libhdf5-openmpi-dev"
 SLURM="slurmctld slurmd slurm-client munge"
 
 . tools/mpi.sh
@@ -129,8 +129,10 @@ find_parallel_hdf5() {
 }
 has_mpi() { command -v mpirun >/dev/null || command -v mpiexec >/dev/null; }
 
+has_compiler() { command -v "${CXX:-c++}" >/dev/null; }
+
 key() { # FILE…: what an installation depends on
-    cat pyproject.toml tools/setup.sh tools/mpi.sh tools/parts.sh "$@"
+    cat pyproject.toml CMakeLists.txt solver/kernels/* tools/setup.sh tools/mpi.sh tools/parts.sh "$@"
     # Another place, interpreter or MPI module is another installation.
     printf '%s\n' "$root" "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" \
         "$(command -v mpicc)" "${HDF5_DIR:-}"
@@ -208,12 +210,14 @@ fi
 
 # ------------------------------------------------------------------- system packages, build tools
 
+TOOLS='setuptools|Cython|numpy|pkgconfig|packaging|scikit_build_core|nanobind|pathspec|cmake|ninja'
+
 make_venv() {
     if [ ! -x "$venv/bin/pip" ] || ! "$venv/bin/python" -m pip --version; then
         "$python" -m venv "$venv"
     fi
 }
-install_tools() { make_venv && install $(locked 'setuptools|Cython|numpy|pkgconfig|packaging'); }
+install_tools() { make_venv && install $(locked "$TOOLS"); }
 begin_tools() {
     say "using $("$python" -V) ($python)"
     if [ -x "$venv/bin/python" ] &&
@@ -235,6 +239,7 @@ missing_system_packages() {
         if ! has_headers; then wanted+=" $(basename "$python")-dev"; fi
     fi
     if ! find_parallel_hdf5 || ! has_mpi; then wanted+=" $SYSTEM"; fi
+    if [ -z "${CXX:-}" ] && ! has_compiler; then wanted+=" g++"; fi
     wanted=$(missing $wanted)
 }
 
@@ -279,10 +284,7 @@ elif ! has_headers; then
 fi
 if ! has_mpi; then why_serial=${why_serial:-"no mpirun in PATH"}; fi
 
-# ------------------------------------------- side by side: h5py, the solver's code, all other packages
-
-SOLVER='numba|llvmlite|scipy|pyFFTW|threadpoolctl'
-TOOLS='setuptools|Cython|numpy|pkgconfig|packaging'
+# ------------------------------------------- side by side: h5py and all other packages
 
 build_h5py() {
     # A compile job for each core and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
@@ -295,14 +297,8 @@ build_h5py() {
             --no-binary=h5py --wheel-dir "$wheels.new" "h5py==$H5PY" &&
         rm -rf "$wheels" && mv "$wheels.new" "$wheels"
 }
-compile_kernels() {
-    PYTHONPATH=$root OPENBLAS_NUM_THREADS=1 "$venv/bin/python" -c '
-import sys
-from adhesis.ensemble.command.main import main
-sys.exit(main(["warm"]))'
-}
 install_rest() {
-    install $(grep -Ev "^(#|h5py==|($SOLVER|$TOOLS)==)" requirements.lock) &&
+    install $(grep -Ev "^(#|h5py==|ziglang==|($TOOLS)==)" requirements.lock) &&
         if [ "$tests" = yes ]; then install_tests; fi
 }
 
@@ -324,16 +320,8 @@ if [ -z "$why_serial" ]; then
         part h5py "building h5py" build_h5py
     fi
 fi
-part solver "packages of the solver" install $(locked "$SOLVER")
-required solver
-part kernels "compiling the solver" compile_kernels
 part rest "all other packages" install_rest
 required rest
-if finish kernels; then
-    say "$(grep '^compiled' .setup/kernels.log | tail -n 1)"
-else
-    warn "the solver is not compiled yet (see .setup/kernels.log); the first loop does it"
-fi
 if [ -n "${pid[h5py]:-}" ] && ! finish h5py; then
     tail -n 15 .setup/h5py.log
     why_serial="h5py could not be built against $hdf5 (see .setup/h5py.log)"
@@ -355,7 +343,12 @@ if ! has_mpi; then
         warn "no MPI: install one (Debian: openmpi-bin); adhesis run works in one process only"
 fi
 finish_installation() {
-    install --no-build-isolation --editable . || return 1
+    # The kernels are compiled here: half a minute of CPU time.
+    if ! has_compiler; then
+        install $(locked ziglang) || return 1
+        export CXX="$venv/bin/python -m ziglang c++"
+    fi
+    PATH=$venv/bin:$PATH install --no-build-isolation --editable . || return 1
     # Byte code of what commands import, also for users who may not write here.
     "$venv/bin/python" -c '
 from importlib import import_module
@@ -365,7 +358,7 @@ for name in COMMANDS:
 import adhesis.ensemble.bench.equal_error, adhesis.ensemble.bench.bench_page, adhesis.solver.validate.claims
 import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, rich.progress, xarray'
 }
-part adhesis "adhesis itself" finish_installation
+part adhesis "adhesis itself, with its kernels" finish_installation
 required adhesis
 
 # ----------------------------------------------------------------- the mpirun that fits, and Slurm

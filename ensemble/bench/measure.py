@@ -22,7 +22,6 @@ from adhesis.ensemble.bench.tamaas import tamaas_loop
 from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.precompile import warm, watch_compilation
 from adhesis.solver.registry import MethodName, make_method
 
 Measured = Literal["grid", "sharp", "tamaas"]
@@ -32,7 +31,7 @@ _SOLUTIONS = {"grid": "solves", "sharp": "fields"}
 # error.
 _GRID_ACCURACY = 1e-3
 _WARM_UP_SETTING = {"grid": 8, "sharp": 1e-2}
-# CPU seconds for start, compilation and warm-up, before the limit of the run applies.
+# CPU seconds for start and warm-up, before the limit of the run applies.
 _START_LIMIT = 300.0
 
 
@@ -74,8 +73,6 @@ class Measurement:
     # jumps, patches: number of jumps, and most patches at a time
     jumps: int = 0
     patches: int = 0
-    # Whether code was compiled during the loop, so that time and memory are too large
-    compiled: bool = False
     note: str = ""  # reason why the run did not finish; else empty
 
 
@@ -85,25 +82,19 @@ def measure(run: Run) -> Measurement:
     A run that fails or takes too long is a :class:`Measurement` with a note, not an exception.
     """
     # One thread: on matrices of a few dozen rows, threads of the linear algebra only add CPU time.
-    # Code that the warm-up does not use may be compiled in the first process; the second finds it
-    # in the cache.
-    for _ in range(2):
-        child = subprocess.run(
-            python("-m", "adhesis.ensemble.bench.measure", json.dumps(asdict(run))),
-            env=python_environment() | ONE_THREAD,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if child.returncode == -signal.SIGXCPU:
-            return Measurement(note=f"given up after {run.seconds:g} s")
-        if child.returncode:
-            last = (child.stderr.strip().splitlines() or [f"exit code {child.returncode}"])[-1]
-            return Measurement(note=f"failed: {last}")
-        measurement = Measurement(**json.loads(child.stdout))
-        if not measurement.compiled:
-            break
-    return measurement
+    child = subprocess.run(
+        python("-m", "adhesis.ensemble.bench.measure", json.dumps(asdict(run))),
+        env=python_environment() | ONE_THREAD,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if child.returncode == -signal.SIGXCPU:
+        return Measurement(note=f"given up after {run.seconds:g} s")
+    if child.returncode:
+        last = (child.stderr.strip().splitlines() or [f"exit code {child.returncode}"])[-1]
+        return Measurement(note=f"failed: {last}")
+    return Measurement(**json.loads(child.stdout))
 
 
 def measure_here(run: Run, *, limited: bool = False) -> Measurement:
@@ -112,20 +103,16 @@ def measure_here(run: Run, *, limited: bool = False) -> Measurement:
         _limit(_START_LIMIT)
     if run.method != "tamaas":
         _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
-    if run.method == "sharp" and run.scene.shape == "rough":
-        warm(("sharp",))  # load the code for many gaps, too
     before = peak_megabytes()
     if limited:
         _limit(run.seconds)
-    with watch_compilation() as compilation:
-        started = process_time()
-        numbers = _numbers(run)
-        seconds = process_time() - started
+    started = process_time()
+    numbers = _numbers(run)
+    seconds = process_time() - started
     return Measurement(
         cpu_seconds=seconds,
         megabytes=peak_megabytes(),
         megabytes_before=before,
-        compiled=compilation.functions > 0,
         **numbers,
     )
 

@@ -56,13 +56,10 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.ensemble.bench.equal_error import benchmark, exponents, growth, ratios
     from adhesis.ensemble.bench.scenes import FULL, QUICK
     from adhesis.ensemble.report.tables.table import make_table, rich_table
-    from adhesis.ensemble.warm import warm_missing
-    from adhesis.solver.precompile import COMPILED_METHODS
 
     if not (math.isfinite(args.budget) and args.budget > 0):
         raise InputError(f"--budget is {args.budget!r}: it must be a positive number of seconds")
     check_output_folder("--to", args.to, _FILES, {})
-    warm_missing(COMPILED_METHODS)  # or the first run of each would do it, silently
     # A file or a pipe has no width of its own; the tables need this one.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
     with following("adhesis bench: measuring") as show_run:

@@ -27,7 +27,6 @@ from adhesis.ensemble.trace.options import (
     trace_of,
     what_was_read,
 )
-from adhesis.ensemble.warm import warm_missing
 from adhesis.solver.checks import plain
 from adhesis.solver.loading.loop import Progress, run_loop
 from adhesis.solver.loading.loop_result import LoopResult
@@ -73,7 +72,6 @@ def execute(args: argparse.Namespace) -> int:
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
     nodes = _field_nodes(args, method, wanted) if wanted else 0
-    warm_missing([method.name], quiet=args.quiet, many_gaps=False)
     fields: dict[str, Any] = {}
     try:
         results = _run(args, method, cycle)

@@ -36,7 +36,6 @@ COMMANDS: dict[str, str] = {
     "sample": "write a sample trace, to try `trace` with",
     "validate": "compare the methods with exact references: error against bound",
     "bench": "measure the speed of each method against its error",
-    "warm": "compile both methods now, for all users of this installation",
     "doctor": "report which MPI, HDF5, FFTW and writer this installation uses, and why",
     "completion": "print the code with which a shell completes commands and options",
 }
@@ -55,7 +54,7 @@ _OPTIONS = {
 # these are independent of one another (of other profiles, on other nodes). Rank 0 alone runs the
 # rest.
 _PARALLEL = "run"
-_INDEPENDENT = ("loop", "trace", "warm", "doctor")
+_INDEPENDENT = ("loop", "trace", "doctor")
 # How long a process waits for rank 0 to report the same error, whose end makes mpirun end all.
 _RANK_0_FIRST = 20.0  # s
 

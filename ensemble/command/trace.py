@@ -54,10 +54,6 @@ def execute(args: argparse.Namespace) -> int:
     print(plan.text, flush=True)
     if args.plan:
         return 0
-    from adhesis.ensemble.warm import warm_missing  # loads the compiler
-
-    method = "grid" if args.method == "grid" else "sharp"
-    warm_missing([method], quiet=args.quiet, many_gaps=False)
     try:
         answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
     except NoAnswer as error:

@@ -38,14 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Run the references and print what came out."""
-    from adhesis.ensemble.warm import warm_missing
     from adhesis.solver.validate.claims import METHODS, validate
 
     names = [name for name in METHODS if not args.method or name in args.method]
     for name in args.method or ():
         if name not in METHODS:
             raise InputError(f"--method is {name!r}: it must be one of {', '.join(METHODS)}")
-    warm_missing(names)  # a time of compiling is no time of a method
     lines = not args.json and not sys.stdout.isatty()
     judged: list[Row] = []
     with following("adhesis validate") as show:

@@ -27,7 +27,7 @@ from adhesis.ensemble.run.launch import (
     python_environment,
     settings,
 )
-from adhesis.ensemble.versions import first_lines, installed, last_lines
+from adhesis.ensemble.versions import first_lines, installed, last_lines, processor
 
 _RANKS = 2
 _TIME_LIMIT = 60.0  # s; the first load of the libraries from a cold network disk is slow
@@ -72,7 +72,7 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     found = alone.reports[0] if alone.reports else {}
     texts = found.get("versions") or installed()
     checks.append(_libraries(alone, texts))
-    checks.append(compiled_code())
+    checks.append(kernels())
 
     mpi_loads = bool(found.get("mpi_loads"))
     mpirun = launcher()
@@ -195,23 +195,13 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
     return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
 
 
-def compiled_code() -> Check:
-    """Check that the compiler loads, and where compiled code is stored."""
+def kernels() -> Check:
+    """Check that the compiled kernels load, and report what made them."""
     try:
-        from adhesis.solver import precompile as warm
-    except (ImportError, RuntimeError, OSError) as error:
-        return Check("compiled code", False, f"does not load: {last_lines(str(error))}")
-    settings = warm.settings()
-    kind = (
-        f"for {warm.processor()}, numba {settings['numba']}, optimised at level {settings['opt']}"
-    )
-    places = {method: warm.compiled_in(method) for method in warm.COMPILED_METHODS}
-    missing = " and ".join(method for method, place in places.items() if place is None)
-    if missing:
-        text = f"{missing} not yet ({kind}); the first loop does it, or adhesis warm"
-        return Check("compiled code", False, text, needed=False)
-    kept = " and ".join(sorted({str(place) for place in places.values()}))
-    return Check("compiled code", True, f"{kept} ({kind})")
+        from adhesis.solver import _kernels
+    except ImportError as error:
+        return Check("kernels", False, f"do not load: {last_lines(str(error))}")
+    return Check("kernels", True, f"{_kernels.COMPILER}, on {processor()}")
 
 
 def _ranks(probe: _Probe, mpirun: str) -> Check:

@@ -31,7 +31,7 @@ from adhesis.ensemble.task.row import RESULT_DATASETS, row_scales
 FILE_TYPE = "adhesis-results"
 FILE_VERSION = 1
 # Versions, beside that of adhesis, on which the last bits of a loop depend.
-_COMPUTING = ("numpy", "scipy", "numba", "llvmlite", "fftw", "processor")
+_COMPUTING = ("numpy", "scipy", "kernels", "fftw", "processor")
 
 PENDING, DONE, FAILED, NOT_NEEDED = 0, 1, 2, 3
 _STATES = ("pending", "done", "failed", "not needed")
@@ -44,7 +44,7 @@ ORIGIN_LENGTH = 160
 ROOT_ATTRIBUTES = (
     *("file_type", "file_version", "Conventions", "title", "campaign", "seed", "part"),
     *("created", "laid_out", "adhesis_version", "commit", "python", "numpy", "scipy"),
-    *("numba", "llvmlite", "mpi", "hdf5", "fftw", "processor"),
+    *("kernels", "mpi", "hdf5", "fftw", "processor"),
 )
 
 

@@ -36,7 +36,7 @@ from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import Counts, ProgressLine
-from adhesis.ensemble.run.ranks import MpiChannel, OneRank, one_a_node_first, together
+from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.ensemble.task.compute import Runner, check_task, methods_of
@@ -140,7 +140,6 @@ def run_campaign(
         origins = [""] * size
         if plan.rows:
             origins = _origins(comm, size)
-            _warm_up(comm, engine.methods(campaign, [plan.tasks[row] for row in plan.rows]), say)
         own_rows = comm.size > 1 and engine.all_write
         if own_rows and comm.rank > 0:
             lock.join()
@@ -163,27 +162,6 @@ def _origins(comm: Any, size: int) -> list[str]:
     known = together(comm, versions)
     processors = comm.allgather(processor()) * (size // comm.size)
     return [origin_of(known | {"processor": name}) for name in processors]
-
-
-def _warm_up(comm: Any, methods: Collection[str], say: Callable[[str], None]) -> None:
-    """Compile on one rank of each node, and load that on the workers, before the first task.
-
-    Code for many gaps that is there already is loaded by the first loop that has as many.
-    """
-    if not methods:
-        return
-    from adhesis.ensemble.warm import warm_up  # brings the compiler in
-    from adhesis.solver.precompile import compiled_in
-
-    def prepare_rank(first: bool) -> bool:
-        lacking = any(compiled_in(method) is None for method in methods)
-        hands_out = comm.size > 1 and comm.rank == 0  # and computes no task
-        if lacking or not hands_out:
-            heard = first and comm.rank == 0
-            warm_up(methods, say if heard else lambda text: None, many_gaps=lacking)
-        return True
-
-    one_a_node_first(comm, prepare_rank)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from functools import cache
 
 import numpy as np
 
-from adhesis.solver.grid.kernels import inverse_form
+from adhesis.solver._kernels import inverse_form
 from adhesis.solver.model.profile import Array
 
 # Number of one-node blocks at the end of a patch beside the node, and growth of the next blocks.

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.grid.kernels import (
+from adhesis.solver._kernels import (
     advance,
     dot,
     residual_inside,
@@ -25,6 +24,7 @@ from adhesis.solver.grid.kernels import (
     total,
     update_direction,
 )
+from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.profile import Array

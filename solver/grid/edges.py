@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.kernels import edges_of, patch_ranges
 from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.patches import edges_of, patch_ranges
 from adhesis.solver.model.profile import Array
 
 Indices = NDArray[np.intp]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver._kernels import dot, total
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import EDGE_COMPLIANCE, Contact
 from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.grid.kernels import total, total_inside
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
@@ -104,7 +104,7 @@ class Lattice:
 
     def adhesion_energy(self, contact: Contact) -> float:
         """Compute -Σ γ sqrt(1 + h'²) dx over the contact nodes, in J/m."""
-        return float(-self.dx * total_inside(self.adhesion, contact.mask))
+        return float(-self.dx * dot(self.adhesion, contact.mask.astype(np.float64)))
 
     def energy(self, contact: Contact) -> float:
         """Compute W of ``control`` in J/m, per period: U at fixed separation.

@@ -8,8 +8,8 @@ import numpy as np
 
 from adhesis.solver.crack import MOST_OPENINGS, largest_excess
 from adhesis.solver.grid.contact import Contact, Mask
-from adhesis.solver.grid.kernels import patch_ranges
 from adhesis.solver.grid.opening import Openings
+from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import state_of
 from adhesis.solver.method import ContactState, PathError

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver._kernels import total
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.edges import Indices
-from adhesis.solver.grid.kernels import patch_ranges, total
 from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.method import ContactState
 
 EDGE_OFFSET = 0.190

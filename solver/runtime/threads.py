@@ -10,17 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import cache, wraps
-from threading import RLock
+from threading import Lock, RLock
 from typing import Any, Protocol, TypeVar
 
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# The number of threads is a property of the process: restoring it while another caller computes
-# would change the bits of that caller's sums. Compiled code and Python hold the interpreter's lock
-# nearly all the time, so serialised callers are hardly slower than concurrent ones.
-_in_use = RLock()
+# The number of threads is a property of the process: the first caller limits it, and the last one
+# restores it, or the bits of another caller's sums would change. Callers compute side by side.
+_change = Lock()
+_callers: set[object] = set()
+_threaded: list[tuple[Any, int]] = []  # libraries that had more, with their numbers
 
 
 class Shared(Protocol):
@@ -52,31 +53,40 @@ def one_at_a_time(function: F) -> F:
 
 
 def on_one_thread(function: F) -> F:
-    """Limit linear algebra to one thread while ``function`` runs.
-
-    Callers in other threads wait.
-    """
+    """Limit linear algebra to one thread while ``function`` runs."""
 
     @wraps(function)
     def limited(*args: Any, **kwargs: Any) -> Any:
-        with _in_use:
-            # ThreadpoolController.limit() also asks each library for its version: 20 times as long
-            threaded = [
-                (library, threads)
-                for library in _libraries().lib_controllers
-                if (threads := library.num_threads) != 1
-            ]
-            try:
-                for library, _ in threaded:
-                    library.set_num_threads(1)
-                return function(*args, **kwargs)
-            finally:
-                for library, threads in threaded:
-                    library.set_num_threads(threads)
+        caller = object()
+        try:
+            _enter(caller)
+            return function(*args, **kwargs)
+        finally:
+            _leave(caller)
 
     decorated: Any = limited
     result: F = decorated
     return result
+
+
+def _enter(caller: object) -> None:
+    with _change:
+        _callers.add(caller)
+        if len(_callers) == 1:
+            # ThreadpoolController.limit() also asks each library for its version: 20 times as long
+            for library in _libraries().lib_controllers:
+                if (threads := library.num_threads) != 1:
+                    _threaded.append((library, threads))
+                    library.set_num_threads(1)
+
+
+def _leave(caller: object) -> None:
+    with _change:
+        _callers.discard(caller)
+        if not _callers:
+            for library, threads in _threaded:
+                library.set_num_threads(threads)
+            _threaded.clear()
 
 
 @cache

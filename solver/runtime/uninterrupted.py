@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# Stack in bytes that LLVM may need: the default is 2 MB if the main thread's stack is unlimited.
+# Stack in bytes of the thread: the default is 2 MB if the main thread's stack is unlimited.
 _STACK = 64 << 20
 
 

@@ -1,143 +1,164 @@
-"""Mechanics of the contact edges of one problem: the choice between few and many gaps."""
+"""Mechanics of the contact edges of one problem: fields, equilibria and descents of its gaps."""
 
 from __future__ import annotations
 
-from functools import cached_property
+import math
+from typing import Any
 
 import numpy as np
 
-from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.gradient_flow import AT_REST, NO_FIELD, REJOINED, VANISHED
-from adhesis.solver.sharp.descent.track import Track
-from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
-from adhesis.solver.sharp.equilibrium.pinning import remember
+from adhesis.solver._kernels import (
+    Descent,
+    DescentEvent,
+    EdgeLaw,
+    Equilibrium,
+    Field,
+    FieldModel,
+    Running,
+    shortest_length,
+    solve_field,
+)
+from adhesis.solver.model.profile import Array, Integers
+from adhesis.solver.sharp.descent.saddle import leaving_step, positions
+from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point
+from adhesis.solver.sharp.equilibrium.griffith import imbalance, move_edges, step_limits
 from adhesis.solver.sharp.errors import FullContact, NoState
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import (
+    FixedEdgeResponse,
+    GapField,
+    respond_at_fixed_edges,
+)
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
-from adhesis.solver.sharp.system.dense import DenseSystem
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
-from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
-from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
-from adhesis.solver.sharp.system.window_descent import KnownState
 from adhesis.solver.sharp.tolerances import (
     DESCENT_LIMIT,
-    HIERARCHICAL_FROM,
+    EQUAL_GAINS,
+    FINER_FIELD,
+    FIRST_REACH,
     LAST_GAP,
+    RESPONSE_TRIALS,
     RESTS,
 )
-
-_ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
 
 
 class EdgeMechanics(EdgeProblem):
     """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
+    The linear response of the gaps is kept from one state to the next.
+
     Attributes
     ----------
-    many : int
-        From so many gaps on the hierarchical system takes the place of the dense one.
+    responses : KeptResponses
     """
 
-    many = HIERARCHICAL_FROM
+    def __init__(self, *problem: Any) -> None:
+        super().__init__(*problem)
+        self.responses = KeptResponses(self)
+        self._finer: tuple[Point, Field] | None = None
 
-    @cached_property
-    def _systems(self) -> tuple[DenseSystem, HierarchicalSystem]:
-        return DenseSystem(self), HierarchicalSystem(self)
-
-    def system(self, gaps: Array) -> EdgeSystem:
-        """Return the system of edges by which these gaps are solved."""
-        return self._systems[len(gaps) >= self.many and not self.pins]
-
-    def uses_windows(self, gaps: Array) -> bool:
-        """Whether these gaps are followed in windows."""
-        return self.system(gaps).uses_windows
-
-    def field(self, gaps: Array, prescribed: float) -> GapField:
-        """Solve the field of these gaps."""
+    def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Field:
+        """Solve the field of these gaps to a ``share`` of the tolerance."""
         self.count.fields += 1
-        return self.solved(gaps, prescribed, self.system(gaps).solution(gaps, prescribed, 1.0, 2))
+        model = self.model
+        if share < 1:
+            model = FieldModel(model.device, model.digits - math.log(share), model.panels)
+        return solve_field(gaps, prescribed, model)
 
-    def field_again(
-        self, gaps: Array, prescribed: float, pressure: float, separation: float
+    def field(
+        self, gaps: Array, prescribed: float, nearly: tuple[float, float] | None = None
     ) -> GapField:
-        """Return the field of gaps that were in equilibrium; of many it is solved when asked for.
+        """Return the field of these gaps, with p and q0 s where they are known."""
+        return GapField(
+            self.source, gaps, prescribed, self.tolerance, self.model.device,
+            lambda: self.solution(gaps, prescribed), nearly,
+        )  # fmt: skip
 
-        ``pressure`` (p) and ``separation`` (q0 s) are those of the equilibrium.
+    def response_before_fold(self, point: Point) -> FixedEdgeResponse:
+        """Return the response at a point next to a fold, the edges held."""
+        return respond_at_fixed_edges(self._solve_finer(point))
+
+    def fold_displacement(self, point: Point) -> float:
+        """Estimate how far in d the error of the field displaces the fold next to a point.
+
+        The error of the openings is their difference from those of a more accurate field.
         """
-        if self.uses_windows(gaps):
-            return self._systems[1].field_on_demand(gaps, prescribed, pressure, separation)
-        return self.field(gaps, prescribed)
+        finer = self._solve_finer(point)
+        change = finer.opening - point.field.solution.opening
+        return point.fold_displacement(change, respond_at_fixed_edges(finer).opening)
 
-    def stiffness(self, point: Point, edges: Integers) -> Array:
-        """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
-
-        The diagonal is not given for many gaps.
-        """
-        by_edge = self.system(point.gaps).stiffness(point, edges)
-        return np.asarray(by_edge * outward(point.gaps)[edges])
+    def _solve_finer(self, point: Point) -> Field:
+        """Solve the field of a point more accurately than that of the path."""
+        if self._finer is None or self._finer[0] is not point:
+            self._finer = point, self.solution(point.gaps, point.at, FINER_FIELD)
+        return self._finer[1]
 
     def equilibrium(
         self,
         gaps: Array,
         prescribed: float,
         reach: float,
-        orders: Integers = _ANY,
+        orders: Integers | None = None,
         *,
         strict: bool = True,
+        memory: Array | None = None,
     ) -> Point | None:
         """Return the stable equilibrium near these gaps, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
         equilibrium is not stable. ``orders`` are the least orders of the gaps. Unless
-        ``strict``, gaps that are nearly in equilibrium are taken as they are.
+        ``strict``, gaps that are nearly in equilibrium are taken as they are. ``memory`` is where
+        the edges were in the state before, which matters with two works of adhesion; here if not
+        given.
         """
         if not shortest_length(gaps) > 0:
             return None
-        try:
-            return self.system(gaps).equilibrium(
-                gaps, prescribed, max(reach, self.settled), orders, strict=strict
-            )
-        except np.linalg.LinAlgError:
-            return None
+        reach = max(reach, self.settled)
+        law = self.law_at(gaps if memory is None else memory)
+        for _ in range(RESPONSE_TRIALS):
+            near = self.responses.near(gaps, prescribed, orders)
+            if near is None:
+                break
+            found = near.response.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
+            self.count.add_newton(found.corrections)
+            if found.found:
+                point = self._point(prescribed, found)
+                near.settled = point.gaps
+                return point
+            if not found.is_outgrown:
+                break
+            gaps = found.gaps
+            near.is_outgrown = True
+        return None
 
-    @property
-    def responses(self) -> KeptResponses:
-        """Linear responses of many gaps."""
-        return self._systems[1].responses
-
-    def start(self, point: Point | None) -> KnownState | None:
-        """Return ``point`` as the start of a descent in a window; None for few gaps."""
-        if point is None or not self.uses_windows(point.gaps):
-            return None
-        return self._systems[1].start(point)
+    def _point(self, prescribed: float, found: Equilibrium) -> Point:
+        """Make the point of an equilibrium."""
+        gaps = found.gaps
+        field = GapField(
+            self.source, gaps, prescribed, self.tolerance, self.model.device,
+            lambda: found.solve_field(prescribed, self.model), (found.pressure, found.separation),
+        )  # fmt: skip
+        pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
+        return Point(prescribed, field, found.rate, found.slope, pinned=pinned)
 
     def forget(self) -> None:
         """Forget what results would depend on within the error of the field."""
         self.responses.forget()
 
     def relax(
-        self,
-        gaps: Array,
-        prescribed: float,
-        reach: float,
-        *,
-        equal_speeds: bool = False,
-        track: Track | None = None,
-        start: KnownState | None = None,
-    ) -> Point | Array:
+        self, gaps: Array, prescribed: float, reach: float, *, equal_speeds: bool = False
+    ) -> tuple[Point | Array, bool]:
         """Descend in energy at a prescribed value to the next minimum.
 
-        By linear kinetics, which extends the ``track``; or, to be compared with that, with
-        ``equal_speeds`` or from where the track has been left, until the track is met. From a
-        ``start`` in a window.
+        By linear kinetics, or with ``equal_speeds``, to be compared with that.
 
         Returns
         -------
         Point or array
             The minimum, or the gaps without those gaps and patches that have closed or vanished on
-            the way (an empty array when no contact is left, or the track is met).
+            the way (an empty array when no contact is left).
+        bool
+            Whether the order in which edges ran may have decided that.
 
         Raises
         ------
@@ -146,35 +167,23 @@ class EdgeMechanics(EdgeProblem):
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
-        # Without adhesion the minimum is unique, and the Hessian vanishes there: linear kinetics
-        # would not come to rest.
-        equal_speeds = equal_speeds or self.critical == 0
-        track = track or Track()
-        system, law = self.system(gaps), self.law
-        left, orders, rests = DESCENT_LIMIT, _ANY, 0
-        begun, rested = len(gaps), np.empty((0, 2))
+        law = self.law_at(gaps)
+        left, rests, raced = DESCENT_LIMIT, 0, False
+        orders: Integers | None = None
+        rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            held = self.law_of(gaps).held
-            law = law._replace(held=held)
-            end = system.descend(
-                gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds, start=start
-            )
-            gaps, orders, start = end.gaps, end.orders, None
-            left -= end.fields
-            if end.event == REJOINED:
-                track.rejoined = True
-                return np.empty((0, 2))
-            if end.event == NO_FIELD:
+            end, orders = self._descend(gaps, prescribed, left, orders, law, equal_speeds, start)
+            if end is None or end.event == DescentEvent.NO_FIELD:
                 raise NoState("there is no field of these edges", prescribed)
-            if end.event == VANISHED:
-                self.recall(remember(held, gaps, law.band) if self.pins else held)
+            gaps, raced = end.gaps, raced or end.raced
+            left -= end.steps
+            if end.event == DescentEvent.VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
-                    return rest
-                if len(gaps) != begun:
-                    return gaps
-                law = law._replace(smallest=self._smallest_of_last_gap(gaps, law.smallest))
-            if end.event == AT_REST:
+                    return rest, raced
+                law = EdgeLaw(law)
+                law.smallest = self._smallest_of_last_gap(gaps, law.smallest)
+            if end.event == DescentEvent.AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1
@@ -182,12 +191,79 @@ class EdgeMechanics(EdgeProblem):
                     rests = max(rests, RESTS + 1)  # no patience changes anything
                 rested = gaps
                 strict = rests <= RESTS
-                point = self.equilibrium(gaps, prescribed, reach, orders, strict=strict)
+                point = self.equilibrium(
+                    gaps, prescribed, reach, orders, strict=strict, memory=law.memory
+                )
                 if point is not None:
-                    return point
-                if not strict and rests <= 2 * RESTS:
-                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS)
+                    return point, raced
+                ways = self.ways_off_saddle(gaps, prescribed, law)
+                if ways:
+                    gaps = ways[0]
+                elif not strict and rests <= 2 * RESTS:
+                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
+
+    def _descend(
+        self,
+        gaps: Array,
+        prescribed: float,
+        most: int,
+        orders: Integers | None,
+        law: EdgeLaw,
+        equal_speeds: bool,
+        start: Array,
+    ) -> tuple[Descent | None, Integers | None]:
+        """Descend on a linear response; returns the orders that it came to, too.
+
+        None if the edges have no field.
+        """
+        running = Running(start, FIRST_REACH)
+        while True:
+            near = self.responses.near(gaps, prescribed, orders)
+            if near is None:
+                return None, orders
+            end = near.response.descend(
+                gaps, prescribed, most, equal_speeds, running, law, self.model
+            )
+            self.count.add_descent(end.steps, end.steps)
+            if end.event != DescentEvent.OUTGROWN:
+                return end, near.response.orders
+            gaps = end.gaps
+            near.is_outgrown = True
+
+    def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
+        """Move edges without force off a saddle of the energy; an empty list where they are stable.
+
+        Both directions along the softest modes are tried. That on which energy falls more is the
+        first, of equal ones that in which the leading edge goes outwards. Where energy rises on
+        both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
+        """
+        near, free = self.responses.at(gaps, prescribed), np.flatnonzero(~law.at_memory(gaps))
+        if near is None or self.critical == 0 or len(free) == 0:
+            return []
+        tangent = near.response.tangent_between(gaps, free, prescribed, law, self.model)
+        by_edge = near.response.opening[free, None] * tangent
+        limit = step_limits(gaps, law.longest_step)[free]
+        order = positions(gaps, self.source.highest)[free]
+        found = leaving_step(by_edge + by_edge.T, limit, order)
+        if found is None:
+            return []
+        step = np.zeros(gaps.size)
+        step[free] = found
+        while np.abs(step).max() >= law.rest_step:
+            ways: list[Array] = [move_edges(gaps, way) for way in (step, -step)]
+            onwards = self._force_along(ways[0], step, prescribed, law)
+            backwards = self._force_along(ways[1], -step, prescribed, law)
+            if max(onwards, backwards) > 0:
+                return ways if onwards >= backwards * (1 - EQUAL_GAINS) else ways[::-1]
+            step = 0.5 * step
+        return []
+
+    def _force_along(self, gaps: Array, step: Array, prescribed: float, law: EdgeLaw) -> float:
+        """Compute the force along a ``step`` at its end: positive where the energy falls."""
+        opening = self.solution(gaps, prescribed).opening
+        residual = imbalance(opening, gaps, law, self.source.panels)
+        return -float((residual * (2 * opening - residual)) @ step)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
         """Return the length below which the last gap is closed.
@@ -206,18 +282,20 @@ class EdgeMechanics(EdgeProblem):
             raise FullContact
         return min(smallest, LAST_GAP * float(length[0]))
 
-    def _perturb_most_unbalanced(self, gaps: Array, prescribed: float, times: int) -> Array:
+    def _perturb_most_unbalanced(
+        self, gaps: Array, prescribed: float, times: int, law: EdgeLaw
+    ) -> Array:
         """Move the most unbalanced edge on by ``times`` half a longest step.
 
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
         minimum: the flow stands still there. A minimum draws the edge back.
         """
-        solution = self.field(gaps, prescribed).solution
-        residual, _ = imbalance(solution, self.law_of(gaps), self.source.panels)
+        opening = self.solution(gaps, prescribed).opening
+        residual = imbalance(opening, gaps, law, self.source.panels)
         e = int(np.argmax(np.abs(residual)))
         length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
-        step[e] = min(0.5 * times * self.law.longest_step, 0.25 * length[e // 2], 0.25 * beside)
+        step[e] = min(0.5 * times * law.longest_step, 0.25 * length[e // 2], 0.25 * beside)
         onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
         return onwards

@@ -36,7 +36,7 @@ from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
@@ -238,8 +238,6 @@ class SharpMethod(Method):
         self.edges.forget()
         control = self.problem.control
         at = self.states.prescribed_of(state)
-        # the separation of a state at the target, where it is known without rounding
-        exact = target.prescribed if control.is_fixed else None
         point = self.follower.recall_point(state.internal)
         if not state.patches:
             touch, highest = self.nucleation.first_touch()
@@ -254,7 +252,6 @@ class SharpMethod(Method):
             point = self._jump(history, before, np.empty((0, 2)), at, target, highest)
         else:
             gaps = state.internal.gaps
-            self.edges.recall(state.internal.held)
             if point is None:
                 point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
                 if point is not None:
@@ -266,7 +263,7 @@ class SharpMethod(Method):
                 history.states.append(before)
                 point = self._jump(history, before, gaps, at, target)
             elif at == target.at:
-                history.states.append(self.states.of_point(point, exact))
+                history.states.append(state)
         while point is not None and at != target.at:
             at, point = self.follower.run(history, point, target)
         if point is None and at != target.at and not control.is_load:

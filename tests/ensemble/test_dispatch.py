@@ -11,7 +11,6 @@ import time
 
 import numpy as np
 import pytest
-from numba import njit
 
 from adhesis.ensemble.run.attempt import Outcome
 from adhesis.ensemble.run.dispatch import (
@@ -27,7 +26,7 @@ from adhesis.ensemble.run.dispatch import (
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
-from adhesis.solver.runtime.compiler import Compiler
+from adhesis.solver._kernels import sum_pull
 from tools.interrupted import Interrupt
 
 
@@ -536,24 +535,13 @@ def test_a_task_that_hangs_meets_its_time_limit():
     assert [o.error for o in outcomes] == [None, "longer than the time limit of 0.3 s", None]
 
 
-@njit(pipeline_class=Compiler)
-def _sines(count):
-    """Compiled work that hands arrays back; numba's own compiler would run Python while it does."""
-    out = np.empty(4)
-    total = 0.0
-    for i in range(count):
-        total += np.sin(i)
-    out[:] = total
-    return out, out.copy()
-
-
-def test_a_task_in_compiled_code_meets_its_time_limit():
-    """The timer goes off in compiled code; what its handler raises arrives as it is."""
-    _sines(1)
+def test_a_task_in_a_kernel_meets_its_time_limit():
+    """The timer goes off in a kernel; what its handler raises arrives as it is."""
+    many = np.linspace(1.0, 2.0, 1000)
 
     def compute(task, check):
         while True:
-            _sines(100_000)
+            sum_pull(many, 0.1 * many, many, many)
 
     outcomes, _ = alone(compute, limits=Limits(task_seconds=0.05))
     assert [o.error for o in outcomes] == ["longer than the time limit of 0.05 s"] * 3

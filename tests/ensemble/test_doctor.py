@@ -13,9 +13,6 @@ import pytest
 from adhesis.ensemble import versions
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.doctor import examine as doctor
-from adhesis.solver import precompile as warm
-from adhesis.solver.runtime import disk_cache as code_cache
-from adhesis.solver.runtime.disk_cache import CodeFiles
 from tests.support.campaign_support import has_ended, run_python
 
 
@@ -51,7 +48,7 @@ def test_text_names_the_writer_and_every_library(
     monkeypatch.setattr("adhesis.ensemble.command.doctor.examine", lambda directory: diagnosis)
     assert main(["doctor"]) == (0 if findings["usable"] else 1)
     text = capsys.readouterr().out
-    for word in ("MPI ", "mpirun ", "HDF5 ", "FFTW ", "numba ", "cores ", "writer "):
+    for word in ("MPI ", "mpirun ", "HDF5 ", "FFTW ", "kernels ", "cores ", "writer "):
         assert f"\n{word}" in text
 
 
@@ -128,25 +125,7 @@ def test_versions_are_texts_and_do_not_start_mpi() -> None:
 def test_a_results_file_tells_the_versions_that_doctor_tells(findings: dict[str, Any]) -> None:
     written, reported = versions.versions(), findings["versions"]
     assert written["adhesis_version"] == reported["adhesis"]
-    for name in ("python", "numpy", "scipy", "numba", "llvmlite", "hdf5", "fftw"):
+    for name in ("python", "numpy", "scipy", "kernels", "hdf5", "fftw"):
         assert written[name] == reported[name]
-    (check,) = [check for check in findings["checks"] if check["name"] == "compiled code"]
-    assert f"for {written['processor']}, numba {written['numba']}" in check["text"]
-
-
-def test_doctor_tells_whether_code_is_compiled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    files = CodeFiles("key")
-    monkeypatch.setattr(warm, "code_files", lambda to_installation=False: files)
-    place = code_cache._CodeFolder(tmp_path / "key", installed=True)
-    monkeypatch.setattr(files, "_folders", [place])
-    before = doctor.compiled_code()
-    assert (before.ok, before.needed) == (False, False)
-    assert "sharp and grid not yet" in before.text
-    (tmp_path / "key").mkdir()
-    for method in warm.COMPILED_METHODS:
-        (tmp_path / "key" / warm._marker(method)).write_text("{}")
-    after = doctor.compiled_code()
-    assert after.ok
-    assert str(tmp_path / "key") in after.text
+    (check,) = [check for check in findings["checks"] if check["name"] == "kernels"]
+    assert check["text"] == f"{written['kernels']}, on {written['processor']}"

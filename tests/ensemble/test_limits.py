@@ -43,7 +43,6 @@ WORDS: dict[str, tuple[object, ...]] = {
     "sample": ("s.csv",),
     "validate": ("--method", "grid"),
     "bench": ("--quick", "--to", "bench"),
-    "warm": (),
     "doctor": (),
     "completion": ("bash",),
 }
@@ -51,8 +50,8 @@ WORDS: dict[str, tuple[object, ...]] = {
 # their own: with few modules or many, files, threads, processes. --slow: all commands and values.
 HARDEST = {
     "n": (5, ("new", "run", "status", "loop", "doctor")),
-    "v": (600_000, ("run", "report", "loop", "trace", "warm")),
-    "f": (0, ("new", "run", "merge", "loop", "sample", "warm", "doctor")),
+    "v": (600_000, ("run", "report", "loop", "trace")),
+    "f": (0, ("new", "run", "merge", "loop", "sample", "doctor")),
     "u": (1, ("run", "verify", "loop", "validate", "bench", "doctor")),
 }
 RANGES = {"n": ("status",), "v": ("status",), "f": ("run",), "u": ("status",)}

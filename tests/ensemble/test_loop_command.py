@@ -127,7 +127,7 @@ def test_provenance_is_that_of_program_command_and_input(wave_file, tmp_path, mo
     }
     assert found["seed"] is None
     assert found["adhesis_version"] == adhesis.__version__
-    assert {"commit", "python", "numpy", "numba", "processor", "date"} <= found.keys()
+    assert {"commit", "python", "numpy", "kernels", "processor", "date"} <= found.keys()
     units = found["units"]
     assert units["states.mean_stress"] == units["mean_stress"] == "Pa"
     assert units["jumps.energy_drop"] == units["loss"] == "J/m²"

@@ -92,7 +92,6 @@ BENCH --budget {{0,-1,nan,inf}} -> --budget is
 BENCH --budget 0 -> --budget is 0.0: it must be a positive number of seconds
 BENCH --to {{text,text/below}} -> text is not a directory
 BENCH --to /proc/x -> --to is /proc/x: it cannot be written
-warm --own 3 -> unrecognized arguments: 3
 doctor --in none -> --in is none: it must be a folder that can be written
 doctor --in text -> --in is text: it must be a folder
 doctor --in '' -> --in is ''

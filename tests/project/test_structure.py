@@ -11,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from adhesis.solver.sharp import tolerances
 from tests.support.campaign_support import run_python
 from tests.support.synthetic_results import campaign, rows, text_of, write
+from tools.stub import stub
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 COMMANDS = """
@@ -55,7 +57,7 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     lines = (line.split() for line in done.stdout.splitlines() if line.startswith("loaded "))
     loaded = {stage: set(names) for _, stage, *names in lines}
-    numeric = {"scipy", "numba", "llvmlite", "matplotlib", "mpi4py"}
+    numeric = {"scipy", "matplotlib", "mpi4py"}
     assert loaded["help"] & (numeric | {"numpy", "h5py", "pandas", "rich"}) == set()
     assert loaded["adhesis"] & (numeric | {"h5py", "xarray", "rich"}) == set()
     assert loaded["nothing_to_do"] & numeric == set()
@@ -75,3 +77,19 @@ def test_what_a_benchmark_imports_is_there(path: Path) -> None:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module != "__future__":
             exec(ast.unparse(node), {})  # raises ImportError
+
+
+def test_tolerances_of_the_kernels_are_those_of_the_page_of_tolerances() -> None:
+    """Each stands in both languages; units and reasons in Python alone."""
+    text = (ROOT / "solver" / "kernels" / "tolerances.hpp").read_text()
+    found = dict(re.findall(r"([A-Z][A-Z_]+) = ([-0-9.e]+)", text))
+    assert len(found) > 40
+    assert float(found.pop("MOST_RANK")) >= float(found["MOST_CHARGES"])
+    assert {name: getattr(tolerances, name) for name in found} == {
+        name: float(value) for name, value in found.items()
+    }
+
+
+def test_the_types_of_the_kernels_are_those_of_the_module() -> None:
+    """`python tools/stub.py` writes them."""
+    assert stub() == (ROOT / "solver" / "_kernels.pyi").read_text()

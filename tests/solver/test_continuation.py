@@ -43,9 +43,6 @@ class Curve:
     asked: int = 0
     pins: bool = False
 
-    def recall(self, held: Array) -> None:
-        """Edges of one work of adhesion remember nothing."""
-
     def half_width(self, at: float) -> float:
         """Half of the gap's length."""
         return 0.5 + (0.1 * at if self.fold is None else float(np.sqrt(at - self.fold)))
@@ -63,19 +60,9 @@ class Curve:
         rate = np.full(2, -self.rate(at))
         return Point(at, cast(Any, field), rate, -2 * at, clearance)
 
-    def uses_windows(self, gaps: Any) -> bool:
-        """Few gaps."""
-        return False
-
-    def system(self, gaps: Any) -> Any:
-        """The system is this object, too."""
-        return self
-
-    def closing_motion(self, before: Any, after: Any) -> float:
-        """Largest motion of an end."""
-        return float(np.abs(after - before).max())
-
-    def equilibrium(self, gaps: Any, at: float, reach: float) -> Point | None:
+    def equilibrium(
+        self, gaps: Any, at: float, reach: float, memory: Array | None = None
+    ) -> Point | None:
         """Point of the curve, if it is within reach."""
         self.asked += 1
         if self.fold is not None and at <= self.fold:
@@ -343,7 +330,7 @@ class Clearance:
         """Seed at a place."""
         return [place]
 
-    def is_located(self, value: float, many: bool, near: bool) -> bool:
+    def is_located(self, value: float, near: bool) -> bool:
         """Whether the overlap is small."""
         return near and value > -0.5 * self.tolerance
 

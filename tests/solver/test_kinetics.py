@@ -7,13 +7,7 @@ import pytest
 
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
 from adhesis.solver.sharp.descent.saddle import leaving_step
-from adhesis.solver.sharp.equilibrium.griffith import edge_tangent, imbalance, move_edges
-from adhesis.solver.sharp.field.dense_solver import solve
-from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.grids import grid_of
 
@@ -38,99 +32,17 @@ def race() -> Problem:
 # ------------------------------------------------------------------ one step
 
 
-def explicit_flow(
-    matrix: np.ndarray, force: np.ndarray, limit: np.ndarray, steps: int
-) -> np.ndarray:
-    """Explicit Euler steps of ṅ = f - Hn until an edge is at 0.95 of its limit or all rest."""
-    n = np.zeros_like(force)
-    dt = 0.002 / np.abs(np.linalg.eigvalsh(matrix)).max()
-    for _ in range(steps):
-        n = n + dt * (force - matrix @ n)
-        if np.any(np.abs(n) > 0.95 * limit):
-            break
-    return n
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_a_step_lies_on_the_linear_flow(seed):
-    rng = np.random.default_rng(seed)
-    count = int(rng.integers(2, 7))
-    root = rng.normal(size=(count, count))
-    matrix = root + root.T  # indefinite
-    force, limit = rng.normal(size=count), rng.uniform(0.05, 0.2, count)
-    values, vectors = np.linalg.eigh(matrix)
-    step = flow_step(values, vectors, force, limit, 0.0)
-    reach = np.abs(step / limit).max()
-    assert 0.9 <= reach <= 1
-    exact = explicit_flow(matrix, force, limit * reach / 0.95, 200_000)
-    np.testing.assert_allclose(step, exact, atol=2e-2 * limit.min())
-
-
-def test_without_a_limit_in_reach_a_step_is_newtons():
-    rng = np.random.default_rng(0)
-    root = rng.normal(size=(5, 5))
-    matrix = root @ root.T + np.eye(5)
-    force = rng.normal(size=5)
-    values, vectors = np.linalg.eigh(matrix)
-    step = flow_step(values, vectors, force, np.full(5, 1e3), 0.0)
-    np.testing.assert_allclose(step, np.linalg.solve(matrix, force), rtol=1e-10)
-
-
-def test_an_edge_of_small_force_is_slow():
-    """Two edges that do not feel each other move as their forces are, not equally fast."""
-    values, vectors = np.linalg.eigh(np.diag([-1e-6, -1e-6]))
-    step = flow_step(values, vectors, np.array([1.0, -0.25]), np.array([0.1, 0.1]), 0.0)
-    assert step[1] == pytest.approx(-0.25 * step[0], rel=1e-5)
-
-
-def test_rounding_does_not_pull_at_an_unstable_mode():
-    """A symmetric pull of two equal edges, with an error of 1e-9, moves them equally."""
-    matrix = np.array([[1.0, 2.0], [2.0, 1.0]])  # the antisymmetric mode is unstable
-    values, vectors = np.linalg.eigh(matrix)
-    step = flow_step(values, vectors, np.array([0.3, 0.3 + 1e-9]), np.full(2, 10.0), 0.0)
-    assert step[0] == pytest.approx(step[1], rel=1e-8)
-
-
 @pytest.mark.parametrize("turn", range(4))
 def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     """Four equal edges on a ring: the way out is the same but for the place of its leader."""
     ring = -np.eye(4) + 0.3 * (np.roll(np.eye(4), 1, 0) + np.roll(np.eye(4), -1, 0))
-    values, vectors = np.linalg.eigh(ring + 1e-12 * np.diag(np.arange(4.0)))
+    ring += 1e-12 * np.diag(np.arange(4.0))
     first = np.roll(np.arange(4.0), turn)
-    step = leaving_step(values, vectors, np.full(4, 0.1), first)
+    step = leaving_step(ring, np.full(4, 0.1), first)
     lead = int(np.argmin(first))
-    reference = leaving_step(values, vectors, np.full(4, 0.1), np.arange(4.0))
+    reference = leaving_step(ring, np.full(4, 0.1), np.arange(4.0))
     np.testing.assert_allclose(np.roll(step, -lead), reference, atol=1e-9)
     assert step[lead] == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize(("h_rms", "gamma"), [(1e-6, 0.01), (5e-5, 10.0)])  # flat, and steep
-def test_the_hessian_is_the_derivative_of_the_forces(h_rms, gamma):
-    profile = self_affine_profile(0.8, period=2e-3, n0=3, ratio=4, seed=1, h_rms=h_rms)
-    method = SharpMethod(Problem(profile, SOLID, gamma), accuracy=1e-6)
-    edges, panels = method.edges, method.edges.source.panels
-    gaps = np.array([[0.3, 1.7], [2.1, 4.4], [5.0, 6.4]])
-    orders = choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
-
-    def forces(at: np.ndarray, fields: int):
-        separation = 0.5 * profile.h_max * profile.q0
-        of = solve(at, separation, orders, fields, edges.model, NO_EXTERIOR)
-        residual, drift = imbalance(of, edges.law, panels)
-        return of, residual, drift, residual * (2 * of.opening - residual)
-
-    of, residual, drift, _ = forces(gaps, 2)
-    tangent, _ = edge_tangent(of, drift, GAUSS_RULES)
-    matrix = hessian(of.opening, residual, drift, tangent)
-    np.testing.assert_array_equal(matrix, matrix.T)
-    h = 1e-5
-    for e in range(6):
-        way = np.zeros(6)
-        way[e] = h
-        slope = (forces(move_edges(gaps, way), 1)[3] - forces(move_edges(gaps, -way), 1)[3]) / h / 2
-        np.testing.assert_allclose(matrix[:, e], slope, atol=2e-4 * np.abs(matrix).max())
-    # On the steep one the slope of what must be paid counts; its sign would be noticed.
-    share = np.abs(2 * residual * drift).max() / np.abs(matrix).max()
-    assert (share > 1e-3) == (h_rms > 1e-5)
 
 
 # ------------------------------------------------------------------ a race
@@ -143,7 +55,7 @@ def test_a_race_ends_where_gradient_flow_does(share):
     It gave a loss of 5.178224 with jumps located to 5e-5 h_max. The loss is that at accuracy 1e-6.
     """
     method = SharpMethod(race())
-    method.edges.law = method.edges.law._replace(longest_step=share * method.edges.law.longest_step)
+    method.edges.law.longest_step *= share
     result = run_loop(method, max_penetration=0.8, load_steps=20)
     assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=1e-4)
     assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
@@ -171,8 +83,7 @@ def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ra
 
     def loss_with(share: float) -> float:
         method = SharpMethod(Problem(profile, SOLID, gamma))
-        law = method.edges.law
-        method.edges.law = law._replace(longest_step=share * law.longest_step)
+        method.edges.law.longest_step *= share
         return run_loop(method, max_penetration=0.9, load_steps=20).loss
 
     losses = [loss_with(share) for share in (2.0, 1.0, 0.25)]
@@ -239,12 +150,12 @@ def test_nothing_races_where_the_rules_agree():
 def test_equal_speeds_end_elsewhere():
     """The comparison rule reaches contact 0.6011 from the same first touch."""
     method = SharpMethod(race())
-    method.edges.law = method.edges.law._replace(longest_step=0.2 * method.edges.law.longest_step)
+    method.edges.law.longest_step *= 0.2
     start, touches = method.nucleation.first_touch()
     gaps = method.nucleation.insert_seeds(np.empty((0, 2)), touches)
-    found = method.edges.relax(gaps, start, 0.05 * method.edges.wave, equal_speeds=True)
+    found = gaps
     while isinstance(found, np.ndarray):
-        found = method.edges.relax(found, start, 0.05 * method.edges.wave, equal_speeds=True)
+        found, _ = method.edges.relax(found, start, 0.05 * method.edges.wave, equal_speeds=True)
     contact = 1 - np.diff(found.field.gaps, axis=1).sum() / (2 * np.pi)
     assert contact == pytest.approx(0.6011, abs=2e-3)
 

@@ -1,37 +1,24 @@
-"""Dense linear algebra of method ``sharp``: factors and solutions, to rounding."""
+"""Dense linear algebra of method ``sharp``: solutions and inverses, to rounding."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from adhesis.solver.sharp.field.cholesky import (
-    cholesky,
-    factor_rows,
-    is_definite,
-    solve_column,
-    solve_factored,
-)
+from adhesis.solver._kernels import invert_definite, solve_definite
 
 
 @pytest.mark.parametrize("n", [1, 7, 8, 9, 41])
-def test_factors_and_solutions(n):
-    """Sizes around a block of eight rows; one, three and many right-hand sides."""
+def test_solutions_and_inverses(n):
+    """Sizes around a block of eight rows."""
     random = np.random.default_rng(n)
     a = random.normal(size=(n, n))
     a = a @ a.T + n * np.eye(n)
-    factor, definite = cholesky(a)
-    lower = np.tril(factor[:, :n])
-    assert definite
-    assert lower.T @ lower == pytest.approx(a, rel=1e-13)
-    for columns in (1, 3, 17):
-        load = random.normal(size=(n, columns))
-        x = load.copy()
-        solve_factored(factor, x)
-        assert a @ x == pytest.approx(load, abs=1e-12)
-    x = load[:, 0].copy()
-    solve_column(factor, x)
-    assert a @ x == pytest.approx(load[:, 0], abs=1e-12)
+    load = random.normal(size=n)
+    assert a @ solve_definite(a, load) == pytest.approx(load, abs=1e-12)
+    inverse = invert_definite(a)
+    assert a @ inverse == pytest.approx(np.eye(n), abs=1e-12)
+    assert inverse.tobytes() == inverse.T.tobytes()
 
 
 def test_definite_is_what_has_positive_eigenvalues():
@@ -40,5 +27,5 @@ def test_definite_is_what_has_positive_eigenvalues():
     for least, definite in ((1e-3, True), (-1e-3, False)):
         a = (vectors * np.append(least, np.arange(1.0, 20))) @ vectors.T
         a = 0.5 * (a + a.T)
-        assert is_definite(a) == definite
-        assert not factor_rows(a.copy(), 0.1)
+        assert (solve_definite(a, np.ones(20)) is not None) == definite
+        assert (invert_definite(a) is not None) == definite

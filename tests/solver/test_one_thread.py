@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 from scipy.linalg import cython_lapack  # noqa: F401  # a library of its own
 from threadpoolctl import ThreadpoolController
 
 from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.precompile import small_problem
 from adhesis.solver.registry import make_method
 from adhesis.solver.sharp.mechanics import EdgeMechanics
+from tests.support.scenes import small_problem
 
 
 def threads() -> set[int]:
@@ -48,3 +50,16 @@ def test_a_loop_and_its_fields_use_one_thread_and_leave_the_number_as_it_was(mon
         method.fields(max(states, key=lambda state: state.patches), 256)
         assert seen == [{1}]
         assert threads() == {2}
+
+
+def test_two_loops_in_two_threads_have_the_bits_of_one_after_the_other():
+    """Each limits the threads; the first one to end leaves the limit to the other."""
+
+    def loss(work_of_adhesion: float) -> str:
+        method = make_method("sharp", small_problem(work_of_adhesion))
+        return run_loop(method, max_penetration=0.8, load_steps=4).loss.hex()
+
+    works = [0.02, 0.03, 0.04, 0.05]
+    expected = [loss(work) for work in works]
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(loss, works)) == expected

@@ -80,7 +80,6 @@ def test_a_loop_has_the_same_bits_whichever_others_were_followed_before_it():
 
     def branch() -> LoadingBranch:
         method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.005))
-        method.edges.many = 4  # most states of these loops have more gaps, some fewer
         return LoadingBranch(method, [0.3, 0.7], load_steps=4)
 
     after_another = branch()

@@ -2,59 +2,34 @@
 
 from __future__ import annotations
 
-import gc
-
 import numpy as np
 import pytest
 
 from adhesis import HalfSpace, Problem, self_affine_profile
-from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD
-from adhesis.solver.sharp.descent.track import Track
-from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.edge_interaction import openings_between_edges
-from adhesis.solver.sharp.equilibrium.griffith import (
-    edge_tangent,
-    imbalance,
-    move_edges,
-    symmetrise,
-)
-from adhesis.solver.sharp.equilibrium.linear_exterior import open_window
-from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.response_setup import set_up_response, update_response
-from adhesis.solver.sharp.equilibrium.window import Window
-from adhesis.solver.sharp.field.cholesky import is_definite
-from adhesis.solver.sharp.field.cluster_tree import build_tree, pair_again
-from adhesis.solver.sharp.field.dense_solver import respond_at_fixed_edges, solve
-from adhesis.solver.sharp.field.edge_derivatives import derivatives
-from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.separate_gaps import solve_separately
-from adhesis.solver.sharp.field.solution import (
-    FIXED_SEPARATION,
+from adhesis.solver._kernels import (
     FieldModel,
     LoadingDevice,
-    no_solution,
+    count_charges,
+    count_negative,
+    on_new_tree,
+    pair_again,
+    pair_runs,
+    set_up_response,
+    solve_field,
 )
-from adhesis.solver.sharp.field.tree_factor import (
-    downward_pass,
-    factor_tree,
-    upward_pass,
-    whole_tree,
-)
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.ends import outward, with_patches
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.griffith import move_edges
+from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.field.gap_field import respond_at_fixed_edges
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.system import hierarchical as many_gaps
-from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
+from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
-from adhesis.solver.sharp.system.window_descent import descend_in_window
 from adhesis.solver.sharp.tolerances import CORRECTED
 from tests.support import next_to_a_fold
+from tests.support.dense import dense_residual, dense_tangent, solve_densely
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +46,8 @@ def random_gaps(count, contact, spread, seed=0):
 
 
 def solved(source, gaps, separation, tolerance):
-    model = FieldModel(FIXED_SEPARATION, -np.log(tolerance), GAUSS_RULES, source.panels)
-    orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-    return solve_many(gaps, separation, orders, 2, model)[0], orders, model
+    model = FieldModel(FIXED_SEPARATION, -np.log(tolerance), source.panels)
+    return solve_field(gaps, separation, model), model
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
@@ -83,12 +57,12 @@ def test_field_equals_the_dense_one(profile, gaps, tolerance):
     source = StressSource(profile, tolerance)
     separation = 0.5 * profile.h_max * profile.q0
     ends = random_gaps(*gaps)
-    tree, orders, model = solved(source, ends, separation, tolerance)
-    dense = solve(ends, separation, orders, 2, model, NO_EXTERIOR)
+    tree, model = solved(source, ends, separation, tolerance)
+    dense = solve_densely(ends, separation, model)
     scale = np.abs(dense.opening).max()
     assert np.abs(tree.opening - dense.opening).max() < 2 * tolerance * scale
     assert tree.pressure == pytest.approx(dense.pressure, rel=2 * tolerance)
-    assert tree.mean.unit_mean == pytest.approx(dense.mean.unit_mean, rel=2 * tolerance)
+    assert tree.unit_mean == pytest.approx(dense.unit_mean, rel=2 * tolerance)
 
 
 def test_same_bits(profile):
@@ -103,12 +77,8 @@ def test_work_grows_as_the_number_of_gaps():
     """Charges, and the entries of all matrices of the tree, per gap, from 100 to 3,200 gaps."""
     share = []
     for count in (100, 3200):
-        table = map_gaps(random_gaps(count, 0.3, 0.7))
-        places = np.linspace(table[:, 0], table[:, 1], 10)[1:-1].T.ravel()
-        tree = build_tree(
-            table, 8 * np.arange(count + 1), places, np.ones(8 * count), -np.log(1e-5), True
-        )
-        share.append([len(tree.theta) / count, (tree.rank.astype(float) ** 3).sum() / count])
+        charges = count_charges(random_gaps(count, 0.3, 0.7), -np.log(1e-5)).astype(float)
+        share.append([charges.sum() / count, (charges**3).sum() / count])
     # once the tree is deep its upper levels, with their few more charges, hold few runs
     assert share[1][0] < 1.1 * share[0][0]
     assert share[1][1] < 1.25 * share[0][1]
@@ -121,32 +91,42 @@ def mechanics(profile, toughness, tolerance=1e-6):
     return EdgeMechanics(source, toughness * scale, tolerance)
 
 
-def opened(gaps, edges, separation):
-    """Solution with S and S' by the dense solver, imbalance, drift and tangent."""
-    orders = choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
-    of = solve(gaps, separation, orders, 2, edges.model, NO_EXTERIOR)
-    residual, drift = imbalance(of, edges.law, edges.model.panels)
-    return of, orders, residual, drift, edge_tangent(of, drift, GAUSS_RULES)[0]
-
-
 def test_newton_step_and_stability_equal_the_dense_ones(profile):
     """Steps of all edges to 1e-3, and the same verdict, on stable and unstable states."""
-    edges = mechanics(profile, 1.0)
+    edges = mechanics(profile, 1.0, 1e-9)
     separation = 3 * profile.h_max * profile.q0
     verdicts = set()
     for seed in range(12):
         gaps = random_gaps(6, 0.1 + 0.06 * seed, 0.1, seed)
-        of, orders, residual, _, tangent = opened(gaps, edges, separation)
-        assert of.opening.min() > 0
-        step = np.linalg.solve(tangent, -residual)
-        stable = is_definite(symmetrise(of, tangent, edges.law.overlap_limit)[1])
-        response, has_field = set_up_response(gaps, separation, orders, edges.law, edges.model)
-        assert has_field
-        found = solve_response(response, separation, FIXED_SEPARATION)
+        solution = solve_densely(gaps, separation, edges.model)
+        assert solution.opening.min() > 0
+        tangent = dense_tangent(gaps, separation, edges)
+        step = np.linalg.solve(tangent, -dense_residual(gaps, separation, edges))
+        by_edge = solution.opening[:, None] * tangent
+        stable = bool(np.linalg.eigvalsh(by_edge + by_edge.T)[0] > 0)
+        response = set_up_response(gaps, separation, None, edges.law, edges.model)
+        found = response.solve(separation, edges.law, edges.model)
         assert np.abs(found.motion - step).max() < 1e-3 * np.abs(step).max()
         assert found.stable == stable
         verdicts.add(stable)
     assert False in verdicts
+
+
+@pytest.mark.parametrize("device", [FIXED_SEPARATION, LoadingDevice(1.0, 0.7)])
+def test_the_tangent_of_some_edges_is_the_dense_one_of_all_condensed(profile, device):
+    """Some edges held, all others following: a Schur complement of the tangent of all edges."""
+    edges = mechanics(profile, 1.0, 1e-9)
+    edges.model = FieldModel(device, edges.model.digits, edges.model.panels)
+    gaps = random_gaps(9, 0.5, 0.3, 3)
+    separation = 3 * profile.h_max * profile.q0
+    response = set_up_response(gaps, separation, None, edges.law, edges.model)
+    whole = dense_tangent(gaps, separation, edges)
+    for some in (np.array([3]), np.array([2, 3, 11]), np.arange(5, 9), np.arange(gaps.size)):
+        found = response.tangent_between(gaps, some, separation, edges.law, edges.model)
+        rest = np.setdiff1d(np.arange(gaps.size), some)
+        others = np.linalg.solve(whole[np.ix_(rest, rest)], whole[np.ix_(rest, some)])
+        exact = whole[np.ix_(some, some)] - whole[np.ix_(some, rest)] @ others
+        assert np.abs(found - exact).max() < 1e-4 * np.abs(exact).max()
 
 
 @pytest.fixture(scope="module")
@@ -164,25 +144,20 @@ def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded
     method, state = loaded
     edges, gaps = method.edges, state.internal.gaps
     law, model = edges.law, edges.model
-    orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
     wrong, moved = [], []
     for way in (4e-3, 2e-3):
         at = state.separation * method.q0 * (1 - way)
-        response, _ = set_up_response(gaps, at, orders, law, model)
-        newton = solve_response(response, at, model.device)
+        response = set_up_response(gaps, at, None, law, model)
+        newton = response.solve(at, law, model)
         assert newton.stable
         ends = move_edges(gaps, newton.motion)
-        potential = response.potential[:, : len(response.nodes.theta)]
-        after = solve_separately(
-            ends, map_gaps(gaps), orders, potential[0] + newton.pressure * potential[1],
-            newton.pressure, at, model,
-        )  # fmt: skip
-        anew, _ = solve_many(ends, at, orders, 2, model)
-        before, _ = solve_many(gaps, at, orders, 2, model)
+        after = response.solve_separately(ends, newton.pressure, at, model)
+        anew = solve_field(ends, at, model, response.orders)
+        before = solve_field(gaps, at, model, response.orders)
         scale = np.abs(anew.opening).max()
         wrong.append(np.abs(after.opening - anew.opening).max() / scale)
         moved.append(np.abs(before.opening - anew.opening).max() / scale)
-        assert after.nodes.weight @ after.scaled_opening == pytest.approx(2 * np.pi * at, rel=1e-12)
+        assert after.weight @ after.scaled_opening == pytest.approx(2 * np.pi * at, rel=1e-12)
         assert after.pressure == pytest.approx(anew.pressure, rel=1e-2 * moved[-1])
     assert wrong[0] < 1e-2 * moved[0]
     assert wrong[1] < 0.3 * wrong[0]
@@ -192,29 +167,25 @@ def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded
 def hierarchical(loaded):
     """Edges of many gaps, and a point of theirs."""
     method, state = loaded
-    edges, before = method.edges, method.edges.many
-    edges.many = 6
-    yield edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)
-    edges.many = before
+    edges = method.edges
+    return edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)
 
 
 def relaxed(edges, gaps, at):
     """Return the minimum that a descent from these gaps leads to."""
-    found = edges.relax(gaps, at, edges.wave)
-    while not isinstance(found, Point):
-        found = edges.relax(found, at, edges.wave)
-    return found
+    while not isinstance(gaps, Point):
+        gaps, _ = edges.relax(gaps, at, edges.wave)
+    return gaps
 
 
 def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, hierarchical):
-    """Edges and rates against dense matrices a hundred times as accurate."""
+    """Edges and rates against a field a hundred times as accurate, where dense edges balance."""
     method, _ = loaded
     edges, point = hierarchical
     exact = SharpMethod(method.problem, accuracy=1e-6).edges
     dense = exact.equilibrium(point.gaps, point.at, exact.wave)
     assert len(point.gaps) >= 10
-    assert edges.uses_windows(point.gaps)
-    assert not exact.uses_windows(point.gaps)
+    assert np.abs(dense_residual(dense.gaps, dense.at, exact)).max() < 1e-3 * exact.critical
     # the error of the field moves an equilibrium by up to edges.coarse
     assert np.abs(point.gaps - dense.gaps).max() < 0.5 * edges.coarse
     assert np.abs(point.rate - dense.rate).max() < 1e-4 * np.abs(dense.rate).max()
@@ -264,7 +235,7 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(hierarch
 def test_gaps_that_come_and_go_leave_the_other_runs_of_the_tree_as_they_are(seed):
     """Every run joins neighbours, and those that stay hold the gaps that they held."""
     rng = np.random.default_rng(seed)
-    children = build_tree(*arguments_of_tree(random_gaps(20, 0.3, 0.5, seed))).children
+    children = pair_runs(20)
     for _ in range(30):
         before = (len(children) + 1) // 2
         # some stay, in order, others come
@@ -283,7 +254,7 @@ def test_gaps_that_come_and_go_leave_the_other_runs_of_the_tree_as_they_are(seed
 
 
 def test_runs_without_a_change_are_taken_over():
-    children = build_tree(*arguments_of_tree(random_gaps(64, 0.3, 0.5))).children
+    children = pair_runs(64)
     source = np.delete(np.arange(64), 21)  # the patch between the gaps of a pair goes
     source[20] = -1
     _, same = pair_again(children, source)
@@ -298,15 +269,6 @@ def gaps_of_runs(children):
     return gaps
 
 
-def arguments_of_tree(ends, digits=12.0):
-    """Nodes of gaps, as ``build_tree`` takes them."""
-    table = map_gaps(ends)
-    orders = choose_orders(table, digits, GAUSS_RULES.counts)
-    offset = np.append(0, np.cumsum(GAUSS_RULES.counts[orders]))
-    theta = np.linspace(0.0, 1.0, offset[-1])
-    return table, offset, theta, np.ones(offset[-1]), digits, True
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
     """Gaps merge, close and open, one after the other, each response set up from the last one."""
@@ -314,8 +276,7 @@ def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
     edges, at = method.edges, state.separation * method.q0
     rng = np.random.default_rng(seed)
     ends = random_gaps(40, 0.4, 0.5, seed)
-    orders = choose_orders(map_gaps(ends), edges.model.digits, GAUSS_RULES.counts)
-    response, _ = set_up_response(ends, at, orders, edges.law, edges.model)
+    response = set_up_response(ends, at, None, edges.law, edges.model)
     for change in ["merge", "merge", "close", "open", "open", "merge", "close", "close", "open"]:
         k = int(rng.integers(1, len(ends) - 1))
         if change == "merge":
@@ -325,24 +286,28 @@ def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
         else:
             one, two = ends[k, 0] + np.diff(ends[k]) * [0.4, 0.6]
             ends = np.concatenate([ends[:k], [[ends[k, 0], one], [two, ends[k, 1]]], ends[k + 1 :]])
-        none = np.empty(0, dtype=np.int64)
-        response, found = update_response(response, ends, at, none, edges.law, edges.model)
-        assert found
-        solve_response(response, at, edges.model.device)
-        nodes, count, n = response.nodes, len(ends), len(response.nodes.theta)
-        tree = build_tree(
-            nodes.table, nodes.offset, response.tree.theta[:n], response.tree.stretch[:n],
-            edges.model.digits, True,
-        )  # fmt: skip
-        of_gaps = response.factor.response[: tree.response_start[count]]
-        factor = factor_tree(tree, of_gaps, response.factor.negative[:count])
-        charges = upward_pass(tree, factor, response.charges.isolated[:, :n].T.copy())
-        potential = np.zeros(charges.potential_of_sibling.shape)
-        downward_pass(tree, factor, whole_tree(tree), charges, potential)
-        difference = np.abs(potential[:, :n] - response.potential[:, :n]).max(axis=1)
-        assert (difference < 1e-4 * np.abs(potential[:, :n]).max(axis=1)).all()
-        # far from balance; of two eigenvalues that change sign in one pair none is counted
-        assert (factor.negative[-1] - response.factor.negative[-1]) % 2 == 0
+        response = response.update(ends, at, None, edges.law, edges.model)
+        response.solve(at, edges.law, edges.model)
+        potential, negative = on_new_tree(response, edges.model.digits)
+        difference = np.abs(potential - response.potential).max(axis=1)
+        assert (difference < 1e-4 * np.abs(potential).max(axis=1)).all()
+        assert negative == response.negative
+
+
+@pytest.mark.parametrize("negative", range(4))
+def test_negative_eigenvalues_that_appear_together_are_counted(negative):
+    """Of a pair of halves whose first one has none, and all directions of which are alike."""
+    rng = np.random.default_rng(negative)
+    n = 12
+    root, _ = np.linalg.qr(rng.standard_normal((n, n)))
+    softest = np.where(np.arange(n) < negative, 1.5, 0.5)  # of the interaction over the stiffness
+    response = root @ np.diag(np.linspace(1, 2, n)) @ root.T
+    inverse_root = np.linalg.inv(np.linalg.cholesky(response))
+    other, _ = np.linalg.qr(rng.standard_normal((n, n)))
+    interaction = inverse_root.T @ other @ np.diag(softest) @ other.T @ inverse_root
+    both = np.block([[interaction, np.eye(n)], [np.eye(n), response]])
+    assert (np.linalg.eigvalsh(both) < 0).sum() == n - negative
+    assert count_negative(interaction, response) == n - negative
 
 
 def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
@@ -354,7 +319,7 @@ def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
     first = kept.at(gaps, at)
     assert kept.at(gaps, at) is first
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
-    assert kept.near(fewer, at, np.empty(0, dtype=np.int64)) is not first
+    assert kept.near(fewer, at, None) is not first
     version = first.version
     assert kept.at(gaps, at) is first
     assert first.version == version
@@ -362,139 +327,6 @@ def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
     assert first.version > version
     kept.forget()
     assert kept.at(gaps, at) is not first
-
-
-@pytest.mark.parametrize("follow", [False, True])
-def test_a_window_responds_to_all_other_gaps(loaded, follow):
-    """Openings and derivatives in a window are those of all gaps.
-
-    With edges that follow outside, its tangent is the Schur complement of all edges'.
-    """
-    method, state = loaded
-    edges, separation = method.edges, state.separation * method.q0
-    gaps = state.internal.gaps.copy()
-    count = len(gaps)
-    assert count >= 7
-    orders = choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
-    first = count - 2
-    inside = (first + np.arange(4)) % count  # across the end of the period
-    model, panels = edges.model, edges.model.panels
-    response, _ = set_up_response(gaps, separation, orders, edges.law, model)
-    newton = solve_response(response, separation, model.device)
-    assert newton.stable
-    assert np.abs(newton.motion).max() < 1e-3 * edges.wave  # an equilibrium for the tree, too
-    window, exterior, _ = open_window(
-        response, gaps, first, 4, np.inf if follow else 0.0, edges.law, model
-    )
-    if not follow:
-        # exact for whatever the window's edges do
-        motion = 0.02 * edges.wave * np.random.default_rng(0).standard_normal((4, 2))
-        window[:-1] += motion
-        gaps[inside] += motion
-    of, _, _, _, tangent = opened(gaps, edges, separation)
-    local = solve(window, separation, np.append(orders[inside], 0), 2, model, exterior)
-    own = (2 * inside[:, None] + [0, 1]).ravel()
-    scale = np.abs(of.opening).max()
-    assert np.abs(local.opening[:-2] - of.opening[own]).max() < 1e-5 * scale
-    assert local.pressure == pytest.approx(of.pressure, rel=1e-4)
-    if follow:
-        residual, drift = imbalance(local, edges.law, panels)
-        assert not residual[-2:].any()  # the ends of the exterior stay
-        found = edge_tangent(local, drift, GAUSS_RULES)[0][:-2, :-2]
-        rest = np.setdiff1d(np.arange(2 * count), own)
-        others = np.linalg.solve(tangent[np.ix_(rest, rest)], tangent[np.ix_(rest, own)])
-        exact = tangent[np.ix_(own, own)] - tangent[np.ix_(own, rest)] @ others
-    else:
-        found = derivatives(local, GAUSS_RULES)[0][:-2, :-2]
-        exact = derivatives(of, GAUSS_RULES)[0][np.ix_(own, own)]
-    assert np.abs(found - exact).max() < 1e-5 * np.abs(exact).max()
-
-
-def test_a_loop_in_windows_is_the_loop():
-    """Tree and windows from six gaps on: losses, jumps and audit as with dense matrices."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=25, h_rms=1e-6, seed=1)
-    problem = Problem(profile, HalfSpace(1e6, 0.5), 0.01)
-    loops = []
-    for many in (1000, 6):
-        method = SharpMethod(problem)
-        method.edges.many = many
-        loops.append(run_loop(method, max_penetration=0.6, load_steps=20))
-    dense, windows = loops
-    assert dense.patches.max() >= 12
-    assert len(windows.jumps) == len(dense.jumps)
-    assert windows.loss == pytest.approx(dense.loss, rel=2e-4)
-    assert windows.loss_from_drops == pytest.approx(dense.loss_from_drops, rel=2e-4)
-    assert abs(windows.audit_residual) < 1e-4
-
-
-def test_jumps_come_where_dense_matrices_find_them():
-    """Of loading, whichever edges come to a fold, to 3e-4 h_max."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
-    problem = Problem(profile, HalfSpace(1e6, 0.5), 0.01)
-    places = []
-    for many in (1000, 6):
-        method = SharpMethod(problem)
-        method.edges.many = many
-        state = method.detached(profile.h_max)
-        jumps = []
-        for separation in profile.h_max * (1 - 0.0225 * np.arange(20)):
-            path = method.follow(state, separation)
-            state = path.states[-1]
-            jumps += [jump.separation / profile.h_max for jump in path.jumps]
-        assert state.patches > 6
-        places.append(jumps)
-    dense, windows = places
-    assert len(dense) > 10
-    assert windows == pytest.approx(dense, abs=3e-4)
-
-
-def test_stiffness_between_some_edges_is_the_dense_one(loaded):
-    """What edges take from each other's force at fixed p, neighbours across a gap and others."""
-    method, state = loaded
-    edges, at = method.edges, state.separation * method.q0
-    point = edges.equilibrium(state.internal.gaps, at, edges.wave)
-    solution = point.field.solution
-    under_load = edges.model._replace(device=LoadingDevice(0.0, 1.0))
-    orders, some = solution.nodes.orders, np.array([0, 1, 4, 7, 2 * len(point.gaps) - 1])
-    loaded_alike = solve(point.gaps, -point.pressure, orders, 2, under_load, NO_EXTERIOR)
-    dense = derivatives(loaded_alike, GAUSS_RULES)[0][np.ix_(some, some)]
-    np.fill_diagonal(dense, 0.0)
-    exact = openings_between_edges(point.gaps, orders, some, solution.opening[some], under_load)
-    assert np.abs(exact - dense).max() < 1e-5 * np.abs(dense).max()
-    edges.many, before = 2, edges.many
-    try:
-        near = edges.stiffness(point, some) * outward(point.gaps)[some]
-    finally:
-        edges.many = before
-    assert np.abs(near - dense).max() < 1e-2 * np.abs(dense).max()  # as ``RACE_MARGIN`` says
-
-
-def test_the_gaps_around_a_fold_place_it_as_all_gaps_do(monkeypatch):
-    """The null vector is exact at the fold: with the distance from it the difference vanishes."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=40, ratio=10, h_rms=1e-6, seed=2)
-    problem = Problem(profile, HalfSpace(1e6, 0.5), 0.005)
-    around_fold, apart = HierarchicalSystem.fold_displacement, []
-
-    def compare(system, point):
-        near = system._solve_next_to_fold(point)
-        change = np.zeros(point.gaps.size)
-        change[np.argmax(np.abs(point.rate))] = 1e-3
-        everywhere = respond_at_fixed_edges(system.solution(point.gaps, point.at, 1.0, 1))
-        around = respond_at_fixed_edges(near.solution).opening[: len(near.edges)]
-        expected = point.fold_displacement(change, everywhere.opening)
-        found = point.fold_displacement(change[near.edges], around, near.edges)
-        apart.append(found / expected - 1)
-        return around_fold(system, point)
-
-    monkeypatch.setattr(HierarchicalSystem, "fold_displacement", compare)
-    largest = []
-    for accuracy in (1e-4, 1e-6):
-        apart.clear()
-        run_loop(SharpMethod(problem, accuracy=accuracy), max_penetration=0.4, load_steps=4)
-        assert len(apart) > 5
-        largest.append(np.abs(apart).max())
-    assert largest[1] < 0.05
-    assert largest[1] < 0.2 * largest[0]  # as the square root of the distance
 
 
 def test_no_step_leads_to_another_branch():
@@ -517,10 +349,7 @@ def test_no_step_leads_to_another_branch():
 
 
 def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
-    """Balanced to the field's error, and Newton's iteration finds nothing: it goes on all the same.
-
-    In windows, and with dense matrices, to one minimum.
-    """
+    """Balanced to the field's error, and Newton's iteration finds nothing: it goes on."""
     profile = self_affine_profile(
         next_to_a_fold.HURST,
         period=2e-3 * np.pi,
@@ -529,42 +358,11 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
         seed=next_to_a_fold.SEED,
         h_rms=1e-6,
     )
-    found = []
-    for many in (30, 100):
-        edges = SharpMethod(
-            Problem(profile, HalfSpace(1e6, 0.5), next_to_a_fold.WORK_OF_ADHESION)
-        ).edges
-        edges.many = many
-        found.append(
-            edges.relax(next_to_a_fold.GAPS, next_to_a_fold.SEPARATION, CORRECTED * edges.wave)
-        )
-        assert edges.count.fields < 2000
-    assert np.abs(found[0].field.gaps - found[1].field.gaps).max() < 0.1 * edges.wave
-
-
-def test_a_window_that_comes_to_where_it_has_no_field_is_left():
-    """Its edges run so far that the others, which follow, would overlap: they are held instead.
-
-    The descent ends where it does with dense matrices, with one gap less.
-    """
-    # fmt: off
-    gaps = np.array([
-        3.201424, 3.727505, 3.795059, 4.324042, 4.502841, 4.991897,
-        5.116157, 5.451749, 5.517615, 7.638616, 7.677602, 8.761642,
-        8.781749, 9.444071,
-    ]).reshape(-1, 2)
-    # fmt: on
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=8, h_rms=1e-6)
-    ends = []
-    for many in (6, 100):
-        edges = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 1e-3)).edges
-        edges.many = many
-        rest = gaps
-        while isinstance(rest, np.ndarray):
-            rest = edges.relax(rest, 1.98188e-3, CORRECTED * edges.wave)
-        ends.append(rest.field.gaps)
-    assert ends[0].shape == ends[1].shape == (6, 2)
-    assert np.abs(ends[0] - ends[1]).max() < 1e-3 * edges.wave
+    problem = Problem(profile, HalfSpace(1e6, 0.5), next_to_a_fold.WORK_OF_ADHESION)
+    edges = SharpMethod(problem).edges
+    found, _ = edges.relax(next_to_a_fold.GAPS, next_to_a_fold.SEPARATION, CORRECTED * edges.wave)
+    assert isinstance(found, Point)
+    assert edges.count.fields < 2000
 
 
 def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(hierarchical, monkeypatch):
@@ -579,52 +377,10 @@ def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(hierarchical, 
 
     monkeypatch.setattr(edges.responses, "near", near)
     others = point.gaps + 3 * edges.wave
-    none = np.empty(0, dtype=np.int64)
-    end = edges.system(others).descend(
-        others, point.at, 10, none, edges.law, Track(), equal_speeds=False
-    )
+    with pytest.raises(NoState, match="no field"):
+        edges.relax(others, point.at, edges.wave)
     assert known.is_outgrown
-    assert end.event == NO_FIELD
-    assert [len(least) for least in asked] == [0, 0]
-
-
-def test_outside_a_window_gaps_follow_to_second_order(hierarchical):
-    """Where the window is solved, the others are expected where they are: error as step squared."""
-    edges, point = hierarchical
-    lead = int(np.argmax(np.abs(point.rate))) // 2
-    count = len(point.gaps)
-    errors = []
-    for share in (0.0, 1.0, 0.5):
-        at = point.at - share * 0.02 * edges.wave / np.abs(point.rate).max()
-        full = edges.equilibrium(point.extrapolate(at), at, edges.wave)
-        response = edges.responses.at(point.gaps, point.at).response
-        window = Window(point.gaps, response, lead - 2, count - 3, np.inf, edges.law, edges.model)
-        local = window.gaps.copy()
-        local[:-1] += (full.gaps - point.gaps)[(lead - 2 + np.arange(count - 3)) % count]
-        expected, _ = window.extend(local, window.orders, at)
-        errors.append(np.abs(expected - full.gaps).max() / edges.wave)
-    assert errors[0] < 1e-6
-    assert 3 < errors[1] / errors[2] < 5
-    assert errors[1] < 2e-3
-
-
-def test_a_window_gives_up_where_the_others_would_follow_far(hierarchical):
-    """By a quarter of the shortest wave: another place decides there what runs."""
-    edges, point = hierarchical
-    response = edges.responses.at(point.gaps, point.at).response
-    width = len(point.gaps) - 3
-    window = Window(point.gaps, response, 0, width, np.inf, edges.law, edges.model)
-    fastest = np.abs(point.rate[2 * len(point.gaps) - 6 :]).max()  # of the others
-    for motion, follows in ((0.15, True), (0.5, False)):
-        at = point.at + motion * edges.wave / fastest
-        everywhere, furthest = window.extend(window.gaps, window.orders, at)
-        assert (furthest < 0.25 * edges.wave) == follows
-        # none moves by more than a longest step
-        assert np.abs(everywhere - point.gaps).max() <= edges.longest_step * (1 + 1e-9)
-        found = descend_in_window(
-            window, point.gaps, at, edges, edges.law, equal_speeds=False, is_first=True
-        )
-        assert (found is not None) == follows
+    assert asked == [None, None]
 
 
 def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
@@ -638,58 +394,9 @@ def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
     assert state.patches > 40
 
 
-def test_a_descent_begun_in_a_window_ends_where_one_of_all_gaps_does(hierarchical):
-    """From a seed in the widest gap, and from edges pushed out of balance."""
-    edges, point = hierarchical
-    widest = int(np.argmax(np.diff(point.gaps, axis=1)))
-    seeded = with_patches(
-        point.gaps, point.gaps[widest].mean(keepdims=True), np.array([0.3 * edges.wave])
-    )
-    pushed = point.gaps.copy()
-    pushed[widest] += 0.3 * edges.wave * np.array([-1.0, 1.0])
-    for gaps in (seeded, pushed):
-        ends = []
-        for start in (None, edges.start(point)):
-            found = edges.relax(gaps, point.at, edges.wave, start=start)
-            if not isinstance(found, Point):
-                found = relaxed(edges, found, point.at)
-            ends.append(found.gaps)
-        assert ends[0].shape == ends[1].shape
-        assert np.abs(ends[0] - ends[1]).max() < 0.01 * edges.wave
-
-
-def test_windows_are_let_go_without_a_search_for_circles(profile):
-    """What windows hold of many gaps is large: it goes with the points that need it."""
-    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 3e-3))
-    method.edges.many = 6
-    gc.collect()
-    gc.disable()
-    try:
-        loop = run_loop(method, max_penetration=0.5, load_steps=4)
-        alive = sum(type(thing) is Window for thing in gc.get_objects())
-    finally:
-        gc.enable()
-    assert loop.patches.max() > 6
-    assert alive <= 2
-
-
-def test_a_fold_whose_window_has_no_solution_is_solved_with_all_gaps(profile, monkeypatch):
-    """As in steep profiles, where the exterior's linear response leaves the window none."""
-
-    def loop() -> LoopResult:
-        method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.01), accuracy=1e-2)
-        method.edges.many = 4
-        return run_loop(method, max_penetration=0.5, load_steps=4)
-
-    def unsolved(gaps, prescribed, orders, fields, model, exterior):
-        return no_solution(map_gaps(gaps), orders, model.device)
-
-    whole = loop()
-    monkeypatch.setattr(many_gaps, "solve", unsolved)
-    assert loop().loss == pytest.approx(whole.loss, rel=1e-6)
-
-
 def test_edges_without_a_field_have_no_response():
-    device = LoadingDevice(1.0, 0.0)
+    gaps = np.array([[1.0, 2.0], [np.nan, 5.0]])
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=2, h_rms=1e-6, seed=1)
+    model = FieldModel(FIXED_SEPARATION, 10.0, StressSource(profile).panels)
     with pytest.raises(FloatingPointError, match="not positive definite"):
-        respond_at_fixed_edges(no_solution(np.ones((1, 6)), np.ones(1, dtype=np.int64), device))
+        respond_at_fixed_edges(solve_field(gaps, 1e-3, model))

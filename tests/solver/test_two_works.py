@@ -15,7 +15,7 @@ from adhesis.solver.loading.path import run_path
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Profile, single_wave
+from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
 
@@ -125,12 +125,24 @@ def test_a_rough_loop_closes_its_audit_with_friction_between_jumps():
     assert loop.loss == pytest.approx(loop.loss_from_drops, rel=1e-4)
 
 
+def test_a_loop_of_many_patches_closes_its_audit():
+    """Most of its gaps lie apart in the tree, and some edges are pinned at most of its states."""
+    profile = self_affine_profile(0.8, period=2e-3, n0=10, ratio=4, seed=3, h_rms=1e-6)
+    problem = Problem(profile, SOLID, 2e-3, work_of_adhesion_open=3e-3)
+    loop = run_loop(make_method("sharp", problem), max_penetration=0.8, load_steps=10)
+    assert loop.patches.max() >= 12
+    assert 0.05 * loop.loss < loop.friction < loop.loss
+    assert abs(loop.audit_residual) < 1e-3
+    assert loop.loss_from_drops == pytest.approx(loop.loss, rel=1e-3)
+
+
 @pytest.mark.parametrize("name", ["loss", "friction"])
 def test_scale_mirror_and_shift_do_not_matter(name):
     value = getattr(rough_loop(), name)
     assert value > 0
     assert getattr(rough_loop(3.0), name) / 3 == pytest.approx(value, rel=1e-8)
-    assert getattr(rough_loop(mirrored=True), name) == pytest.approx(value, rel=1e-8)
+    # the tree pairs other gaps in a mirror: to the error of the field, which is 1e-6 here
+    assert getattr(rough_loop(mirrored=True), name) == pytest.approx(value, rel=1e-6)
     assert getattr(rough_loop(shift=0.7), name) == pytest.approx(value, rel=1e-5)
 
 

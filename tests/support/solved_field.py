@@ -1,21 +1,14 @@
-"""Fields of given gaps, solved by dense matrices."""
+"""Fields of given gaps."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from adhesis.solver._kernels import FieldModel, LoadingDevice, solve_field
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.dense_solver import GapField, solve
-from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
-from adhesis.solver.sharp.field.solution import (
-    FIXED_SEPARATION,
-    FieldModel,
-    LoadingDevice,
-    Solution,
-)
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
+from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 
 
 def solved_field(
@@ -26,7 +19,7 @@ def solved_field(
     device: LoadingDevice = FIXED_SEPARATION,
 ) -> GapField:
     """Solve the field of these gaps to a relative accuracy."""
-    model = FieldModel(device, float(-np.log(tolerance)), GAUSS_RULES, source.panels)
-    orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-    solution: Solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
-    return GapField(source, gaps, prescribed, tolerance, device, solution)
+    model = FieldModel(device, float(-np.log(tolerance)), source.panels)
+    return GapField(
+        source, gaps, prescribed, tolerance, device, lambda: solve_field(gaps, prescribed, model)
+    )

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import Any
 
-RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py", "test_warm.py")
+RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py")
 LONG = (
     *("ranks", "test_staging.py", "test_every_claim", "test_kinetics.py", "test_report.py"),
     *("test_docs.py", "test_run.py", "test_preload.py", "test_opening.py", "test_store.py"),
     *("test_trace_answer.py", "test_launching.py", "test_notebook.py", "test_sharp.py"),
-    *("test_numba_untouched.py", "test_grid.py", "test_setup.py", "test_sharp_path.py"),
+    *("test_grid.py", "test_setup.py", "test_sharp_path.py"),
 )
 
 

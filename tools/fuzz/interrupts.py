@@ -8,8 +8,7 @@ that a crash is counted too.
 
 - ``strong``, ``weak``: loops of ``sharp`` at paper scale, γ = 0.04 and 0.0025 J/m²
 - ``grid``: loops of ``grid``
-- ``first``: the first loop of a process, which loads compiled code
-- ``compile``: the same where nothing is compiled yet
+- ``first``: the first loop of a process
 - ``trace``, ``pool``: ``loss_of_trace`` in one process, and with processes of its own
 - ``campaign``: a campaign in one process
 
@@ -36,8 +35,8 @@ import numpy as np
 
 from tools.interrupted import interrupted
 
-KINDS = ("strong", "weak", "grid", "first", "compile", "trace", "pool", "campaign")
-OF_ONE_PROCESS_EACH = ("first", "compile")
+KINDS = ("strong", "weak", "grid", "first", "trace", "pool", "campaign")
+OF_ONE_PROCESS_EACH = ("first",)
 LOAD_STEPS = 40
 WAVES = 10  # the longest ones in a period
 AT_ONCE = 50  # interrupts of one process
@@ -241,24 +240,19 @@ def work(name: str, seed: int, numbers: range) -> None:
 def run(name: str, seed: int, numbers: range) -> dict[int, str]:
     """Interrupt some times in a process of its own; what each ended in."""
     ended: dict[int, str] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        environment = dict(os.environ)
-        if name == "compile":
-            environment |= {"NUMBA_OPT": "1", "ADHESIS_CACHE": folder}
-        words = ["--kind", name, "--seed", str(seed), "--count", str(len(numbers))]
-        words += ["--first", str(numbers.start), "--work"]
-        try:
-            done = subprocess.run(
-                [sys.executable, str(Path(__file__).resolve()), *words],
-                stdout=subprocess.PIPE,
-                text=True,
-                env=environment,
-                check=False,
-                timeout=LIMIT,
-            )
-            lines, code = done.stdout, done.returncode
-        except subprocess.TimeoutExpired as late:
-            lines, code = (late.stdout or b"").decode(), None
+    words = ["--kind", name, "--seed", str(seed), "--count", str(len(numbers))]
+    words += ["--first", str(numbers.start), "--work"]
+    try:
+        done = subprocess.run(
+            [sys.executable, str(Path(__file__).resolve()), *words],
+            stdout=subprocess.PIPE,
+            text=True,
+            check=False,
+            timeout=LIMIT,
+        )
+        lines, code = done.stdout, done.returncode
+    except subprocess.TimeoutExpired as late:
+        lines, code = (late.stdout or b"").decode(), None
     for line in lines.splitlines():
         if line.startswith("["):
             number, how = json.loads(line)

@@ -301,11 +301,8 @@ def _tell_price(
     part = Part.parse(args.part) if args.part else WHOLE
 
     def prepare(tasks: Tasks) -> None:
-        from adhesis.ensemble.warm import warm_up  # loads the compiler
-
         for task in tasks:
             engine.check(campaign, task)
-        warm_up(engine.methods(campaign, tasks), log)
 
     heard = time.monotonic()
 

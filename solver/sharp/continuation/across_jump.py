@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver.model.profile import Array
+from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.gap.quadrature import Integers
 
 
 def carry_previous(earlier: PreviousPoint, before: Point, after: Point, near: float) -> Point:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adhesis.solver._kernels import shortest_length
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.sharp.continuation.across_jump import carry_previous
 from adhesis.solver.sharp.continuation.corrector import correct
@@ -17,9 +18,7 @@ from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
-from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
-from adhesis.solver.sharp.equilibrium.griffith import shortest_length
-from adhesis.solver.sharp.equilibrium.pinning import way_to_motion
+from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
@@ -142,8 +141,7 @@ class Branch:
         may predict; without one the point has none before it.
         """
         before, after = jump.before, jump.point
-        # of few gaps a jump moves nearly all: it saves no field there
-        if before is None or after is None or not self._edges.uses_windows(after.gaps):
+        if before is None or after is None:
             return after
         longest = PREDICTED_MOTION * self._edges.wave
         remaining = self._target.at - before.at
@@ -166,15 +164,14 @@ class Branch:
         motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
         step = self.steps.next(predictor, self._target.at, motion * self._edges.wave)
         self._free_step, self._begins_to_move = step, False
-        return self._step_to_kink(step) if self._edges.pins else step
+        return step if self.point.pinned is None else self._step_to_kink(step, self.point.pinned)
 
-    def _step_to_kink(self, step: float) -> float:
+    def _step_to_kink(self, step: float, pinned: PinnedEdges) -> float:
         """Shorten a step to where a pinned edge begins to move, or let it lead just across.
 
         The branch has a kink there, and the state on either side belongs to the path.
         """
-        point, finest = self.point, self.steps.finest
-        distance = way_to_motion(point.gaps, point.held, point.rate, self._edges.law, step)
+        distance, finest = pinned.distance(step), self.steps.finest
         if not distance < abs(step) + finest:
             return step
         self._begins_to_move = True
@@ -235,7 +232,8 @@ class Branch:
         if apart < resolution:
             way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
             edges = predictor.leading_edge, other.edge
-            self._two_folds = TwoFolds(edges, predictor.point.at + way, apart)
+            ways = tuple(float(np.sign(predictor.point.rate[e] * way)) for e in edges)
+            self._two_folds = TwoFolds(edges, ways, predictor.point.at + way, apart)
 
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed."""

@@ -19,5 +19,4 @@ def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | No
     # not written as > : a prediction that is no number is none
     if not np.abs(gaps - predictor.point.gaps).max() <= LONGEST_PREDICTION * edges.wave:
         return None
-    edges.recall(predictor.point.held)
-    return edges.equilibrium(gaps, at, CORRECTED * edges.wave)
+    return edges.equilibrium(gaps, at, CORRECTED * edges.wave, memory=predictor.point.gaps)

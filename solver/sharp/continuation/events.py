@@ -38,13 +38,17 @@ class TwoFolds:
     ----------
     edges : tuple of int
         The edge that leads to each of them.
+    ways : tuple of float
+        The way on which it does: 1 outwards of the contact, -1 inwards. Next to the one fold its
+        edge takes the other one along, so that the rates there do not show it.
     beyond : float
         d beyond both.
     apart : float
         Their distance in d.
     """
 
-    edges: tuple[int, int]
+    edges: tuple[int, ...]
+    ways: tuple[float, ...]
     beyond: float
     apart: float
 

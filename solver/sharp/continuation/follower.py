@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch as BranchName
@@ -19,18 +20,16 @@ from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.descent.saddle import positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import step_limits
-from adhesis.solver.sharp.equilibrium.pinning import into_band
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
 from adhesis.solver.sharp.nucleation.location import Located, locate
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import (
+    CORRECTED,
     EQUAL_AMPLITUDES,
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
@@ -67,22 +66,19 @@ class Follower:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
-        self._last: tuple[ContinuationData, Point] | None = None
         self._came_on: BranchName | None = None
         self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, memory: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
-        self.nucleation.searched = NONE_SEARCHED if memory is None else memory.searched
+        self.nucleation.searched = SearchedGaps() if memory is None else memory.searched
         self.openings.healed = []
         self._came_on = None if memory is None else memory.branch
         if memory is None or memory.branch_data is None:
             return None
-        if self._last is not None and self._last[0] is memory:
-            return self._last[1]
-        at, nearly, rate, slope, previous = memory.branch_data
-        field = self.edges.field_again(memory.gaps, at, *nearly)
-        return Point(at, field, rate, slope, memory.clearance, previous, memory.held)
+        at, nearly, rate, slope, previous, pinned = memory.branch_data
+        field = self.edges.field(memory.gaps, at, nearly)
+        return Point(at, field, rate, slope, memory.clearance, previous, pinned)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
         """Follow a stable branch to the target or through its next jump.
@@ -116,7 +112,6 @@ class Follower:
 
     def _turned_back(self, point: Point) -> Point:
         """Return the point at which a path turns back: all its edges are pinned there at first."""
-        self.edges.recall(into_band(point.held, point.gaps, self.edges.law.band))
         pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.settled)
         return point.with_previous(None) if pinned is None else pinned
 
@@ -134,16 +129,12 @@ class Follower:
         memory = ContinuationData(
             point.field.gaps,
             point.clearance,
-            BranchData(point.at, point.field.nearly, point.rate, point.slope, point.previous),
+            BranchData(
+                point.at, point.field.nearly, point.rate, point.slope, point.previous, point.pinned
+            ),
             self.nucleation.searched,
-            point.held,
             name,
         )
-        # A dense field does not depend on the way to it; a hierarchical one does.
-        if self.edges.uses_windows(point.field.gaps):
-            self._last = None
-        else:
-            self._last = memory, point
         history.states[-1] = with_values(history.states[-1], internal=memory)
 
     def _handle_accepted(
@@ -299,7 +290,7 @@ class Follower:
         low = self.nucleation.minimum(point.field)[0]
         way = abs(fold.at - point.at)
         if not self.edges.is_fixed:
-            response = self.edges.system(point.gaps).response_before_fold(point)
+            response = self.edges.response_before_fold(point)
             way *= max(1.0, abs(response.separation))
         if low > self.closing.rate_at_fixed_edges(point) * way:
             return None
@@ -319,13 +310,10 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             last = self.states.of_point(point)
             states = (last,)
-        system = self.edges.system(point.gaps)
-        response = system.response_before_fold(point)
+        response = self.edges.response_before_fold(point)
         before = self.states.at_fixed_edges(last, point.field, response, fold.at)
-        jump = self.jumps.compute(
-            before, self._start_at_fold(fold), fold.at, target.branch, known=point,
-            orders=self._orders_of_folds(fold),
-        )  # fmt: skip
+        start, orders = self._start_at_fold(fold)
+        jump = self.jumps.compute(before, start, fold.at, target.branch, known=point, orders=orders)
         after = jump.states[-1]
         late = self.states.work(before, after, way)
         drop = jump.jump.energy_drop
@@ -333,7 +321,7 @@ class Follower:
         if late > allowed and finest > self.resolution.finest:
             share = max(LATE_REFINEMENT * allowed / late, LEAST_REFINEMENT)
             return None, max(share * min(way, finest), self.resolution.finest)
-        displaced = self.states.work(before, after, abs(system.fold_displacement(point)))
+        displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
@@ -344,35 +332,47 @@ class Follower:
         two, point = fold.with_another, fold.point
         if two is None:
             return None
-        displaced = abs(self.edges.system(point.gaps).fold_displacement(point))
+        displaced = abs(self.edges.fold_displacement(point))
         if two.apart > max(self.resolution.order, SECOND_FOLD_DISPLACED * displaced):
             return None
         furthest = max(fold.at, two.beyond) if fold.at > point.at else min(fold.at, two.beyond)
         longest = self.edges.longest_step
-        return Orders(furthest, tuple(self._moved_on(fold, edge, longest) for edge in two.edges))
+        ahead = zip(two.edges, two.ways, strict=True)
+        starts = tuple(self._moved_on(point.gaps, edge, way * longest) for edge, way in ahead)
+        return Orders(furthest, starts)
 
-    def _start_at_fold(self, fold: Fold) -> Array:
-        """Return the edges from which a descent at a fold starts.
+    def _start_at_fold(self, fold: Fold) -> tuple[Array, Orders | None]:
+        """Return the edges from which a descent at a fold starts, and other orders of events.
 
-        Of edges that are mirror images in a state that is its own image, one is moved on a little:
-        the first to the right of the highest crest. If they hold each other back, it goes first, as
-        one does in any other profile; if they help each other, they go together all the same.
+        A state that is its own mirror image may go on as a saddle. That is left to either side;
+        which of them counts as an order, as these may differ where several modes soften at once.
+        Else of edges that are mirror images one is moved on a little: the first to the right of the
+        highest crest. If they hold each other back, it goes first, as one does in any other
+        profile; if they help each other, they go together all the same.
         """
         point = fold.point
         if not self.jumps.mirror.is_symmetric(point.gaps):
-            return point.gaps
+            return point.gaps, self._orders_of_folds(fold)
+        reach = CORRECTED * self.edges.wave
+        saddle = self.edges.equilibrium(point.extrapolate(fold.at), fold.at, reach, strict=False)
+        if saddle is not None:
+            ways = self.edges.ways_off_saddle(saddle.gaps, fold.at, self.edges.law_at(point.gaps))
+            if ways:
+                return ways[0], Orders(fold.at, tuple(ways))
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
-        away = positions(map_gaps(point.gaps), self.edges.law.origin)[fastest]
-        return self._moved_on(fold, int(fastest[np.argmin(away)]), self.edges.law.rest_step)
+        away = positions(point.gaps, self.edges.source.highest)[fastest]
+        edge = int(fastest[np.argmin(away)])
+        way = np.sign(point.rate[edge] * (fold.at - point.at))
+        moved = self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
+        return moved, self._orders_of_folds(fold)
 
-    def _moved_on(self, fold: Fold, edge: int, length: float) -> Array:
-        """Return the gaps before a fold, one edge moved on by a length in θ or its limit."""
-        point = fold.point
-        longest = step_limits(map_gaps(point.gaps), length)
-        motion = np.zeros(point.gaps.size)
-        motion[edge] = math.copysign(longest[edge], point.rate[edge] * (fold.at - point.at))
-        moved: Array = point.gaps + (outward(point.gaps) * motion).reshape(-1, 2)
+    def _moved_on(self, gaps: Array, edge: int, length: float) -> Array:
+        """Return gaps with one edge moved outwards by a length in θ, or to its limit."""
+        longest = step_limits(gaps, abs(length))
+        motion = np.zeros(gaps.size)
+        motion[edge] = math.copysign(longest[edge], length)
+        moved: Array = gaps + (outward(gaps) * motion).reshape(-1, 2)
         return moved
 
     def _early_closure_error(self, before: ContactState, point: Point, way: float) -> float:

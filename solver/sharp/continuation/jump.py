@@ -11,14 +11,12 @@ from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.history import ComputedJump
-from adhesis.solver.sharp.continuation.races import MirrorCheck, RaceCheck
-from adhesis.solver.sharp.descent.track import Track
-from adhesis.solver.sharp.equilibrium.branch_point import NO_MEMORY, Point
+from adhesis.solver.sharp.continuation.mirror import MirrorCheck
+from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
-from adhesis.solver.sharp.system.window_descent import KnownState
 from adhesis.solver.sharp.tolerances import (
     CORRECTED,
     MOST_NUCLEATIONS,
@@ -58,7 +56,6 @@ class Jumps:
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
-        self.races = RaceCheck(edges)
         profile = states.problem.profile
         self.mirror = MirrorCheck(edges, profile.q0 * profile.mirror_axes)
 
@@ -82,11 +79,11 @@ class Jumps:
         on one of two sides that are mirror images.
         """
         rivals: list[Rival] = []
-        point = self._descend(start, at, touches or [], rivals, known)
+        point = self._descend(start, at, touches or [], rivals)
         point = self._nucleate_until_clear(
             point,
             at,
-            lambda gaps, touching, before: self._descend(gaps, at, touching, rivals, before),
+            lambda gaps, touching: self._descend(gaps, at, touching, rivals),
         )
         after = self._after(before, point, at)
         at_stake = None
@@ -95,7 +92,7 @@ class Jumps:
                 rival = self._end_of_rival(rivals[0], at)
                 at_stake = self._at_stake(before, point, rival, at)
             elif orders is not None:
-                at_stake = self._at_stake_beyond(before, point, orders, known)
+                at_stake = self._at_stake_beyond(before, point, orders)
         except FullContact:  # elsewhere, but with no energy that could be compared
             at_stake = 0.0
         except NoState:  # a comparison that does not come to rest is no failure of the path
@@ -107,12 +104,12 @@ class Jumps:
         return ComputedJump(at, (after,), jump, point, known)
 
     def _at_stake_beyond(
-        self, before: ContactState, point: Point | None, orders: Orders, known: Point | None
+        self, before: ContactState, point: Point | None, orders: Orders
     ) -> float | None:
         """Difference in J/m² of the energies to which two events lead in either order, or None."""
         at = orders.beyond
-        both = None if point is None else self._end_beyond(at, point.gaps, point)
-        ends = (self._end_beyond(at, start, known) for start in orders.starts)
+        both = None if point is None else self._end_beyond(at, point.gaps)
+        ends = (self._end_beyond(at, start) for start in orders.starts)
         differences = [self._at_stake(before, both, end, at) for end in ends]
         return max((one for one in differences if one is not None), default=None)
 
@@ -122,6 +119,8 @@ class Jumps:
         """Difference of the energies of two ends in J/m²; None if they are one."""
         if self._is_same_minimum(rival, point):
             return None
+        if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
+            return 0.0
         ends = (self._after(before, end, at) for end in (point, rival))
         return self.states.energy_difference(*ends)
 
@@ -136,28 +135,26 @@ class Jumps:
         if isinstance(point, FullContact):
             raise point
 
-        def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
-            gaps, start = self.nucleation.insert_seeds(gaps, touching), self.edges.start(before)
-            self._recall(before)
-            return self._relax(gaps, at, equal_speeds=True, start=start)
+        def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
+            gaps = self.nucleation.insert_seeds(gaps, touching)
+            return self._relax(gaps, at, equal_speeds=True)[0]
 
         return self._nucleate_until_clear(point, at, relaxed)
 
-    def _end_beyond(self, at: float, start: Array, known: Point | None) -> Point | None:
+    def _end_beyond(self, at: float, start: Array) -> Point | None:
         """Descend at a d next to that of an equilibrium, until nothing touches."""
 
-        def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
+        def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
             gaps = self.nucleation.insert_seeds(gaps, touching) if touching else gaps
-            self._recall(before)
-            return self._relax(gaps, at, start=self.edges.start(before))
+            return self._relax(gaps, at)[0]
 
-        return self._nucleate_until_clear(relaxed(start, [], known), at, relaxed)
+        return self._nucleate_until_clear(relaxed(start, []), at, relaxed)
 
     def _nucleate_until_clear(
         self,
         point: Point | None,
         at: float,
-        descend: Callable[[Array, list[Touch], Point | None], Point | None],
+        descend: Callable[[Array, list[Touch]], Point | None],
     ) -> Point | None:
         """Let contact nucleate wherever surfaces overlap in a minimum, the deepest place first.
 
@@ -173,12 +170,12 @@ class Jumps:
                 if not (adhesive and self.states.overlaps_when_detached(at)):
                     return None
                 _, touches = self.nucleation.first_touch()
-                point = descend(np.empty((0, 2)), touches, None)
+                point = descend(np.empty((0, 2)), touches)
                 continue
             least, minima = self.nucleation.minimum(point.field)
             if least > 0:
                 return point.with_clearance(least)
-            grown = descend(point.field.gaps, self.nucleation.choose_seeds(minima), point)
+            grown = descend(point.field.gaps, self.nucleation.choose_seeds(minima))
             if grown is not None and self.is_same(grown.field.gaps, point.field.gaps):
                 if adhesive and least < -self.nucleation.tolerance:
                     break
@@ -190,7 +187,10 @@ class Jumps:
         """Whether two descents led to one minimum."""
         if one is None or other is None:
             return one is other
-        here, there = one.field.gaps, other.field.gaps
+        return self._is_same(one.gaps, other.gaps)
+
+    def _is_same(self, here: Array, there: Array) -> bool:
+        """Whether gaps are those of one minimum."""
         apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.coarse)
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
@@ -199,12 +199,7 @@ class Jumps:
         return one.shape == other.shape and bool(np.abs(one - other).max() < 10 * self.edges.coarse)
 
     def _descend(
-        self,
-        gaps: Array,
-        at: float,
-        touches: list[Touch],
-        rivals: list[Rival],
-        known: Point | None = None,
+        self, gaps: Array, at: float, touches: list[Touch], rivals: list[Rival]
     ) -> Point | None:
         """Descend to the next minimum of the energy; None when no contact is left.
 
@@ -213,15 +208,13 @@ class Jumps:
         """
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
-        self._recall(known)
-        track = Track()
-        start = self.edges.start(known)
-        point = self._relax(gaps, at, track=track, start=start)
-        if not rivals and self.races.may_occur(gaps, point, track):
+        point, raced = self._relax(gaps, at)
+        if not rivals and self.edges.critical > 0 and raced:
             try:
-                self._recall(known)
-                rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
-                if not track.rejoined and not self._is_same_minimum(rival, point):
+                rival, _ = self._relax(gaps, at, equal_speeds=True)
+                # next to a fold the field's error may show a minimum where the edges are
+                has_left = rival is None or not self._is_same(rival.gaps, gaps)
+                if has_left and not self._is_same_minimum(rival, point):
                     rivals.append(rival)
             except FullContact as full:
                 rivals.append(full)
@@ -229,25 +222,15 @@ class Jumps:
                 pass  # a comparison that does not come to rest is no failure of the path
         return point
 
-    def _recall(self, point: Point | None) -> None:
-        """Let the edges have the memory of a point; without one they advance."""
-        self.edges.recall(NO_MEMORY if point is None else point.held)
-
     def _relax(
-        self,
-        gaps: Array,
-        at: float,
-        *,
-        equal_speeds: bool = False,
-        track: Track | None = None,
-        start: KnownState | None = None,
-    ) -> Point | None:
-        reach = CORRECTED * self.edges.wave
+        self, gaps: Array, at: float, *, equal_speeds: bool = False
+    ) -> tuple[Point | None, bool]:
+        """Descend until nothing vanishes; returns also whether edges may have raced."""
+        reach, races = CORRECTED * self.edges.wave, False
         while len(gaps):
-            found = self.edges.relax(
-                gaps, at, reach, equal_speeds=equal_speeds, track=track, start=start
-            )
+            found, raced = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds)
+            races = races or raced
             if isinstance(found, Point):
-                return found
-            gaps, start = found, None
-        return None
+                return found, races
+            gaps = found
+        return None, races

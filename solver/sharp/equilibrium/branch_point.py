@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
 
-from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.model.profile import Array, Integers
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.gap.quadrature import Integers
 
 ALL_EDGES = slice(None)
-NO_MEMORY: Array = np.empty((0, 2))
 
 
 class PreviousPoint(NamedTuple):
@@ -23,6 +20,24 @@ class PreviousPoint(NamedTuple):
     at: float
     rate: Array
     gaps: Array
+
+
+class PinnedEdges(NamedTuple):
+    """Place of C of every pinned edge between both critical openings, and its derivative by d.
+
+    It is 0 where an edge begins to advance and 1 where it begins to recede; NaN for other edges.
+    """
+
+    share: Array
+    rate: Array
+
+    def distance(self, step: float) -> float:
+        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
+        rate = self.rate * np.sign(step)
+        left = np.where(rate > 0, 1 - self.share, self.share)
+        moving = np.isfinite(rate) & (rate != 0)
+        ways = np.maximum(left[moving], 0.0) / np.abs(rate[moving])
+        return float(ways.min(initial=np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +57,8 @@ class Point:
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     previous : PreviousPoint, optional
         The point before it on its branch.
-    held : array, shape (L, 2)
-        Memory of its edges, with two works of adhesion (``pinning``).
+    pinned : PinnedEdges, optional
+        With two works of adhesion.
     """
 
     at: float
@@ -52,7 +67,7 @@ class Point:
     slope: float
     clearance: float = 0.0
     previous: PreviousPoint | None = None
-    held: Array = dataclasses.field(default_factory=lambda: NO_MEMORY)
+    pinned: PinnedEdges | None = None
 
     @property
     def gaps(self) -> Array:
@@ -101,6 +116,8 @@ class Point:
             vectors.
         """
         left = (self.field.opening.ravel() * self.rate)[edges]
+        if not left.any():
+            return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))
 
     def interpolate(self, other: Point, at: float) -> Array:

@@ -1,4 +1,4 @@
-"""Elastic field of given contact edges, by a dense matrix or on a tree of gaps.
+"""Elastic field of given contact edges, on a tree of gaps.
 
 Import from its modules.
 """

@@ -19,11 +19,11 @@ import math
 
 import numpy as np
 
+from adhesis.solver._kernels import sum_pull
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.peaks import parabola_vertex
-from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.opening_series import GapOpening, fine_opening
 
 _COARSE = 4.0  # sine nodes per shortest wave of the openings at nodes; the verification has more
@@ -48,8 +48,8 @@ class RefinedTension:
 
     def at(self, theta: Array) -> Array:
         """Compute the tension at some positions on the contact."""
-        pull = _sum_pull(theta, self._sine, self._cosine, self._source_weight) / (4 * np.pi)
-        return np.asarray(pull - self._source.sample(theta)[:, 0] - self._pressure)
+        pull = sum_pull(theta, self._sine, self._cosine, self._source_weight) / (4 * np.pi)
+        return np.asarray(pull - self._source.panels.stress(theta)[0] - self._pressure)
 
     def inside(self, theta: float) -> bool:
         """Return whether a position lies on the contact."""
@@ -75,20 +75,6 @@ class RefinedTension:
                 return float(points[i] + shift * (points[1] - points[0])), highest
             theta = float(points[i])
         return None
-
-
-@compiled
-def _sum_pull(theta: Array, sine: Array, cosine: Array, weight: Array) -> Array:
-    """Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2."""
-    out = np.zeros(theta.shape[0])
-    for i in range(theta.shape[0]):
-        s, c = np.sin(0.5 * theta[i]), np.cos(0.5 * theta[i])
-        total = 0.0
-        for j in range(sine.shape[0]):
-            half = s * cosine[j] - c * sine[j]
-            total += weight[j] / (half * half)
-        out[i] = total
-    return out
 
 
 def nodal_tension(problem: Problem) -> NodalTension:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.tolerances import (
     TRIAL_FROM_END,
 )

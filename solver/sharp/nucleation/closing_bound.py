@@ -6,8 +6,8 @@ import numpy as np
 
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import total_length
 from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.tolerances import CLOSING_BY_MOTION
 
 
 class ClosingBound:
@@ -26,7 +26,7 @@ class ClosingBound:
         if branch == "loading":
             return abs(reached.at - point.at) * self._rate(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
-        motion = self._edges.system(point.gaps).closing_motion(point.gaps, reached.gaps)
+        motion = CLOSING_BY_MOTION * np.abs(reached.gaps - point.gaps).sum(axis=1).max()
         return float(self._edges.largest_opening / np.sqrt(self._edges.wave) * motion)
 
     def _rate(self, point: Point) -> float:
@@ -35,8 +35,9 @@ class ClosingBound:
         if self._edges.is_fixed:
             return rate
         # d(q0 s)/dd along the branch, from d = weight q0 s - compliance p and dY/dd
-        weight, compliance = self._edges.model.device
-        mean = 1 + compliance * point.slope if weight else point.slope
+        device = self._edges.model.device
+        load = device.separation_weight == 0
+        mean = point.slope if load else 1 + device.compliance * point.slope
         return float(rate * max(1.0, abs(mean)))
 
     def rate_at_fixed_edges(self, point: Point) -> float:
@@ -44,5 +45,4 @@ class ClosingBound:
 
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """
-        factor = self._edges.system(point.gaps).closing_factor
-        return factor * 2 * np.pi / float(total_length(point.gaps))
+        return 2 * np.pi / float(np.diff(point.gaps).sum())

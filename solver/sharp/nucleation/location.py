@@ -13,7 +13,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
 from adhesis.solver.sharp.tolerances import (
@@ -51,21 +51,19 @@ class Criterion(Protocol[Seed]):
         """Return the seeds of the least value, and of those that equal it; none if positive."""
         ...
 
-    def is_located(self, value: float, many: bool, near: bool) -> bool:
+    def is_located(self, value: float, near: bool) -> bool:
         """Return whether a point with this value is located finely enough.
 
         Parameters
         ----------
         value : float
-        many : bool
-            Whether there are many gaps, for which each trial is expensive.
         near : bool
             Whether a point with a positive value is as near as the resolution.
         """
         ...
 
     def track_between(self, clear: Point, hit: Point) -> ClearanceInterpolation | None:
-        """Track each value that changes sign between two points by itself, of many gaps."""
+        """Track each value that changes sign between two points by itself, or return None."""
         ...
 
     def validate_location(self, value: float, at: float) -> None:
@@ -109,15 +107,13 @@ def locate(
             high, hit, hit_candidates, hit_value = middle, trail[middle], candidates, value
     last = trail[low]
     clear = last.at
-    # Of many gaps each trial is expensive: those at both ends show where to begin, and the least
-    # value below zero is enough.
-    many = edges.uses_windows(last.gaps)
-    if many and low == 0 and clearance > 0:
+    # Each trial is expensive: the values at both ends show where to begin.
+    if low == 0 and clearance > 0:
         clear_value = clearance
-    tracked = criterion.track_between(last, hit) if many else None
+    tracked = criterion.track_between(last, hit)
     cleared = 0  # trials one after the other that were clear
     for trials in range(1, TOUCH_TRIALS + 1):
-        if criterion.is_located(hit_value, many, abs(clear - hit.at) <= resolution):
+        if criterion.is_located(hit_value, abs(clear - hit.at) <= resolution):
             break
         share = 0.5
         if tracked is not None and trials % BISECTION_EVERY:
@@ -128,14 +124,13 @@ def locate(
         trial = clear + (hit.at - clear) * share
         if trial in (clear, hit.at):  # there its value differs by the error of the field
             return Located(last, criterion.choose_seeds(hit_candidates), 0.0), 0.0
-        point = None
-        edges.recall(last.held)
         reach = CORRECTED * edges.wave
-        if many:
-            point = edges.equilibrium(last.interpolate(hit, trial), trial, reach)
+        gaps = last.interpolate(hit, trial)
+        point = edges.equilibrium(gaps, trial, reach, memory=last.gaps)
         for start in (last, hit) if share < 0.5 else (hit, last):
             if point is None:
-                point = edges.equilibrium(start.extrapolate(trial), trial, reach)
+                gaps = start.extrapolate(trial)
+                point = edges.equilibrium(gaps, trial, reach, memory=last.gaps)
         if point is None:
             break
         value, candidates = criterion.minimum(point.field)

@@ -15,25 +15,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from adhesis.solver._kernels import (
+    SearchedGaps,
+    SearchLengths,
+    clearance_left,
+    least_clearances,
+    search,
+)
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import EQUAL_CRESTS, Array
-from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.solution import Nodes
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules, Integers
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.clearance import (
-    NONE_SEARCHED,
-    SearchedGaps,
-    clearance_left,
-    update_searched,
-)
 from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
-from adhesis.solver.sharp.nucleation.gap_minima import minima_of_gaps
 from adhesis.solver.sharp.nucleation.location import Located, secant_share
 from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, COMPARABLE, OVERLAP, TOUCH_TRIALS
 
@@ -55,84 +51,6 @@ class Minima(NamedTuple):
     curvature: Array
 
 
-class Lengths(NamedTuple):
-    """Constants of a problem for the search for touches.
-
-    Attributes
-    ----------
-    max_displacement, closing_per_motion : float
-        See ``clearance.clearance_left``.
-    surface, narrowest, widest : float
-        See :func:`seed_width`.
-    top : int
-        Highest harmonic of the profile.
-    """
-
-    max_displacement: float
-    closing_per_motion: float
-    surface: float
-    narrowest: float
-    widest: float
-    top: int
-
-
-@compiled_for_both
-def seed_width(curvature: float, lengths: Lengths) -> float:
-    """Compute the width of the seed at a touch with this curvature, of surfaces with energy Γ."""
-    first = (16 * lengths.surface / (np.pi * curvature**2)) ** (1 / 3)
-    width: float = min(max(0.5 * first, lengths.narrowest), lengths.widest)
-    return width
-
-
-@compiled_for_both
-def clearances(opening: Array, curvature: Array, lengths: Lengths) -> Array:
-    """Compute :meth:`Nucleation.clearance`, compiled."""
-    out = np.empty(opening.shape[0])
-    for i in range(opening.shape[0]):
-        width = seed_width(curvature[i], lengths)
-        out[i] = opening[i]
-        # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
-        # the surface follows it, 10 to 20 here.
-        if width <= lengths.narrowest:
-            out[i] += 4 * curvature[i] * width**2
-    return out
-
-
-@compiled_for_both
-def search_gaps(
-    indices: Integers, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
-    out: Array,
-) -> Minima:  # fmt: skip
-    """Find the minima of some gaps; ``out`` receives their least clearances by index."""
-    theta, opening, curvature, where = minima_of_gaps(indices, nodes, f, rules, lengths.top, panels)
-    values = clearances(opening, curvature, lengths)
-    for k in indices:
-        out[k] = np.inf
-    for i in range(where.shape[0]):
-        out[where[i]] = min(out[where[i]], values[i])
-    return Minima(theta, opening, curvature)
-
-
-@compiled
-def search(
-    gaps: Array, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
-    searched: SearchedGaps,
-) -> tuple[float, int, Minima, SearchedGaps]:  # fmt: skip
-    """Find the least clearance of a field, searching only gaps that may have closed.
-
-    Also returns the number of these gaps, their minima, and the updated searched gaps.
-    """
-    left, index, to_search, is_unchanged = clearance_left(
-        gaps, nodes, f, rules, searched, lengths.max_displacement, lengths.closing_per_motion
-    )
-    minima = Minima(np.empty(0), np.empty(0), np.empty(0))
-    if to_search.shape[0] > 0:
-        minima = search_gaps(to_search, nodes, f, rules, panels, lengths, left)
-    if not is_unchanged:
-        searched = update_searched(gaps, nodes, f, rules, searched, index, left)
-    return left.min(), to_search.shape[0], minima, searched
-
-
 class Nucleation:
     """Criterion of touches for ``location.locate``, which also inserts seed patches.
 
@@ -149,14 +67,13 @@ class Nucleation:
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
-        self.searched = NONE_SEARCHED
-        self._lengths = Lengths(
+        self.searched = SearchedGaps()
+        self._lengths = SearchLengths(
             max_displacement=COMPARABLE * edges.wave,
             closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=math.pi * edges.critical**2 / 8,  # Γ
             narrowest=float(3 * edges.smallest),
             widest=float(edges.longest_step),
-            top=edges.source.top,
         )
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
         self.tolerance = OVERLAP * problem.profile.h_max * problem.profile.q0
@@ -177,7 +94,7 @@ class Nucleation:
 
     def clearance(self, opening: Array, curvature: Array) -> Array:
         """Compute the opening left at minima before a seed is put; not positive at a touch."""
-        return clearances(opening, curvature, self._lengths)
+        return self._lengths.clearances(opening, curvature)
 
     def choose_seeds(self, minima: Minima) -> list[Touch]:
         """Choose the touch of the largest overlap; of equal ones, one and its copies."""
@@ -203,19 +120,15 @@ class Nucleation:
     def minimum(self, field: GapField) -> tuple[float, Minima]:
         """Return the least clearance of a field, and the minima of the gaps that may have closed.
 
-        Only those are searched; see ``clearance``.
+        Only those are searched; see ``kernels/clearance.hpp``.
         """
-        solution = field.solution
-        least, count, minima, self.searched = search(
-            field.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES, field.source.panels,
-            self._lengths, self.searched,
-        )  # fmt: skip
+        least, count, found, self.searched = search(field.solution, self.searched, self._lengths)
         self.edges.count.openings += count
-        return least, minima
+        return least, Minima(*found)
 
-    def is_located(self, value: float, many: bool, near: bool) -> bool:
+    def is_located(self, value: float, near: bool) -> bool:
         """Return whether a touch is located finely enough; see ``location.Criterion``."""
-        return value == 0 or ((many or near) and value > -0.5 * self.tolerance)
+        return value > -0.5 * self.tolerance
 
     def validate_location(self, value: float, at: float) -> None:
         """Raise if surfaces overlap at the touch that was located."""
@@ -225,21 +138,12 @@ class Nucleation:
     def _clearance_of(self, field: GapField, indices: Integers) -> Array:
         """Compute the clearance of each of some gaps."""
         self.edges.count.openings += len(indices)
-        solution, out = field.solution, np.empty(len(field.gaps))
-        search_gaps(
-            indices, solution.nodes, solution.scaled_opening, GAUSS_RULES, field.source.panels,
-            self._lengths, out,
-        )  # fmt: skip
-        return out[indices]
+        return least_clearances(field.solution, indices, self._lengths)
 
     def track_between(self, clear: Point, hit: Point) -> ClearanceInterpolation | None:
         """Track the gaps that are open at one point and overlap at another."""
-        solution, lengths = hit.field.solution, self._lengths
-        left = clearance_left(
-            hit.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES, self.searched,
-            lengths.max_displacement, lengths.closing_per_motion,
-        )  # fmt: skip
-        closed = np.flatnonzero(left.clearance <= 0)
+        remaining = clearance_left(hit.field.solution, self.searched, self._lengths)
+        closed = np.flatnonzero(remaining <= 0)
         after = self._clearance_of(hit.field, closed)
         closed, after = closed[after < 0], after[after < 0]
         if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:
@@ -272,7 +176,7 @@ class Nucleation:
                 clear, low = trial, value
             else:
                 hit, high, field, minima = trial, value, tried, there
-        touching = Point(hit, field, point.rate, float("nan"), held=point.held)
+        touching = Point(hit, field, point.rate, float("nan"))
         return Located(touching, self.choose_seeds(minima), abs(end - point.at))
 
     def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:
@@ -280,5 +184,5 @@ class Nucleation:
         return with_patches(
             gaps,
             np.array([t.theta for t in touches]),
-            np.array([seed_width(t.curvature, self._lengths) for t in touches]),
+            self._lengths.seed_widths(np.array([t.curvature for t in touches])),
         )

@@ -25,10 +25,9 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 from adhesis.solver.sharp.gap.ends import with_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import measure_at
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
     SHORTEST_CRACK,
@@ -106,7 +105,7 @@ class Openings:
         self.healed += cracks
         self.heals += len(cracks)
 
-    def is_located(self, value: float, many: bool, near: bool) -> bool:
+    def is_located(self, value: float, near: bool) -> bool:
         """Return whether a maximum with this value is located finely enough.
 
         A maximum may appear with a tension above the strength: then no point of the branch is.
@@ -124,7 +123,7 @@ class Openings:
     ) -> Crack:
         """Judge one maximum of tension."""
         wave, critical = self.edges.wave, self.edges.critical
-        measure, _ = measure_at(theta, field.source.panels)
+        measure = float(field.source.panels.measure(np.array([theta]))[0][0])
         return judge_maximum(
             theta,
             tension,
@@ -142,6 +141,5 @@ class Openings:
         middle = (gaps.mean(axis=1) - theta + np.pi) % (2 * np.pi) - np.pi
         crack = int(np.argmin(np.abs(middle)))
         opening = self.edges.field(gaps, field.prescribed).opening[crack]
-        panels = field.source.panels
-        critical = [self.edges.critical**2 * measure_at(end, panels)[0] for end in gaps[crack]]
+        critical = self.edges.critical**2 * field.source.panels.measure(gaps[crack])[0]
         return float((np.maximum(opening, 0.0) ** 2 / critical).min())

@@ -7,18 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from adhesis.solver._kernels import LoadingDevice, SearchedGaps
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.branch_point import NO_MEMORY, Point, PreviousPoint
-from adhesis.solver.sharp.field.dense_solver import FixedEdgeResponse, GapField
-from adhesis.solver.sharp.field.opening_series import work_of_gaps
-from adhesis.solver.sharp.field.solution import LoadingDevice
+from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
+from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
 from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED, SearchedGaps
 from adhesis.solver.values import with_values
 
 
@@ -30,6 +28,7 @@ class BranchData(NamedTuple):
     rate: Array
     slope: float
     previous: PreviousPoint | None
+    pinned: PinnedEdges | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +45,6 @@ class ContinuationData:
         If a path stopped at the state.
     searched : SearchedGaps
         The gaps as they were when they were last searched for touches.
-    held : array, shape (L, 2)
-        Memory of their edges, with two works of adhesion.
     branch : {"loading", "unloading"}, optional
         Branch on which the path stopped.
     """
@@ -55,8 +52,7 @@ class ContinuationData:
     gaps: Array
     clearance: float
     branch_data: BranchData | None = None
-    searched: SearchedGaps = NONE_SEARCHED
-    held: Array = field(default_factory=lambda: NO_MEMORY)
+    searched: SearchedGaps = field(default_factory=SearchedGaps)
     branch: Branch | None = None
 
 
@@ -133,7 +129,7 @@ class States:
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation, point.clearance, held=point.held)
+        return self.of_field(point.field, point.slope, separation, point.clearance)
 
     def of_field(
         self,
@@ -141,7 +137,6 @@ class States:
         slope: float = float("nan"),
         separation: float | None = None,
         clearance: float = 0.0,
-        held: Array = NO_MEMORY,
     ) -> ContactState:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
@@ -152,9 +147,8 @@ class States:
         mean_stress = gap_field.pressure * half
         gaps = gap_field.gaps
         patches, measure = self.source.contact_between(gaps)
-        elastic = (
-            self._full_energy + 0.5 * work_of_gaps(gap_field) - np.pi * at * gap_field.pressure
-        )
+        work = gap_field.solution.work_of_gaps()
+        elastic = self._full_energy + 0.5 * work - np.pi * at * gap_field.pressure
         return ContactState(
             separation=separation,
             edges=patches / self.q0,
@@ -164,7 +158,7 @@ class States:
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             stiffness=slope * self._stiffness_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gaps, clearance, held=held),
+            internal=ContinuationData(gaps, clearance),
         )
 
     def at_fixed_edges(

@@ -10,7 +10,7 @@ from adhesis.solver.crack import MOST_MAXIMA
 from adhesis.solver.method import PatchTension
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.peaks import highest_peaks
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 
 # Local maxima of each state that are kept: with zero range, and where a strength may be so small

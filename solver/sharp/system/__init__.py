@@ -1,4 +1,4 @@
-"""Systems of edges: their field, equilibrium and descent, for few gaps or for many.
+"""The edges of one problem: law, tolerances, and the linear responses that are kept.
 
-Import :class:`adhesis.solver.sharp.mechanics.EdgeMechanics`, which chooses between them.
+Import :class:`adhesis.solver.sharp.mechanics.EdgeMechanics`, which solves and moves them.
 """

@@ -4,22 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from adhesis.solver._kernels import EdgeLaw, FieldModel, LoadingDevice
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.branch_point import NO_MEMORY
-from adhesis.solver.sharp.equilibrium.edge_law import EdgeLaw
-from adhesis.solver.sharp.equilibrium.pinning import memory_of
-from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.solution import (
-    FIXED_SEPARATION,
-    FieldModel,
-    LoadingDevice,
-    Solution,
-)
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES
 from adhesis.solver.sharp.tolerances import (
-    BAND,
     COARSE_FIELD,
     DESCENT_HANDS_OVER,
     FAINT_FORCE,
@@ -30,6 +19,8 @@ from adhesis.solver.sharp.tolerances import (
     SMALLEST_LENGTH,
     SMALLEST_OF_SEED,
 )
+
+FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
 
 
 class EdgeProblem:
@@ -91,42 +82,27 @@ class EdgeProblem:
             smallest=float(self.smallest),
             overlap_limit=float(OVERLAPPING * max(critical, roughness_opening)),
             force_error=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
-            origin=source.highest,
             pinning=float(pinning),
-            band=BAND * float(self.coarse),
-            held=np.empty((0, 2)),
         )
         self.model = FieldModel(
             device=device,
             digits=float(-np.log(tolerance)),
-            rules=GAUSS_RULES,
             panels=source.panels,
         )
         self.count = Counters()
-        self._held = NO_MEMORY
-
-    def solved(
-        self, gaps: Array, prescribed: float, solution: Solution, share: float = 1.0
-    ) -> GapField:
-        """Return the field of these gaps, of which the solution is known."""
-        tolerance = share * self.tolerance
-        return GapField(self.source, gaps, prescribed, tolerance, self.model.device, solution)
 
     @property
     def pins(self) -> bool:
         """Whether edges are pinned, as works of adhesion differ."""
         return self.law.pinning > 0
 
-    def recall(self, held: Array) -> None:
-        """Let the next states follow from edges with this memory (``pinning``)."""
-        self._held = held
-
-    def law_of(self, gaps: Array) -> EdgeLaw:
-        """Return the law of the edges of these gaps, with their memory."""
+    def law_at(self, memory: Array) -> EdgeLaw:
+        """Return the law of edges that were at ``memory`` in the state before."""
         if not self.pins:
             return self.law
-        self._held = memory_of(self._held, gaps, self.law.band)
-        return self.law._replace(held=self._held)
+        law = EdgeLaw(self.law)
+        law.memory = memory
+        return law
 
     @property
     def largest_opening(self) -> float:
@@ -136,7 +112,7 @@ class EdgeProblem:
     @property
     def is_fixed(self) -> bool:
         """Whether the separation is prescribed."""
-        return self.model.device == FIXED_SEPARATION
+        return self.model.device.compliance == 0
 
     @property
     def is_load(self) -> bool:

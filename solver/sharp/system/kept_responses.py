@@ -1,23 +1,13 @@
-"""Linear responses of many gaps that are kept from one state to the next."""
+"""Linear responses of the gaps that are kept from one state to the next."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
-from adhesis.solver.sharp.equilibrium.renewal import settle_response
-from adhesis.solver.sharp.equilibrium.response_setup import (
-    count_unknown,
-    set_up_response,
-    update_response,
-)
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+from adhesis.solver._kernels import LinearResponse, set_up_response, shortest_length
+from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.tolerances import RESPONSE_TRIALS, RESPONSES_KEPT
-
-_ANY = np.empty(0, dtype=np.int64)
 
 
 class KeptResponse:
@@ -59,18 +49,20 @@ class KeptResponses:
         """Forget all, on which results depend within the error of the field."""
         self._kept.clear()
 
-    def near(self, gaps: Array, prescribed: float, least: Integers) -> KeptResponse | None:
+    def near(self, gaps: Array, prescribed: float, least: Integers | None) -> KeptResponse | None:
         """Return a response of as many gaps, not far from these if possible, that is to change.
 
-        ``least`` are the least orders of the gaps, or empty. None if these have no field.
+        ``least`` are the least orders of the gaps, if there are such. None if these have no field.
         """
+        if not (np.isfinite(gaps).all() and shortest_length(gaps) > 0):
+            return None
         kept = self._kept
         known = self._of_as_many(gaps)
         if known is not None:
             kept.remove(known)
         else:
             response = self._new(gaps, prescribed, least)
-            kept[:] = [old for old in kept if len(old.response.nodes.orders) != len(gaps)]
+            kept[:] = [old for old in kept if old.response.gap_count != len(gaps)]
             if response is None:
                 return None
             known = KeptResponse(response)
@@ -84,7 +76,7 @@ class KeptResponses:
     def _of_as_many(self, gaps: Array) -> KeptResponse | None:
         """Return a response of as many gaps, unless the last one has more of these; else None."""
         for known in reversed(self._kept):
-            if len(known.response.nodes.orders) == len(gaps) and not known.is_outgrown:
+            if known.response.gap_count == len(gaps) and not known.is_outgrown:
                 last = self._kept[-1]
                 if known is last or self._unknown(known, gaps) <= self._unknown(last, gaps):
                     return known
@@ -94,22 +86,16 @@ class KeptResponses:
     def _unknown(self, known: KeptResponse, gaps: Array) -> int:
         """Count the gaps that would be new to a response."""
         problem = self._problem
-        return int(count_unknown(known.response, gaps, problem.law, problem.model))
+        return known.response.count_unknown(gaps, problem.law_at(gaps), problem.model)
 
-    def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
+    def _new(self, gaps: Array, prescribed: float, least: Integers | None) -> LinearResponse | None:
         """Set up a response of these gaps, from the last one if there is one."""
         problem = self._problem
-        law, model = problem.law, problem.model
+        given = gaps, prescribed, least, problem.law_at(gaps), problem.model
         problem.count.fields += 1
         if self._kept:
-            last = self._kept[-1].response
-            response, has_field = update_response(last, gaps, prescribed, least, law, model)
-        else:
-            orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-            if len(least) == len(orders):
-                orders = np.maximum(orders, least)
-            response, has_field = set_up_response(gaps, prescribed, orders, law, model)
-        return response if has_field else None
+            return self._kept[-1].response.update(*given)
+        return set_up_response(*given)
 
     def at(self, gaps: Array, prescribed: float) -> KeptResponse | None:
         """Return the response about these gaps; None if they have no field."""
@@ -118,10 +104,10 @@ class KeptResponses:
             if known.settled is gaps:
                 return known
         for _ in range(RESPONSE_TRIALS):
-            near = self.near(gaps, prescribed, _ANY)
+            near = self.near(gaps, prescribed, None)
             if near is None:
                 return None
-            if settle_response(near.response, gaps, prescribed, problem.law, problem.model):
+            if near.response.settle(gaps, prescribed, problem.law_at(gaps), problem.model):
                 near.settled = gaps
                 return near
             near.is_outgrown = True

@@ -1,0 +1,84 @@
+// Names for arrays, and sums whose order does not depend on the processor.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+// Functions of long loops, which g++ makes for vectors of four numbers, too, and chooses when the
+// module is loaded. Sums in fixed lanes and no contracted a·b + c: both have the same bits.
+#if defined(__x86_64__) && !defined(__clang__)
+#define WIDE [[gnu::target_clones("avx2", "default")]]
+#else
+#define WIDE
+#endif
+
+namespace adhesis {
+
+using Vector = std::vector<double>;
+using Integers = std::vector<int>;
+using Pair = std::array<Vector, 2>;
+using Flags = std::vector<char>;  // true or false; not bool, so that each has an address
+
+using std::numbers::pi;
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
+inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+// Four numbers that are computed together, by whatever vectors the processor has.
+typedef double Four __attribute__((vector_size(32)));
+
+[[gnu::always_inline]] inline Four load_four(const double* from) {
+  Four out;
+  std::memcpy(&out, from, sizeof out);
+  return out;
+}
+
+[[gnu::always_inline]] inline void store_four(Four value, double* to) {
+  std::memcpy(to, &value, sizeof value);
+}
+
+// Sum a_i b_i: every fourth product apart, in two turns, then these eight in pairs.
+inline double dot(const double* a, const double* b, int count) {
+  Four even = {}, odd = {};
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    even += load_four(a + i) * load_four(b + i);
+    odd += load_four(a + i + 4) * load_four(b + i + 4);
+  }
+  Four both = even + odd;
+  double total = (both[0] + both[1]) + (both[2] + both[3]);
+  for (; i < count; ++i) total += a[i] * b[i];
+  return total;
+}
+
+// Sum (a_i - b_i) x_i, in the same order as dot.
+inline double dot_difference(const double* a, const double* b, const double* x, int count) {
+  Four even = {}, odd = {};
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    even += (load_four(a + i) - load_four(b + i)) * load_four(x + i);
+    odd += (load_four(a + i + 4) - load_four(b + i + 4)) * load_four(x + i + 4);
+  }
+  Four both = even + odd;
+  double total = (both[0] + both[1]) + (both[2] + both[3]);
+  for (; i < count; ++i) total += (a[i] - b[i]) * x[i];
+  return total;
+}
+
+// Add factor x_i to every out_i.
+inline void add_scaled(double factor, const double* x, double* out, int count) {
+  for (int i = 0; i < count; ++i) out[i] += factor * x[i];
+}
+
+inline double largest(const Vector& values) {
+  double size = 0;
+  for (double value : values) size = std::max(size, std::abs(value));
+  return size;
+}
+
+}  // namespace adhesis

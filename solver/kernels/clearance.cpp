@@ -1,0 +1,131 @@
+#include "clearance.hpp"
+
+#include "tolerances.hpp"
+
+namespace adhesis {
+
+namespace {
+
+Vector low_openings(const Field& field, int k, const GaussRule& rule) {
+  Vector out(rule.count);
+  for (int i = 0; i < rule.count; ++i)
+    out[i] = field.scaled_opening[field.nodes.offset[k] + i] *
+             std::sqrt(1 - rule.eta[i] * rule.eta[i]);
+  return out;
+}
+
+// Bound the clearance left in gap k, which was searched; negative if it has to be searched again.
+double clearance_since(const Field& field, int k, const SearchedGap& was,
+                       const SearchLengths& lengths, const GaussRule& rule) {
+  const Gap& gap = field.nodes.gaps[k];
+  const double furthest = lengths.max_displacement;
+  const double begin = gap.end[0] - was.end[0], end = gap.end[1] - was.end[1];
+  if (std::abs(begin) > furthest || std::abs(end) > furthest ||
+      field.nodes.orders[k] != was.order)
+    return -1;
+  const double within = NO_MINIMUM_WITHIN / COMPARABLE * furthest;
+  const double by_edges =
+      lengths.closing_per_motion * (std::max(begin, 0.0) + std::max(-end, 0.0));
+  const Vector opening = low_openings(field, k, rule);
+  double closed = 0, most = 0;
+  bool none_inside = true;
+  for (int i = 0; i < rule.count; ++i) {
+    // the slope between the node's neighbours, or the gap's end
+    const bool first = i == 0, last = i == rule.count - 1;
+    const double before = first ? was.end[0] : was.theta[i - 1];
+    const double after = last ? was.end[1] : was.theta[i + 1];
+    const double low = first ? 0 : was.opening[i - 1], high = last ? 0 : was.opening[i + 1];
+    const double here = field.nodes.theta[field.nodes.offset[k] + i];
+    const double moved = here - was.theta[i];
+    if (std::abs(moved) > furthest) return -1;
+    const double expected = was.opening[i] + (high - low) / (after - before) * moved;
+    const double closing = expected - opening[i];
+    closed = std::max(closed, closing);
+    most = std::max(most, expected);
+    // a minimum may appear at any node, but hardly beside the ends
+    if (std::min(here - gap.end[0], gap.end[1] - here) > within) {
+      none_inside = false;
+      const double rest = expected - CLOSING_SAFETY * std::max(closing, 0.0) - by_edges;
+      if (!(rest > CLEARANCE_LEFT * expected)) return -1;
+    } else if (opening[i] < 0 && 0 <= expected) {
+      return -1;
+    }
+  }
+  double clearance = was.clearance;
+  if (clearance == infinity && none_inside) clearance = most;
+  const double rest = clearance - CLOSING_SAFETY * closed - by_edges;
+  if (clearance < infinity && !(rest > CLEARANCE_LEFT * clearance)) return -1;
+  return was.clearance < infinity ? rest : infinity;
+}
+
+}  // namespace
+
+RemainingClearance clearance_left(const Field& field, const SearchedGaps& searched,
+                                  const SearchLengths& lengths) {
+  const int count = field.nodes.gap_count();
+  RemainingClearance out{Vector(count, -1), Integers(count, -1), {}};
+  size_t j = 0;
+  for (int k = 0; k < count; ++k) {
+    const double least = field.nodes.gaps[k].end[0] - lengths.max_displacement;
+    while (j < searched.size() && searched[j]->end[0] < least) ++j;
+    if (j < searched.size()) {
+      const GaussRule& rule = gauss_rules()[field.nodes.orders[k]];
+      const double left = clearance_since(field, k, *searched[j], lengths, rule);
+      // a clearance that is left is positive: below zero it would have to be searched
+      if (left != -1) {
+        out.clearance[k] = left;
+        out.before[k] = int(j);
+        continue;
+      }
+    }
+    out.to_search.push_back(k);
+  }
+  return out;
+}
+
+double seed_width(double curvature, const SearchLengths& lengths) {
+  const double first = std::pow(16 * lengths.surface / (pi * curvature * curvature), 1.0 / 3);
+  return std::min(std::max(0.5 * first, lengths.narrowest), lengths.widest);
+}
+
+double clearance_of(double opening, double curvature, const SearchLengths& lengths) {
+  const double width = seed_width(curvature, lengths);
+  // Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which the
+  // surface follows it, 10 to 20 here.
+  return width <= lengths.narrowest ? opening + 4 * curvature * width * width : opening;
+}
+
+Vector least_clearances(const std::vector<Minimum>& minima, int gaps,
+                        const SearchLengths& lengths) {
+  Vector out(gaps, infinity);
+  for (const Minimum& minimum : minima)
+    out[minimum.gap] = std::min(out[minimum.gap],
+                                clearance_of(minimum.opening, minimum.curvature, lengths));
+  return out;
+}
+
+Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths) {
+  const Nodes& nodes = field.nodes;
+  const int count = nodes.gap_count();
+  RemainingClearance left = clearance_left(field, searched, lengths);
+  Search out;
+  out.count = int(left.to_search.size());
+  out.minima = find_minima(field, left.to_search);
+  const Vector found = least_clearances(out.minima, count, lengths);
+  for (int k : left.to_search) left.clearance[k] = found[k];
+  out.least = *std::min_element(left.clearance.begin(), left.clearance.end());
+  for (int k = 0; k < count; ++k) {
+    if (left.before[k] >= 0) {
+      out.searched.push_back(searched[left.before[k]]);
+      continue;
+    }
+    const GaussRule& rule = gauss_rules()[nodes.orders[k]];
+    const auto first = nodes.theta.begin() + nodes.offset[k];
+    out.searched.push_back(std::make_shared<SearchedGap>(
+        SearchedGap{nodes.gaps[k].end, nodes.orders[k], Vector(first, first + rule.count),
+                    low_openings(field, k, rule), left.clearance[k]}));
+  }
+  return out;
+}
+
+}  // namespace adhesis

@@ -1,0 +1,66 @@
+// Bound the clearance left in gaps since they were last searched for minima.
+//
+// The fine opening of a gap costs as much as many fields, and most gaps are far from touching.
+// Inside a gap the surface is free: between two states with nearly the same edges its opening
+// changes smoothly, so the nodes of the field show by how much it has closed. Only beside an edge
+// that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)), for which that a fourth of the
+// shortest wave away is taken.
+//
+// A gap is searched again when a good part of its clearance can be gone, or of its opening at any
+// node: a minimum may appear there, whatever others there are. Beside the ends of a gap openings
+// are small in any case; there it is searched again when one is negative.
+#pragma once
+
+#include <memory>
+
+#include "opening.hpp"
+
+namespace adhesis {
+
+// Lengths of a search, in units of 1/q0.
+struct SearchLengths {
+  double max_displacement;    // nodes that moved further are not compared
+  double closing_per_motion;  // closing beside an edge over the motion of the edge
+  double surface;             // Γ
+  double narrowest, widest;   // of a seed
+};
+
+// A gap as it was when it was last searched; its clearance is infinite where there is no minimum.
+struct SearchedGap {
+  std::array<double, 2> end;
+  int order;
+  Vector theta, opening;  // nodes, and the opening of the lower modes there
+  double clearance;
+};
+
+using SearchedGaps = std::vector<std::shared_ptr<const SearchedGap>>;
+
+struct RemainingClearance {
+  Vector clearance;    // a lower bound in each gap; negative where it has to be searched
+  Integers before;     // index among those searched; negative where it has to be searched
+  Integers to_search;  // the gaps that have to be searched
+};
+
+RemainingClearance clearance_left(const Field& field, const SearchedGaps& searched,
+                                  const SearchLengths& lengths);
+
+// Opening left at a minimum before a seed is put; not positive at a touch.
+double clearance_of(double opening, double curvature, const SearchLengths& lengths);
+
+// Width of the seed at a touch with this curvature, of surfaces with energy Γ.
+double seed_width(double curvature, const SearchLengths& lengths);
+
+struct Search {
+  double least;  // clearance of the field
+  int count;     // of gaps that were searched
+  std::vector<Minimum> minima;
+  SearchedGaps searched;
+};
+
+// Find the least clearance of a field, searching only gaps that may have closed.
+Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths);
+
+// Find the least clearance at these minima in each of so many gaps, infinite where there is none.
+Vector least_clearances(const std::vector<Minimum>& minima, int gaps, const SearchLengths& lengths);
+
+}  // namespace adhesis

@@ -1,0 +1,262 @@
+#include "descent.hpp"
+
+#include <algorithm>
+
+#include "signals.hpp"
+#include "step_size.hpp"
+
+namespace adhesis {
+
+namespace {
+
+// Compute the norm of the forces C_c² - C |C| from C - C_c at some edges.
+double force_at(const Vector& residual, const Integers& edges, const Vector& ends,
+                const EdgeLaw& law, const Panels& panels) {
+  double square = 0;
+  for (size_t i = 0; i < edges.size(); ++i) {
+    const int e = edges[i];
+    const double opening = residual[i] + critical_opening(ends[e], law, panels).value;
+    const double critical = critical_of(e, ends[e], opening, law, panels).value;
+    const double force = critical * critical - opening * std::abs(opening);
+    square += force * force;
+  }
+  return std::sqrt(square);
+}
+
+// Let the softest edge run where the others are not stable; false if all are held. It is sought
+// among the gaps of the smallest run of the tree that is not stable.
+bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolution& now) {
+  std::array<int, 2> range = {0, response.gap_count() - 1};
+  for (const Run& run : response.tree.runs) {
+    if (run.count.negative > 0) {
+      range = run.range;
+      break;
+    }
+  }
+  int weakest = -1;
+  double softest = -1;
+  for (int e = 2 * range[0]; e < 2 * range[1] + 2; ++e) {
+    const Edge& edge = response.edges[e];
+    if (edge.held) continue;
+    const double stiff = std::abs(edge.tangent[0]) + std::abs(edge.tangent[1]);
+    const double soft = std::abs(now.by_pressure[e] / edge.opening_by_pressure) * stiff;
+    if (soft > softest) {
+      weakest = e;
+      softest = soft;
+    }
+  }
+  if (weakest >= 0) runs[weakest] = true;
+  return weakest >= 0;
+}
+
+// Let edges run that are out of balance; returns whether they are more. If none runs yet, those
+// run, too, that Newton's step moves far.
+bool run_more(Flags& runs, const LinearResponse& response, const ResponseSolution& now,
+              const EdgeLaw& law) {
+  if (law.critical == 0) return false;
+  const bool none = std::find(runs.begin(), runs.end(), true) == runs.end();
+  bool more = false;
+  for (int e = 0; e < int(runs.size()); ++e) {
+    const Edge& edge = response.edges[e];
+    const bool pinned = law.pinning > 0 && edge.held;
+    const double residual = edge.imbalance(e % 2, law.pinning).value;
+    const bool unbalanced = std::abs(residual) > RUNNING * law.critical && !pinned;
+    const bool far = std::abs(now.motion[e] - edge.here) > FOLLOWING * law.longest_step;
+    if ((unbalanced || (none && far)) && !runs[e]) runs[e] = more = true;
+  }
+  return more;
+}
+
+// Let edges run that would follow too far, or across their memory; returns whether there are any.
+bool run_far(Flags& runs, const LinearResponse& response, const Vector& way, const Vector& ends,
+             const EdgeLaw& law) {
+  bool more = false;
+  for (int e = 0; e < int(runs.size()); ++e) {
+    // written so that NaN is too far
+    bool near = std::abs(way[e]) <= FURTHEST_FOLLOWING * law.longest_step;
+    if (law.pinning > 0) {
+      const double gone = way_from_memory(e, ends[e], law);
+      near = near && gone * (gone + way[e]) >= 0;
+    }
+    if (!(response.edges[e].held || near)) runs[e] = more = true;
+  }
+  return more;
+}
+
+// Cut the motion of every edge to its limit; returns whether any was longer.
+bool cut(Vector& way, const std::vector<Gap>& gaps, const EdgeLaw& law) {
+  bool is_cut = false;
+  for (int e = 0; e < int(way.size()); ++e) {
+    const double limit = motion_limit(gaps[e / 2], e % 2, law.longest_step, CLOSING_SHARE);
+    if (std::abs(way[e]) > limit) {
+      way[e] = std::copysign(limit, way[e]);
+      is_cut = true;
+    }
+  }
+  return is_cut;
+}
+
+// Mark the edges that run, those beside them, and those at their memory, which may be pinned: all
+// that are in the model of the openings.
+Flags held_edges(const Flags& runs, const Vector& ends, const EdgeLaw& law) {
+  const int count = int(runs.size());
+  Flags some = at_memory(ends, law);
+  for (int e = 0; e < count; ++e)
+    if (runs[e]) some[e] = some[(e + 1) % count] = some[(e + count - 1) % count] = true;
+  return some;
+}
+
+Integers indices(const Flags& marked) {
+  Integers out;
+  for (int e = 0; e < int(marked.size()); ++e)
+    if (marked[e]) out.push_back(e);
+  return out;
+}
+
+// Let held edges flow through the model; `strongest` is the largest norm of forces so far.
+//
+// A long step that comes to rest, or to where a gap or patch vanishes, is taken as a short one.
+ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& tangent,
+                  const Vector& ends, double& strongest, double reach, bool equal_speeds,
+                  const EdgeLaw& law, const Panels& panels) {
+  const int count = int(edges.size());
+  const double force = force_at(residual, edges, ends, law, panels);
+  strongest = std::max(strongest, force);
+  const std::vector<Gap> gaps = map_gaps(ends);
+  bool is_long = reach >= LEAST_REACH && !near_balance(force, strongest, law);
+  while (true) {
+    EdgeModel openings(edges, ends, residual, tangent, law, panels);
+    const double longest = (is_long ? reach : std::min(reach, 1.0)) * law.longest_step;
+    const double share = is_long ? LONG_CLOSING : CLOSING_SHARE;
+    Vector limit(count), motion(ends.size());
+    for (int i = 0; i < count; ++i)
+      limit[i] = motion_limit(gaps[edges[i] / 2], edges[i] % 2, longest, share);
+    ModelFlow flow = flow_through(openings, limit, equal_speeds, is_long, strongest, law);
+    for (int i = 0; i < count; ++i) motion[edges[i]] = flow.motion[i];
+    const bool vanished = shortest_length(move_edges(ends, motion)) < law.smallest;
+    const bool runs_on =
+        flow.is_at_limit || largest(motion) > RUNNING_LENGTH * law.longest_step;
+    if (!is_long || (runs_on && !vanished)) return flow;
+    is_long = false;
+  }
+}
+
+// Whether edges that have run from `start` took much force C_c² - C² from each other.
+//
+// By the tangent at their end, to first order. The order of both ends of a gap or patch that has
+// vanished does not matter.
+bool may_race(const Integers& edges, const Matrix& tangent, const Vector& start,
+              const Vector& ends, const EdgeLaw& law) {
+  const double ran = RAN * law.longest_step / LONGEST_STEP;
+  for (int i = 0; i < tangent.n; ++i) {
+    const int e = edges[i];
+    const double way = outwards(e) * (ends[e] - start[e]);
+    if (std::abs(way) < ran) continue;
+    double taken = 0;
+    for (int j = 0; j < tangent.n; ++j) {
+      const int f = edges[j];
+      const double apart = std::abs(ends[e] - ends[f]);
+      if (i == j || std::min(apart, 2 * pi - apart) < law.smallest) continue;
+      const double along = outwards(f) * (ends[f] - start[f]);
+      if (std::abs(along) > ran) {
+        const double force = law.critical * (tangent(i, j) + tangent(j, i)) * along;
+        // written so that a force that is no number stays one
+        taken += way * force < 0 ? 0 : std::copysign(1, way) * force;
+      }
+    }
+    // not written as > : a force that is no number may be large
+    if (!(taken <= HELD_BACK * law.critical * law.critical)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Descent descend(LinearResponse& response, Vector ends, double prescribed, int most_steps,
+                bool equal_speeds, Running& running, const EdgeLaw& law, const Model& model) {
+  const Panels& panels = *model.panels;
+  const Device& device = model.device;
+  Flags& runs = running.edges;
+  Descent out;
+  double& reach = out.reach = running.reach;
+  Flags held = held_edges(runs, ends, law);
+  Integers edges = indices(held);
+  Vector before = ends;
+  ModelFlow flow;
+  Matrix tangent;
+  double pressure = response.pressure_at(prescribed, device), strongest = 0;
+  bool moved = true, judges = false;
+  while (out.steps < most_steps) {
+    check_signals();
+    if (!moved) {
+      condense_gaps(response, hold_edges(response, ends, held, law), law);
+    } else if (!move_references(response, ends, held, pressure, prescribed, law, model)) {
+      out.event = DescentEvent::outgrown;
+      break;
+    }
+    ++out.steps;
+    moved = false;
+    const ResponseSolution now = response.solve(prescribed, law, device);
+    if (!std::isfinite(now.pressure)) {
+      out.event = DescentEvent::no_field;
+      break;
+    }
+    pressure = now.pressure;
+    HeldEdges condensed(response, edges, now, device);
+    const Vector residual = condensed.residual();
+    if (judges) {
+      judges = false;
+      const double error = model_error(flow, residual, edges, ends, law, panels);
+      const double length = largest(flow.motion) / law.longest_step;
+      reach = std::max(next_reach(reach, length, error), SHORTEST_REACH);
+      if (error > 1 && length > 1.5 * SHORTEST_REACH) {
+        ends = before;
+        moved = true;
+        continue;
+      }
+    }
+    bool more = run_more(runs, response, now, law), is_cut = false;
+    if (!(now.stable || more)) {
+      more = run_weakest(runs, response, now);
+      if (!more) {
+        out.event = DescentEvent::no_field;
+        break;
+      }
+    }
+    Vector way;
+    if (!more) {
+      tangent = condensed.tangent();
+      flow = flow_on(edges, residual, tangent, ends, strongest, reach, equal_speeds, law, panels);
+      way = condensed.follow(flow.motion, pressure);
+      const Vector here = response.motion_to(ends);
+      for (size_t e = 0; e < way.size(); ++e) way[e] -= here[e];
+      for (size_t i = 0; i < edges.size(); ++i) way[edges[i]] = flow.motion[i];  // no rounding
+      if (law.critical == 0)
+        is_cut = cut(way, map_gaps(ends), law);
+      else
+        more = run_far(runs, response, way, ends, law);
+    }
+    if (more) {
+      held = held_edges(runs, ends, law);
+      edges = indices(held);
+      continue;
+    }
+    judges = !edges.empty();
+    moved = true;
+    before = ends;
+    ends = move_edges(ends, way);
+    if (shortest_length(ends) < law.smallest) {
+      out.event = DescentEvent::vanished;
+      break;
+    }
+    if (largest(way) < rest_within(ends, law) && !(flow.is_at_limit || is_cut)) {
+      out.event = DescentEvent::at_rest;
+      break;
+    }
+  }
+  out.raced = law.critical > 0 && may_race(edges, tangent, running.start, ends, law);
+  out.ends = ends;
+  return out;
+}
+
+}  // namespace adhesis

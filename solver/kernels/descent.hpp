@@ -1,0 +1,46 @@
+// Descent in energy along a jump: the gradient flow of the edges, on the tree of gaps.
+//
+// With n the outward motions and f = C_c² - C² the forces, the edges follow ṅ = f. Few of them run
+// at a time. These, and those beside them, are held in the linear response, so that the others are
+// stable and follow; of the held ones the tangent is condensed. With it their flow is integrated
+// through a model of their openings, over several shortest waves where they run, and over a
+// fraction of one near equilibria and saddles, where a gap closes or a patch vanishes. The field at
+// the end of each step shows how wrong the model was.
+#pragma once
+
+#include "renewal.hpp"
+
+namespace adhesis {
+
+enum class DescentEvent {
+  at_rest,     // the steps have become short: Newton's iteration finds the equilibrium
+  vanished,    // a gap or patch is below the smallest length
+  step_limit,  // the steps that were allowed are used up
+  no_field,    // the edges have no field
+  outgrown,    // some gap needs more nodes than the linear response has
+};
+
+struct Descent {
+  DescentEvent event = DescentEvent::step_limit;
+  Vector ends;
+  int steps = 0;  // solutions of the linear response
+  double reach;   // of the next long step, in longest steps
+  // Whether the order in which the edges ran may have decided where they ended: some took so much
+  // force from others. Edges that increase each other's force end alike in any order.
+  bool raced = false;
+};
+
+// What a descent knows of the way that its edges have come.
+struct Running {
+  Flags edges;   // those that run
+  Vector start;  // ends where they began to run
+  double reach;  // of the first long step, in longest steps
+};
+
+// Descend until an event; `running.edges` follows. Without adhesion the edges are stable but where
+// patches come or go: all take Newton's steps, each edge within its limit. With equal speeds, for
+// comparison, each edge has the time Δτ in which its own force would move it by the longest step.
+Descent descend(LinearResponse& response, Vector ends, double prescribed, int most_steps,
+                bool equal_speeds, Running& running, const EdgeLaw& law, const Model& model);
+
+}  // namespace adhesis

@@ -1,0 +1,55 @@
+// Equation (1) of gap_field.py: nodes, diagonal blocks and loads of given gaps.
+//
+// A gap's own part depends on the gap alone. Between gaps acts the half-space kernel at their nodes
+// (cluster_tree.hpp).
+#pragma once
+
+#include "model.hpp"
+
+namespace adhesis {
+
+// Gaps and their Gauss-Chebyshev nodes, N of all L gaps together.
+struct Nodes {
+  std::vector<Gap> gaps;
+  Integers orders;   // of each gap's rule
+  Integers offset;   // first node of each gap, and N
+  Integers square;   // first element of the M×M matrix of each gap, and of all
+  Vector theta, weight;                        // θ and X
+  Vector sine, cosine;                         // of θ/2
+  std::vector<std::array<double, 2>> slope;    // dη/dθ at both ends of each gap
+
+  Nodes() = default;
+  Nodes(std::vector<Gap> gaps, Integers orders);
+
+  int gap_count() const { return int(gaps.size()); }
+  int size() const { return int(theta.size()); }
+  int size_of(int k) const { return offset[k + 1] - offset[k]; }
+};
+
+// Of S and S': a value for each end of a gap.
+using EndTerms = std::array<std::array<double, 2>, 2>;  // [side][field]
+
+// Diagonal blocks of B + G, flat, and loads; X is the weight of the nodes.
+struct Equations {
+  Vector blocks;
+  Vector load, load_of_slope;        // S~, and S~' if asked for
+  std::vector<EndTerms> end_terms;   // terms that the modes of S and S' above M add at the ends
+};
+
+Equations allocate_equations(const Nodes& nodes);
+
+// Fill in nodes, block and loads of gap k, of S alone or also of S'.
+void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model& model);
+
+// 1/sin²(x/2) - 4/x², x = Δθ: the kernel of a gap's own periodic images.
+double periodic_images(double x);
+
+// 4 [α²/sinh²(αx) - 1/x²], x = Δη: the own kernel but for a straight crack in η.
+double mapped_kernel(double alpha, double x);
+
+// Load on the own gap, and charges, of the singular opening that an edge leaves when it moves
+// (weight_function.py); `density` is space for the nodes of the gap.
+void end_charges(const Nodes& nodes, const Equations& equations, int k, int side,
+                 const GaussRule& rule, double* density, double* load, double* charge);
+
+}  // namespace adhesis

@@ -1,0 +1,197 @@
+#include "field.hpp"
+
+#include "cholesky.hpp"
+
+namespace adhesis {
+
+namespace {
+
+// w A⁻¹ w of a gap: its response to potentials with the edges held.
+void weigh_inverse(const double* inverse, const GaussRule& rule, double* response) {
+  const int m = rule.count;
+  for (int i = 0; i < m; ++i)
+    for (int j = 0; j < m; ++j)
+      response[i * m + j] = rule.weights[i] * inverse[i * m + j] * rule.weights[j];
+}
+
+Tree build_tree(const Nodes& nodes, double digits) {
+  const auto halves = pair_runs(nodes.gap_count());
+  Tree tree(nodes, halves, Integers(halves.size(), 0), digits);
+  for (int k = 0; k < nodes.gap_count(); ++k) {
+    const Vector& w = gauss_rules()[nodes.orders[k]].weights;
+    for (int i = 0; i < nodes.size_of(k); ++i) {
+      const int node = nodes.offset[k] + i;
+      tree.theta[node] = nodes.theta[node];
+      tree.stretch[node] = nodes.weight[node] / w[i];
+    }
+  }
+  for (int run = tree.count; run < tree.run_count(); ++run) tree.place_charges(run);
+  return tree;
+}
+
+// Multiply a column by the inverse diagonal blocks.
+Vector apply_inverse(const Nodes& nodes, const Vector& inverse, const Vector& x) {
+  Vector out(x.size());
+  for (int k = 0; k < nodes.gap_count(); ++k) {
+    const int m = nodes.size_of(k), first = nodes.offset[k];
+    for (int i = 0; i < m; ++i)
+      out[first + i] = dot(&inverse[nodes.square[k] + i * m], &x[first], m);
+  }
+  return out;
+}
+
+// Apply (B + G)⁻¹ to a load.
+Vector solve_load(const Nodes& nodes, const FactoredGaps& gaps, const Vector& weights,
+                  const Vector& load) {
+  const Tree& tree = gaps.tree;
+  const int n = nodes.size();
+  Charges charges(tree.size());
+  Vector potential(tree.size());
+  Vector solved = apply_inverse(nodes, gaps.inverse, load);
+  for (int i = 0; i < n; ++i) charges.isolated[i] = weights[i] * solved[i];
+  for (int run = tree.count; run < tree.run_count(); ++run) tree.charge(run, charges);
+  tree.pass_down(charges, potential);
+  Vector rest(n);
+  for (int i = 0; i < n; ++i) rest[i] = load[i] - weights[i] * potential[i];
+  return apply_inverse(nodes, gaps.inverse, rest);
+}
+
+}  // namespace
+
+Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equations,
+                     bool with_end_terms) {
+  Vector out(2 * nodes.gap_count());
+  for (int e = 0; e < int(out.size()); ++e) {
+    const int k = e / 2, side = e % 2;
+    const Vector& end_values = gauss_rules()[nodes.orders[k]].end_values[side];
+    double value = dot(end_values.data(), &f[nodes.offset[k]], nodes.size_of(k));
+    if (with_end_terms) value -= equations.end_terms[k][side][0];
+    out[e] = std::sqrt(2 * nodes.slope[k][side]) * value;
+  }
+  return out;
+}
+
+SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders, int fields,
+                        const Model& model) {
+  const std::vector<GaussRule>& rules = gauss_rules();
+  std::vector<Gap> gaps = map_gaps(ends);
+  const int count = int(gaps.size());
+  bool solvable = in_order(gaps);
+  if (!solvable) {  // any edges with a field, whose pressure is then NaN
+    Vector any(2 * count);
+    for (int e = 0; e < 2 * count; ++e) any[e] = e * pi / count;
+    gaps = map_gaps(any);
+  }
+  SolvedField out{Field(model), {}};
+  Field& field = out.field;
+  field.nodes = Nodes(gaps, orders);
+  field.equations = allocate_equations(field.nodes);
+  const Nodes& nodes = field.nodes;
+  const int n = nodes.size();
+  out.factored.inverse.resize(nodes.square.back());
+  for (int k = 0; k < count; ++k) {
+    fill_gap(k, fields, field.nodes, field.equations, model);
+    const int at = nodes.square[k];
+    solvable &= invert_definite(&field.equations.blocks[at], nodes.size_of(k),
+                                &out.factored.inverse[at]);
+  }
+  out.factored.tree = build_tree(nodes, model.digits);
+  Tree& tree = out.factored.tree;
+  Vector weights(n);
+  for (int k = 0; k < count; ++k) {
+    const GaussRule& rule = rules[nodes.orders[k]];
+    std::copy(rule.weights.begin(), rule.weights.end(), weights.begin() + nodes.offset[k]);
+    weigh_inverse(&out.factored.inverse[nodes.square[k]], rule,
+                  &tree.response[tree.runs[k].response]);
+  }
+  for (int run = count; run < tree.run_count(); ++run) tree.factor(run);
+  field.solved = {solve_load(nodes, out.factored, weights, field.equations.load),
+                  solve_load(nodes, out.factored, weights, nodes.weight)};
+  const double load_mean = dot(nodes.weight.data(), field.solved[0].data(), n);
+  field.unit_mean = dot(nodes.weight.data(), field.solved[1].data(), n);
+  auto [weight, compliance] = model.device;
+  field.resistance = weight * field.unit_mean + 2 * pi * compliance;
+  field.pressure = -(2 * pi * prescribed + weight * load_mean) / field.resistance;
+  field.separation = prescribed;
+  if (compliance != 0)
+    field.separation = -(load_mean + field.pressure * field.unit_mean) / (2 * pi);
+  if (!solvable) field.pressure = not_a_number;
+  field.scaled_opening.resize(n);
+  for (int i = 0; i < n; ++i)
+    field.scaled_opening[i] = -field.solved[0][i] - field.pressure * field.solved[1][i];
+  field.opening = edge_openings(field.scaled_opening, nodes, field.equations, true);
+  return out;
+}
+
+Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,
+                       const Vector& potential, double pressure, double prescribed,
+                       const Model& model) {
+  const std::vector<GaussRule>& rules = gauss_rules();
+  Field field(model);
+  field.nodes = Nodes(map_gaps(ends), orders);
+  field.equations = allocate_equations(field.nodes);
+  const Nodes& nodes = field.nodes;
+  const int n = nodes.size();
+  Vector f(n), by_pressure(nodes.weight);
+  for (int k = 0; k < nodes.gap_count(); ++k) {
+    fill_gap(k, 1, field.nodes, field.equations, model);
+    const GaussRule& rule = rules[orders[k]];
+    const int m = rule.count, first = nodes.offset[k];
+    const double* block = &field.equations.blocks[nodes.square[k]];
+    Vector factor(block, block + m * m);
+    if (!factor_rows(factor.data(), m, m)) pressure = not_a_number;
+    std::copy_n(&nodes.weight[first], m, &by_pressure[first]);
+    solve_column(factor.data(), m, m, &by_pressure[first]);
+    for (int i = first; i < first + m; ++i) {
+      double there = interpolate_potential(known[k], rule, &potential[first], nodes.theta[i]);
+      f[i] = -(field.equations.load[i] + pressure * nodes.weight[i]) - nodes.weight[i] * there;
+    }
+    solve_column(factor.data(), m, m, &f[first]);
+  }
+  const double mean = dot(nodes.weight.data(), f.data(), n);  // mean opening times 2π
+  const double unit_mean = dot(nodes.weight.data(), by_pressure.data(), n);  // its fall by p
+  // weight·mean - 2π compliance·p = 2π d
+  auto [weight, compliance] = model.device;
+  double more = weight * mean - 2 * pi * (prescribed + compliance * pressure);
+  more /= weight * unit_mean + 2 * pi * compliance;
+  field.pressure = pressure + more;
+  add_scaled(-more, by_pressure.data(), f.data(), n);
+  field.separation = compliance != 0 ? (mean - more * unit_mean) / (2 * pi) : prescribed;
+  field.opening = edge_openings(f, nodes, field.equations, true);
+  field.scaled_opening = f;
+  return field;
+}
+
+Vector gap_potentials(const Field& field) {
+  const Nodes& nodes = field.nodes;
+  Vector out(nodes.size());
+  for (int k = 0; k < nodes.gap_count(); ++k) {
+    const Vector& w = gauss_rules()[nodes.orders[k]].weights;
+    const int m = nodes.size_of(k), first = nodes.offset[k];
+    for (int i = 0; i < m; ++i) {
+      // A f + w g + S~ + p X = 0
+      double total = field.equations.load[first + i] + field.pressure * nodes.weight[first + i] +
+                     dot(&field.equations.blocks[nodes.square[k] + i * m],
+                         &field.scaled_opening[first], m);
+      out[first + i] = -total / w[i];
+    }
+  }
+  return out;
+}
+
+double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,
+                             double theta) {
+  MappedPoint at = eta_at(gap, std::min(std::max(theta, gap.end[0]), gap.end[1]));
+  double above = 0, below = 0, sign = 1;
+  for (int i = 0; i < rule.count; ++i) {
+    double apart = at.eta - rule.eta[i];
+    if (apart == 0) return at.slope * potential[i];
+    double share = sign * rule.weights[i] / apart;
+    above += share * potential[i];
+    below += share;
+    sign = -sign;
+  }
+  return at.slope * above / below;
+}
+
+}  // namespace adhesis

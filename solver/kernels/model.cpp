@@ -1,0 +1,86 @@
+#include "model.hpp"
+
+namespace adhesis {
+
+ValueAndSlope evaluate_series(const Vector& coefficients, double theta, const Panels& panels) {
+  const int terms = int(coefficients.size()) / panels.finest_count;
+  double position = theta / panels.width;
+  long panel = long(std::floor(position));
+  double x = 2 * (position - double(panel)) - 1;
+  // the number of panels is a power of two
+  const double* c = &coefficients[(panel & (panels.finest_count - 1)) * terms];
+  double b1 = 0, b2 = 0, d1 = 0, d2 = 0;
+  for (int j = terms - 1; j > 0; --j) {
+    double d = 2 * x * d1 + (2 * b1 - d2);
+    double b = 2 * x * b1 + (c[j] - b2);
+    d2 = d1, d1 = d;
+    b2 = b1, b1 = b;
+  }
+  return {x * b1 - b2 + c[0], (b1 + x * d1 - d2) * 2 / panels.width};
+}
+
+WIDE void interpolate(const Vector& coefficients, const double* position, int count,
+                 const Panels& panels, double* out) {
+  const int terms = int(coefficients.size()) / panels.finest_count;
+  const int last = panels.finest_count - 1;
+  // four recurrences side by side: each waits for its last term
+  for (int first = 0; first < count; first += 4) {
+    const double* c[4];
+    Four x = {}, a = {}, b = {}, c0 = {};
+    const int here = std::min(4, count - first);
+    for (int lane = 0; lane < 4; ++lane) {
+      double at = position[first + std::min(lane, here - 1)];
+      long panel = long(std::floor(at));
+      c[lane] = &coefficients[(panel & last) * terms];
+      x[lane] = 2 * (at - double(panel)) - 1;
+      c0[lane] = c[lane][0];
+    }
+    for (int j = terms - 1; j > 0; --j) {
+      Four term = {c[0][j], c[1][j], c[2][j], c[3][j]};
+      Four next = 2 * x * a + (term - b);
+      b = a;
+      a = next;
+    }
+    Four value = x * a - b + c0;
+    for (int lane = 0; lane < here; ++lane) out[first + lane] = value[lane];
+  }
+}
+
+ShortRule::ShortRule(int count) : minus(count), plus(count), eta(count), sine(count) {
+  for (int i = 0; i < count; ++i) {
+    double t = (i + 0.5) * pi / count;
+    minus[i] = 2 * std::sin(t / 2) * std::sin(t / 2);
+    plus[i] = 2 * std::cos(t / 2) * std::cos(t / 2);
+    eta[i] = std::cos(t);
+    sine[i] = std::sin(t);
+  }
+}
+
+ValueAndSlope measure_at(double theta, const Panels& panels) {
+  auto [tilt, rate] = evaluate_series(panels.tilt, theta, panels);
+  double measure = std::sqrt(1 + tilt * tilt);
+  return {measure, tilt / measure * rate};
+}
+
+double length_up_to(double theta, const Panels& panels) {
+  const double turns = std::floor(theta / (2 * pi));
+  const double position = (theta - turns * 2 * pi) / panels.width;
+  const int panel = std::min(std::max(int(position), 0), panels.finest_count - 1);
+  const double share = std::min(std::max(position - panel, 0.0), 1.0);
+  const LengthRule& rule = panels.length;
+  double part = 0;
+  for (size_t i = 0; i < rule.nodes.size(); ++i) {
+    const double at = (panel + share * rule.nodes[i]) * panels.width;
+    part += rule.weights[i] * measure_at(at, panels).value;
+  }
+  return turns * rule.before.back() + rule.before[panel] + part * share * panels.width;
+}
+
+double contact_length(const Vector& ends, const Panels& panels) {
+  double total = length_up_to(2 * pi, panels);
+  for (size_t e = 0; e < ends.size(); ++e)
+    total += (e % 2 == 0 ? 1 : -1) * length_up_to(ends[e], panels);
+  return total;
+}
+
+}  // namespace adhesis

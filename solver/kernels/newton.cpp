@@ -1,0 +1,129 @@
+#include "newton.hpp"
+
+#include "signals.hpp"
+
+#include "condensed.hpp"
+
+namespace adhesis {
+
+namespace {
+
+Integers indices(const Flags& marked) {
+  Integers out;
+  for (int e = 0; e < int(marked.size()); ++e)
+    if (marked[e]) out.push_back(e);
+  return out;
+}
+
+// Pin edges that come to their memory, and release those whose opening no longer holds them.
+//
+// Returns the ends with these at their memory, or a little to the side to which they are released;
+// `pinned` is changed likewise.
+Vector pin_edges(LinearResponse& response, const Vector& ends, Flags& pinned,
+                 const ResponseSolution& now, const EdgeLaw& law, const Model& model) {
+  const Integers edges = indices(pinned);
+  const Vector residual = HeldEdges(response, edges, now, model.device).residual();
+  const Vector here = response.motion_to(ends);
+  Vector out = ends;
+  for (int e = 0; e < int(ends.size()); ++e) {
+    const double way = way_from_memory(e, ends[e], law);
+    if (!pinned[e] && way * (way + now.motion[e] - here[e]) < 0) {
+      out[e] = law.memory[e];
+      pinned[e] = true;
+    }
+  }
+  const double slack = PINNED_SLACK * law.force_error / law.critical;
+  for (size_t c = 0; c < edges.size(); ++c) {
+    const int e = edges[c];
+    const double critical = critical_opening(ends[e], law, *model.panels).value;
+    const double released = outwards(e) * law.newton_tolerance;
+    const bool advances = residual[c] < -slack;
+    if (!advances && !(residual[c] > law.pinning * critical + slack)) continue;
+    out[e] = ends[e] + (advances ? released : -released);
+    pinned[e] = false;
+  }
+  return out;
+}
+
+// Compute where the openings of pinned edges lie between both critical ones, and the rates.
+void share_openings(Equilibrium& out, LinearResponse& response, const Flags& pinned,
+                    const EdgeLaw& law, const Model& model) {
+  const Integers edges = indices(pinned);
+  const HeldEdges held(response, edges, out.at, model.device);
+  const Vector residual = held.residual(), closing = held.closing_by_pressure();
+  const double by_pressure = model.device.separation_weight * response.mean[1] -
+                             2 * pi * model.device.compliance;
+  out.pinned_share.assign(out.ends.size(), not_a_number);
+  out.pinned_rate = out.pinned_share;
+  for (size_t c = 0; c < edges.size(); ++c) {
+    const double critical = critical_opening(out.ends[edges[c]], law, *model.panels).value;
+    out.pinned_share[edges[c]] = residual[c] / (law.pinning * critical);
+    out.pinned_rate[edges[c]] = -closing[c] * 2 * pi / by_pressure / (law.pinning * critical);
+  }
+}
+
+}  // namespace
+
+Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed,
+                             double reach, bool strict, const EdgeLaw& law, const Model& model) {
+  const int edges = int(ends.size());
+  Equilibrium out;
+  Flags pinned = at_memory(ends, law);
+  const int most = MOST_CORRECTIONS * (law.pinning > 0 ? PINNED_CORRECTIONS : 1);
+  Vector travelled(edges), step(edges), moved(edges);
+  double last = infinity;
+  bool judged_again = false;
+  double pressure = response.pressure_at(prescribed, model.device);
+  while (true) {
+    check_signals();
+    ++out.corrections;
+    if (!move_references(response, ends, pinned, pressure, prescribed, law, model)) {
+      out.is_outgrown = true;
+      break;
+    }
+    out.at = response.solve(prescribed, law, model.device);
+    pressure = out.at.pressure;
+    if (!std::isfinite(pressure)) break;
+    if (law.pinning > 0) {
+      const Vector before = ends;
+      ends = pin_edges(response, ends, pinned, out.at, law, model);
+      if (ends != before && out.corrections < most) {
+        last = infinity;
+        continue;
+      }
+    }
+    if (strict && !out.at.stable) {
+      if (judged_again || !any_outdated(response, ends, law)) break;
+      judged_again = true;  // the first time the tangent was that of an outdated reference
+      continue;
+    }
+    const Vector here = response.motion_to(ends);
+    for (int e = 0; e < edges; ++e) {
+      step[e] = out.at.motion[e] - here[e];
+      travelled[e] += step[e];
+      moved[e] = response.nodes.gaps[e / 2].end[e % 2] + outwards(e) * out.at.motion[e];
+    }
+    const double size = largest(step);
+    const bool stalled = size <= law.field_error && size > STALLED_SHARE * last;
+    // not written as > : a size that is no number is a failure, too
+    const double longest = std::max(HIERARCHICAL_NEWTON_GROWTH * last, law.rest_step);
+    const bool within = size <= std::min(reach, longest);
+    if (!(within && largest(travelled) <= reach && shortest_length(moved) > 0)) break;
+    ends = moved;
+    const bool at_rest = stalled || (!strict && size <= rest_within(ends, law));
+    if (at_rest || !any_outdated(response, ends, law)) {
+      out.found = true;
+      break;
+    }
+    if (out.corrections >= most) break;
+    last = size;
+  }
+  out.potential = response.potential_at(pressure);
+  out.references = response.nodes.gaps;
+  out.orders = response.nodes.orders;
+  out.ends = ends;
+  if (out.found && law.pinning > 0) share_openings(out, response, pinned, law, model);
+  return out;
+}
+
+}  // namespace adhesis

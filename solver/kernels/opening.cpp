@@ -1,0 +1,178 @@
+#include "opening.hpp"
+
+#include <optional>
+
+#include "tolerances.hpp"
+
+namespace adhesis {
+
+namespace {
+
+// Place the fine nodes of a gap, and compute s_n of all their modes.
+FineOpening fine_moments(const Gap& gap, const Circle& circle, const Panels& panels) {
+  const int count = circle.count - 1;
+  FineOpening out{Vector(count), Vector(count), Vector(count), Vector(count)};
+  const std::span<const double> cosine(&circle.cosine[1], count), sine(&circle.sine[1], count);
+  place_nodes(gap, cosine, sine, out.theta.data(), out.theta_by_t.data());
+  Vector position(count), load(count);
+  for (int i = 0; i < count; ++i) position[i] = out.theta[i] / panels.width;
+  interpolate(panels.stress, position.data(), count, panels, load.data());
+  for (int i = 0; i < count; ++i) load[i] *= out.theta_by_t[i];
+  sine_sums(load, circle, out.modes);
+  for (double& mode : out.modes) mode *= 2.0 / (count + 1);
+  return out;
+}
+
+// Locate a minimum by narrowing parabolas.
+void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
+  double width = 0.5 * minimum.width, low = infinity, half = 0;
+  for (int i = 0; i < MINIMUM_REFINEMENTS; ++i) {
+    width /= 8;
+    const double left = sum_modes(gap, minimum.theta - width, modes);
+    const double here = sum_modes(gap, minimum.theta, modes);
+    const double right = sum_modes(gap, minimum.theta + width, modes);
+    half = (right - 2 * here + left) / (2 * width * width);
+    const double slope = (right - left) / (2 * width);
+    if (!(half > 0)) {
+      low = here;
+      half = std::max(half, NO_CURVATURE);
+      break;
+    }
+    const double step = std::min(std::max(-slope / (2 * half), -4 * width), 4 * width);
+    minimum.theta += step;
+    low = here + slope * step + half * step * step;
+  }
+  minimum.opening = low;
+  minimum.half = half;
+}
+
+}  // namespace
+
+std::vector<Candidate> local_minima(const Vector& x, const Vector& y) {
+  std::vector<Candidate> out;
+  const int count = int(y.size());
+  for (int i = count - 2; i > 0; --i) {
+    if (!(y[i] <= y[i + 1] && y[i] < y[i - 1])) continue;
+    const double first = (y[i] - y[i + 1]) / (x[i] - x[i + 1]);
+    const double second = (y[i - 1] - y[i]) / (x[i - 1] - x[i]);
+    const double width = x[i - 1] - x[i + 1];
+    const double half = (second - first) / width;
+    const double slope = first + half * (x[i] - x[i + 1]);
+    double cubic = 0;
+    for (int j : {i - 2, i + 2}) {
+      if (j < 0 || j >= count) continue;
+      const int beside = j < i ? i - 1 : i + 1, far = j < i ? i + 1 : i - 1;
+      const double outer = (y[j] - y[beside]) / (x[j] - x[beside]);
+      const double other = (outer - (j < i ? second : first)) / (x[j] - x[i]);
+      cubic = std::max(cubic, std::abs((other - half) / (x[j] - x[far])));
+    }
+    out.push_back({x[i] - slope / (2 * half), y[i] - slope * slope / (4 * half), half, width,
+                   0.05 * cubic * width * width * width});
+  }
+  return out;
+}
+
+int fast_size(int fewest) {
+  constexpr int many_nodes = 500;  // from so many on, sizes of the transform lie closer together
+  int eighth = 1;
+  while (16 * eighth <= fewest + 1) eighth *= 2;
+  for (int step : {9, 10, 12, 15, 16}) {
+    if (fewest <= many_nodes && step != 12 && step != 16) continue;
+    if (step * eighth - 1 >= fewest) return step * eighth - 1;
+  }
+  return 32 * eighth - 1;
+}
+
+int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave) {
+  double widest = 0;
+  for (int i = 1; i < 24; ++i) {
+    const double t = pi * i / 24;
+    widest = std::max(widest, theta_at(gap, std::cos(t)).stretch * std::sin(t));
+  }
+  const int waves = int(std::ceil(0.5 * per_wave * widest * top)) + FEWEST_SINE_NODES;
+  return fast_size(std::max(waves, modes));
+}
+
+FineOpening open_gap(const Field& field, int k, const Circle& circle) {
+  const Nodes& nodes = field.nodes;
+  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
+  FineOpening out = fine_moments(nodes.gaps[k], circle, *field.model.panels);
+  const int m = rule.count;
+  for (int n = m; n < int(out.modes.size()); ++n) out.modes[n] /= -(n + 1);
+  for (int n = 0; n < m; ++n) {
+    double total = 0;
+    for (int j = 0; j < m; ++j)
+      total += rule.weights[j] * field.scaled_opening[nodes.offset[k] + j] * rule.modes[j * m + n];
+    out.modes[n] = 2 / pi * total;
+  }
+  sine_sums(out.modes, circle, out.opening);
+  return out;
+}
+
+FineOpening refine_opening(const Gap& gap, Vector modes, int count) {
+  const Circle circle(count + 1);
+  FineOpening out{Vector(count), Vector(count), Vector(count), std::move(modes)};
+  out.modes.resize(count);
+  const std::span<const double> cosine(&circle.cosine[1], count), sine(&circle.sine[1], count);
+  place_nodes(gap, cosine, sine, out.theta.data(), out.theta_by_t.data());
+  sine_sums(out.modes, circle, out.opening);
+  return out;
+}
+
+double sum_modes(const Gap& gap, double theta, const Vector& modes) {
+  const MappedPoint at = eta_at(gap, theta);
+  double b1 = 0, b2 = 0;
+  for (int n = int(modes.size()) - 1; n >= 0; --n) {
+    const double next = 2 * at.eta * b1 - b2 + modes[n];
+    b2 = b1;
+    b1 = next;
+  }
+  return b1 * std::sqrt(at.square);
+}
+
+double sum_pull(double theta, const Vector& sine, const Vector& cosine, const Vector& weight) {
+  const double s = std::sin(0.5 * theta), c = std::cos(0.5 * theta);
+  double total = 0;
+  for (size_t j = 0; j < sine.size(); ++j) {
+    const double half = s * cosine[j] - c * sine[j];
+    total += weight[j] / (half * half);
+  }
+  return total;
+}
+
+double work_of_gaps(const Field& field) {
+  const Panels& panels = *field.model.panels;
+  const Nodes& nodes = field.nodes;
+  double total = 0;
+  std::optional<Circle> circle;
+  for (int k = 0; k < nodes.gap_count(); ++k) {
+    const int m = nodes.size_of(k);
+    const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, ENERGY_NODES);
+    if (!circle || circle->count != count + 1) circle.emplace(count + 1);
+    const FineOpening fine = fine_moments(nodes.gaps[k], *circle, panels);
+    for (int n = m; n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);
+  }
+  return -pi / 2 * total +
+         dot(field.equations.load.data(), field.scaled_opening.data(), nodes.size());
+}
+
+std::vector<Minimum> find_minima(const Field& field, const Integers& gaps) {
+  const int top = field.model.panels->top;
+  std::vector<Minimum> out;
+  std::optional<Circle> circle;
+  for (int k : gaps) {
+    const Gap& gap = field.nodes.gaps[k];
+    const int count = count_sine_nodes(gap, field.nodes.size_of(k), top, SHAPE_NODES);
+    if (!circle || circle->count != count + 1) circle.emplace(count + 1);
+    const FineOpening fine = open_gap(field, k, *circle);
+    for (Candidate minimum : local_minima(fine.theta, fine.opening)) {
+      const double low = MINIMUM_IS_LOW * minimum.half * minimum.width * minimum.width;
+      if (minimum.opening < std::max(low, MINIMUM_DOUBT * minimum.error))
+        refine(gap, fine.modes, minimum);
+      out.push_back({minimum.theta, minimum.opening, 2 * minimum.half, k});
+    }
+  }
+  return out;
+}
+
+}  // namespace adhesis

@@ -1,0 +1,57 @@
+// Openings of gaps at fine nodes, and their minima: where a gap may touch between its edges.
+//
+// A gap's opening is T = Σ_n b_n sin((n+1)t), cos t = η. Below the M modes of (1) b_n come from f;
+// above them the straight crack gives b_n = -s_n/(n+1), s_n the moments of S_full over the gap.
+#pragma once
+
+#include "field.hpp"
+#include "sine_transform.hpp"
+
+namespace adhesis {
+
+struct FineOpening {
+  Vector theta, theta_by_t;  // θ, falling, and dθ/dt at the nodes of a circle
+  Vector opening, modes;     // T and b_n
+};
+
+// Count the sine nodes of a gap at `per_wave` nodes per shortest wave, of `top` waves a period;
+// there are no fewer than `modes`, those of its field.
+int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave);
+
+// Round up a number N of nodes to one that many gaps share, N + 1 with small prime factors.
+int fast_size(int fewest);
+
+// Evaluate the opening of gap k at the nodes of a circle.
+FineOpening open_gap(const Field& field, int k, const Circle& circle);
+
+// Evaluate θ and T of a gap, θ falling, at `count` nodes, from fewer modes.
+FineOpening refine_opening(const Gap& gap, Vector modes, int count);
+
+// Sum b_n sin((n+1)t), cos t = η(θ), over n.
+double sum_modes(const Gap& gap, double theta, const Vector& modes);
+
+// Integrate S_full T dθ over the gaps: by f, less π/2 s_n²/(n+1) of all modes above those of f.
+double work_of_gaps(const Field& field);
+
+// Sum weight_j / sin²((θ-φ_j)/2) over the nodes φ_j, from sine and cosine of φ_j/2.
+double sum_pull(double theta, const Vector& sine, const Vector& cosine, const Vector& weight);
+
+// A minimum by the parabola through three nodes.
+struct Candidate {
+  double theta, opening, half;  // half the curvature
+  double width, error;          // distance of the outer nodes; error of the opening
+};
+
+// Find local minima where θ falls; of the minima θ rises. The error is estimated from the cubics
+// through a fourth node on either side.
+std::vector<Candidate> local_minima(const Vector& x, const Vector& y);
+
+struct Minimum {
+  double theta, opening, curvature;
+  int gap;
+};
+
+// Find the minima of some gaps.
+std::vector<Minimum> find_minima(const Field& field, const Integers& gaps);
+
+}  // namespace adhesis

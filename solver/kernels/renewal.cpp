@@ -1,0 +1,190 @@
+#include "renewal.hpp"
+
+#include "cholesky.hpp"
+
+namespace adhesis {
+
+namespace {
+
+// Move the reference of a gap, filled in already, with the potential there; `old` is where it was.
+// Returns whether it has a field.
+bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
+               const EdgeLaw& law, const Model& model) {
+  const Nodes& nodes = response.nodes;
+  Tree& tree = response.tree;
+  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
+  const int first = nodes.offset[k], m = rule.count;
+  response.about_pressure[k] = pressure;
+  Vector known(m);
+  for (int i = 0; i < m; ++i)
+    known[i] = response.potential[0][first + i] + pressure * response.potential[1][first + i];
+  for (int i = 0; i < m; ++i) {
+    const int node = first + i;
+    tree.theta[node] = nodes.theta[node];
+    tree.stretch[node] = nodes.weight[node] / rule.weights[i];
+    response.about[node] =
+        tree.stretch[node] * interpolate_potential(old, rule, known.data(), nodes.theta[node]);
+  }
+  tree.runs[k].interval = nodes.gaps[k];
+  const int square = nodes.square[k];
+  if (!invert_definite(&response.equations.blocks[square], m, &response.inverse[square]))
+    return false;
+  response.linearise(k, law, model);
+  return true;
+}
+
+// Place the runs anew that hold gaps that have changed; returns whether they have enough charges.
+bool replace_runs(LinearResponse& response, const Flags& changed, const Model& model) {
+  Tree& tree = response.tree;
+  Flags renewed(changed);
+  renewed.resize(tree.run_count());
+  for (int run = tree.count; run < tree.run_count(); ++run) {
+    auto [one, two] = tree.runs[run].half;
+    if (renewed[one] || renewed[two]) {
+      renewed[run] = true;
+      if (!tree.replace(run, response.nodes.gaps, model.digits)) return false;
+    }
+  }
+  return true;
+}
+
+bool any(const Flags& flags) {
+  return std::find(flags.begin(), flags.end(), true) != flags.end();
+}
+
+}  // namespace
+
+Outdated is_outdated(const Gap& known, const Gap& gap, double softness, const EdgeLaw& law) {
+  Outdated out = {false, false};
+  for (int side = 0; side < 2; ++side) {
+    const double moved = std::abs(gap.end[side] - known.end[side]);
+    const double before = known.patch[side], patch = gap.patch[side];
+    const double least = std::min(known.length(), before);
+    const double scale = std::min(least, REFERENCE_SCALE * law.longest_step);
+    double allowed = std::min(std::sqrt(law.field_error * scale) / (softness * softness),
+                              REFERENCE_SHARE * least);
+    // an edge acts on the field to second order only, in which all have the same sign
+    if (law.critical == 0) allowed = law.field_error;
+    // not written as > : references that are no numbers are no references
+    if (!(moved <= std::max(law.newton_tolerance, allowed))) out.changed = true;
+    if (!(moved <= REFERENCE_FAR * least)) out.far = true;
+    if (!(std::abs(patch - before) <= REFERENCE_PATCH * std::min(before, patch)))
+      out.changed = true;
+  }
+  return out;
+}
+
+Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, const EdgeLaw& law) {
+  const double softness = response.softness[k];
+  Outdated out = is_outdated(response.nodes.gaps[k], gap, softness, law);
+  // in other potentials than those of its reference its edges follow otherwise
+  const double allowed = REFERENCE_BALANCE * law.critical;
+  for (int side = 0; side < 2; ++side) {
+    const Edge& edge = response.edges[2 * k + side];
+    const bool pinned = law.pinning > 0 && edge.held;
+    const double residual = edge.imbalance(side, law.pinning).value;
+    if (std::abs(residual) * softness > allowed && allowed > 0 && !pinned) out.changed = true;
+  }
+  return out;
+}
+
+bool any_outdated(const LinearResponse& response, const Vector& ends, const EdgeLaw& law) {
+  const std::vector<Gap> gaps = map_gaps(ends);
+  for (int k = 0; k < int(gaps.size()); ++k)
+    if (is_outdated(response, k, gaps[k], law).changed) return true;
+  return false;
+}
+
+bool move_references(LinearResponse& response, const Vector& ends, const Flags& held,
+                     double pressure, double prescribed, const EdgeLaw& law, const Model& model) {
+  const std::vector<Gap> gaps = map_gaps(ends);
+  const std::vector<GaussRule>& rules = gauss_rules();
+  Nodes& nodes = response.nodes;
+  const int count = nodes.gap_count();
+  Flags changed(count), far(count);
+  int most_far = 0;
+  for (int k = 0; k < count; ++k) {
+    Outdated outdated = is_outdated(response, k, gaps[k], law);
+    changed[k] = outdated.changed;
+    far[k] = outdated.far;
+    most_far += outdated.far;
+  }
+  if (most_far > REFERENCE_MOST_FAR * std::max(count, FEW_REFERENCES)) return false;
+  for (int k = 0; k < count; ++k) {
+    const int order = nodes.orders[k];
+    const double wanted = model.digits / convergence_rate(gaps[k]);
+    if (changed[k] && rules[order].count < wanted && order < int(rules.size()) - 1) return false;
+  }
+  const std::vector<Gap> before = nodes.gaps;
+  for (int k = 0; k < count; ++k)
+    if (changed[k]) nodes.gaps[k] = gaps[k];
+  Flags both(held);
+  for (int e = 0; e < 2 * count; ++e)
+    if (far[e / 2]) both[e] = true;
+  const Flags others = hold_edges(response, ends, both, law);
+  if (!any(changed)) {
+    condense_gaps(response, others, law);
+    return true;
+  }
+  for (int k = 0; k < count; ++k)
+    if (changed[k]) fill_gap(k, 2, nodes, response.equations, model);
+  bool renewed = true;
+  Flags again(changed);
+  for (int k = 0; k < count; ++k) {
+    if (changed[k] && renewed) {
+      renewed = renew_gap(response, k, before[k], pressure, law, model);
+    } else if (others[k]) {
+      response.condense(k, law.pinning);
+      again[k] = true;
+    }
+  }
+  if (!(renewed && replace_runs(response, changed, model))) {
+    const double nan = not_a_number;
+    for (int k = 0; k < count; ++k)  // they serve for no other response
+      if (changed[k]) nodes.gaps[k] = {{nan, nan}, {nan, nan}, nan};
+    return false;
+  }
+  response.factor_runs(again);
+  if (any(far)) {
+    // their potentials are not those of the old edges: solved with these held
+    pressure = response.solve(prescribed, law, model.device).pressure;
+    hold_edges(response, ends, held, law);
+    for (int k = 0; k < count; ++k)
+      if (far[k]) response.linearise_in_current_potential(k, pressure, law, model);
+    response.factor_runs(far);
+  }
+  return true;
+}
+
+Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held,
+                 const EdgeLaw& law) {
+  const Vector motion = response.motion_to(ends);
+  Flags changed(ends.size() / 2);
+  for (int e = 0; e < int(ends.size()); ++e) {
+    Edge& edge = response.edges[e];
+    const double here = held[e] ? motion[e] : 0;
+    const bool recedes = law.pinning > 0 && way_from_memory(e, ends[e], law) < 0;
+    if (bool(held[e]) != edge.held || here != edge.here || recedes != edge.recedes)
+      changed[e / 2] = true;
+    edge.recedes = recedes;
+    edge.held = held[e];
+    edge.here = here;
+  }
+  return changed;
+}
+
+void condense_gaps(LinearResponse& response, const Flags& some, const EdgeLaw& law) {
+  for (int k = 0; k < response.gap_count(); ++k)
+    if (some[k]) response.condense(k, law.pinning);
+  if (any(some)) response.factor_runs(some);
+}
+
+bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
+                     const EdgeLaw& law, const Model& model) {
+  const double pressure = response.pressure_at(prescribed, model.device);
+  if (!move_references(response, ends, at_memory(ends, law), pressure, prescribed, law, model)) return false;
+  response.solve(prescribed, law, model.device);
+  return true;
+}
+
+}  // namespace adhesis

@@ -1,0 +1,67 @@
+// Renewal of a linear response where edges have moved, and its set-up.
+//
+// A gap whose edge leaves its reference is linearised anew where it is now, in the potential of the
+// last solution, and the runs of the tree that hold the gap are computed anew. So a state next to a
+// known one costs the changed gaps and one pass through the tree. Where a patch comes or goes the
+// other gaps keep their responses, and the tree all runs that hold no change.
+#pragma once
+
+#include "field.hpp"
+#include "response.hpp"
+
+namespace adhesis {
+
+struct Outdated {
+  bool changed, far;  // whether a gap has left its reference, and by how far
+};
+
+// Compare a gap with its reference. The response is wrong to second order, in which the motion
+// squared over the gap or the patch beside it may be the error of the field; the less the softer
+// the gap is: next to a fold.
+Outdated is_outdated(const Gap& known, const Gap& gap, double softness, const EdgeLaw& law);
+
+// Return whether gap k, now `gap`, is to be renewed: it has left its reference, or was out of
+// balance in it.
+Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, const EdgeLaw& law);
+
+bool any_outdated(const LinearResponse& response, const Vector& ends, const EdgeLaw& law);
+
+// Move the references of gaps to these edges where they have departed from them.
+//
+// `held` marks the edges that are held from now on. `pressure` is p, with which the last solution
+// gives the potentials. Returns false where a gap or run needs more nodes than it has, or many gaps are
+// far from their references: then another response is to be set up.
+bool move_references(LinearResponse& response, const Vector& ends, const Flags& held,
+                     double pressure, double prescribed, const EdgeLaw& law, const Model& model);
+
+// Hold some edges where they are, and no others, and note which of all recede; marks the gaps that
+// are to be condensed.
+Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held,
+                 const EdgeLaw& law);
+
+// Eliminate the edges of some gaps anew, and factor the runs that hold them.
+void condense_gaps(LinearResponse& response, const Flags& some, const EdgeLaw& law);
+
+// Renew the response for a known equilibrium; returns false as move_references does.
+bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
+                     const EdgeLaw& law, const Model& model);
+
+struct NewResponse {
+  LinearResponse response;
+  bool has_field;
+};
+
+// Solve the field of these gaps, and linearise about it; `least` are the least orders of the gaps,
+// or empty.
+NewResponse set_up_response(const Vector& ends, double prescribed, const Integers& least,
+                            const EdgeLaw& law, const Model& model);
+
+// Set up a response of gaps of which most are those of another.
+NewResponse update_response(const LinearResponse& known, const Vector& ends, double prescribed,
+                            const Integers& least, const EdgeLaw& law, const Model& model);
+
+// Count the gaps that update_response would not take over.
+int count_unknown(const LinearResponse& known, const Vector& ends, const EdgeLaw& law,
+                  const Model& model);
+
+}  // namespace adhesis

@@ -1,0 +1,448 @@
+#include "tree.hpp"
+
+#include <algorithm>
+
+#include "tolerances.hpp"
+
+namespace adhesis {
+
+namespace {
+
+// Make the interval of a run of gaps.
+Gap interval(const std::vector<Gap>& gaps, int first, int last) {
+  const double left = gaps[first].patch[0], right = gaps[last].patch[1];
+  const double length = gaps[last].end[1] - gaps[first].end[0];
+  return {{gaps[first].end[0], gaps[last].end[1]}, {left, right}, alpha_of(length, left, right)};
+}
+
+// Return the number of charges that a run needs.
+int wanted_rank(const Gap& interval, double digits) {
+  int wanted = int(std::ceil((digits + CHARGE_MARGIN) / convergence_rate(interval)));
+  return std::min(std::max(wanted, FEWEST_CHARGES), MOST_CHARGES);
+}
+
+// Compute K between two sets of charges.
+WIDE void fill_kernel(const double* theta, const double* stretch, int rows, const double* other,
+                 const double* other_stretch, int columns, double* out) {
+  Vector sine(columns), cosine(columns);
+  for (int j = 0; j < columns; ++j) {
+    sine[j] = std::sin(0.5 * other[j]);
+    cosine[j] = std::cos(0.5 * other[j]);
+  }
+  for (int i = 0; i < rows; ++i) {
+    const double si = std::sin(0.5 * theta[i]), ci = std::cos(0.5 * theta[i]);
+    const double scale = stretch[i] / (4 * pi);
+    double* row = out + i * columns;
+    for (int j = 0; j < columns; ++j) {
+      double half = si * cosine[j] - ci * sine[j];
+      row[j] = scale * other_stretch[j] / (half * half);
+    }
+  }
+}
+
+// Compute the interpolation of potentials from the nodes of an interval to points inside.
+void fill_interpolation(const Gap& interval, const Vector& node, const Vector& share,
+                        const double* theta, const double* stretch, int points, double* out) {
+  const int rank = int(node.size());
+  for (int b = 0; b < points; ++b) {
+    MappedPoint at = eta_at(interval, theta[b]);
+    const double scale = stretch[b] * at.slope;
+    double* row = out + b * rank;
+    double total = 0;
+    for (int a = 0; a < rank; ++a) row[a] = share[a] / (at.eta - node[a]);
+    for (int a = 0; a < rank; ++a) total += row[a];
+    if (std::isfinite(total)) {
+      for (int a = 0; a < rank; ++a) row[a] *= scale / total;
+    } else {  // the point is a node
+      for (int a = 0; a < rank; ++a) row[a] = at.eta == node[a] ? scale : 0;
+    }
+  }
+}
+
+// out += a b, a of (rows, inner), b of (inner, columns).
+WIDE void add_product(const double* a, const double* __restrict b, int rows, int inner, int columns,
+                 double* __restrict out) {
+  for (int i = 0; i < rows; ++i) {
+    double* row = out + i * columns;
+    const double* c = a + i * inner;
+    int k = 0;
+    for (; k + 4 <= inner; k += 4) {
+      const double *b0 = b + k * columns, *b1 = b0 + columns, *b2 = b1 + columns;
+      const double* b3 = b2 + columns;
+      for (int j = 0; j < columns; ++j)
+        row[j] += (c[k] * b0[j] + c[k + 1] * b1[j]) + (c[k + 2] * b2[j] + c[k + 3] * b3[j]);
+    }
+    for (; k < inner; ++k) add_scaled(c[k], b + k * columns, row, columns);
+  }
+}
+
+// out += aᵀ b, a of (inner, rows), b of (inner, columns).
+WIDE void add_transposed_product(const double* a, const double* __restrict b, int inner, int rows,
+                            int columns, double* __restrict out) {
+  int k = 0;
+  for (; k + 4 <= inner; k += 4) {
+    const double *b0 = b + k * columns, *b1 = b0 + columns, *b2 = b1 + columns;
+    const double* b3 = b2 + columns;
+    for (int i = 0; i < rows; ++i) {
+      const double c0 = a[k * rows + i], c1 = a[(k + 1) * rows + i];
+      const double c2 = a[(k + 2) * rows + i], c3 = a[(k + 3) * rows + i];
+      double* row = out + i * columns;
+      for (int j = 0; j < columns; ++j)
+        row[j] += (c0 * b0[j] + c1 * b1[j]) + (c2 * b2[j] + c3 * b3[j]);
+    }
+  }
+  for (; k < inner; ++k)
+    for (int i = 0; i < rows; ++i)
+      add_scaled(a[k * rows + i], b + k * columns, out + i * columns, columns);
+}
+
+// out = (a x) and out = (aᵀ x), a of (rows, columns).
+void apply(const double* a, int rows, int columns, const double* x, double* out) {
+  for (int i = 0; i < rows; ++i) out[i] = dot(a + i * columns, x, columns);
+}
+
+void apply_transposed(const double* a, int rows, int columns, const double* x, double* out) {
+  std::fill_n(out, columns, 0.0);
+  for (int i = 0; i < rows; ++i) add_scaled(x[i], a + i * columns, out, columns);
+}
+
+void add(const double* a, double* out, int count) {
+  for (int i = 0; i < count; ++i) out[i] += a[i];
+}
+
+}  // namespace
+
+WIDE void eliminate(double* a, int n, double* x, int columns) {
+  for (int k = 0; k < n; ++k) {
+    int best = k;
+    for (int i = k + 1; i < n; ++i)
+      if (std::abs(a[i * n + k]) > std::abs(a[best * n + k])) best = i;
+    if (best != k) {
+      std::swap_ranges(a + k * n + k, a + (k + 1) * n, a + best * n + k);
+      std::swap_ranges(x + k * columns, x + (k + 1) * columns, x + best * columns);
+    }
+    const double pivot = 1 / a[k * n + k];
+    for (int i = k + 1; i < n; ++i) {
+      const double factor = -(a[i * n + k] * pivot);
+      add_scaled(factor, a + k * n + k + 1, a + i * n + k + 1, n - k - 1);
+      add_scaled(factor, x + k * columns, x + i * columns, columns);
+    }
+  }
+  for (int k = n - 1; k >= 0; --k) {
+    for (int i = k + 1; i < n; ++i)
+      add_scaled(-a[k * n + i], x + i * columns, x + k * columns, columns);
+    const double pivot = 1 / a[k * n + k];
+    for (int j = 0; j < columns; ++j) x[k * columns + j] *= pivot;
+  }
+}
+
+namespace {
+
+// Add up the squares of the eigenvalues of a matrix.
+double trace_of_square(const double* a, int n) {
+  double total = 0;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) total += a[i * n + j] * a[j * n + i];
+  return total;
+}
+
+// Bring the pivot of two rows with the largest determinant to row and column k.
+void take_pivot(const std::array<double*, 3>& matrices, int k, int n) {
+  auto [h, r, x] = matrices;
+  int best = k;
+  double most = 0;
+  for (int i = k; i < n; ++i) {
+    const int at = i * n + i;
+    const double det = std::abs(h[at] * r[at] - x[at] * x[at]);
+    if (det > most) {
+      best = i;
+      most = det;
+    }
+  }
+  if (best == k) return;
+  for (double* a : matrices) {
+    std::swap_ranges(a + k * n, a + (k + 1) * n, a + best * n);
+    for (int i = 0; i < n; ++i) std::swap(a[i * n + k], a[i * n + best]);
+  }
+}
+
+}  // namespace
+
+WIDE NegativeCount count_negative(double* h, double* r, int n) {
+  Vector unit(n * n), of_h(n), of_r(n);
+  for (int i = 0; i < n; ++i) unit[i * n + i] = 1;
+  double* x = unit.data();
+  NegativeCount out;
+  for (int k = 0; k < n; ++k) {
+    take_pivot({h, r, x}, k, n);
+    const double a = h[k * n + k], b = x[k * n + k], c = r[k * n + k];
+    const double det = a * c - b * b;
+    out.nearest = std::min(out.nearest, std::abs(det));
+    if (det < 0)
+      out.negative += 1;
+    else if (a + c < 0)
+      out.negative += 2;
+    for (int i = k + 1; i < n; ++i) {
+      of_h[i] = x[i * n + k];
+      of_r[i] = x[k * n + i];
+    }
+    const double *h_k = h + k * n, *r_k = r + k * n;
+    for (int i = k + 1; i < n; ++i) {
+      const double own_h = h[i * n + k], own_r = r[i * n + k];
+      const double first = (c * own_h - b * of_h[i]) / det;
+      const double second = (a * of_h[i] - b * own_h) / det;
+      const double third = (c * of_r[i] - b * own_r) / det;
+      const double fourth = (a * own_r - b * of_r[i]) / det;
+      double *h_i = h + i * n, *x_i = x + i * n, *r_i = r + i * n;
+      for (int j = k + 1; j < n; ++j) {
+        h_i[j] -= first * h_k[j] + second * of_h[j];
+        x_i[j] -= first * of_r[j] + second * r_k[j];
+        r_i[j] -= third * of_r[j] + fourth * r_k[j];
+      }
+    }
+  }
+  return out;
+}
+
+Halves pair_runs(int count) {
+  Halves halves(2 * count - 1, {-1, -1});
+  Integers level(count);
+  for (int i = 0; i < count; ++i) level[i] = i;
+  int made = count;
+  while (level.size() > 1) {
+    Integers above;
+    for (size_t i = 0; i + 1 < level.size(); i += 2) {
+      halves[made] = {level[i], level[i + 1]};
+      above.push_back(made++);
+    }
+    if (level.size() % 2 == 1) above.push_back(level.back());
+    level = above;
+  }
+  return halves;
+}
+
+PairedAgain pair_again(const Halves& known, const Integers& source) {
+  const int count = int(source.size()), before = (int(known.size()) + 1) / 2;
+  PairedAgain out{Halves(2 * count - 1, {-1, -1}), Integers(2 * count - 1, -1)};
+  std::copy(source.begin(), source.end(), out.same.begin());
+  Integers image(known.size(), -1);  // of every run of the known tree
+  int made = count;
+  int first = -1;  // run of the gaps before all known ones
+  int free = 0;    // index in the known tree
+  for (int k = 0; k < count; ++k) {
+    int after = k;
+    while (after < count && source[after] < 0) ++after;
+    const int end = after < count ? source[after] : before;
+    if (source[k] >= 0) free = source[k];
+    if (source[k] >= 0 || free < end) {
+      image[free] = k;
+      if (first >= 0) {
+        out.halves[made] = {first, k};
+        image[free] = made++;
+        first = -1;
+      }
+      ++free;
+    } else if (free == 0 && first < 0) {
+      first = k;
+    } else {
+      int& partner = free == 0 ? first : image[free - 1];
+      out.halves[made] = {partner, k};
+      partner = made++;
+    }
+  }
+  for (int run = before; run < int(known.size()); ++run) {
+    auto [left, right] = known[run];
+    const int one = image[left], two = image[right];
+    image[run] = std::max(one, two);
+    if (one >= 0 && two >= 0) {
+      out.halves[made] = {one, two};
+      if (out.same[one] == left && out.same[two] == right) out.same[made] = run;
+      image[run] = made++;
+    }
+  }
+  return out;
+}
+
+Halves Tree::halves() const {
+  Halves out;
+  for (const Run& run : runs) out.push_back(run.half);
+  return out;
+}
+
+Tree::Tree(const Nodes& nodes, const Halves& halves, const Integers& known, double digits)
+    : runs(halves.size()), count(nodes.gap_count()) {
+  Run end;  // of all runs so far
+  for (int i = 0; i < run_count(); ++i) {
+    Run& run = runs[i];
+    run = end;
+    run.half = halves[i];
+    run.count = {};
+    int one = 0, two = 0;
+    if (i < count) {
+      run.range = {i, i};
+      run.interval = nodes.gaps[i];
+      run.rank = nodes.size_of(i);
+    } else {
+      const Run &left = runs[run.half[0]], &right = runs[run.half[1]];
+      one = left.rank;
+      two = right.rank;
+      run.range = {left.range[0], right.range[1]};
+      run.rank = 0;
+      if (i < run_count() - 1) {  // outside the whole there is nothing
+        run.interval = interval(nodes.gaps, run.range[0], run.range[1]);
+        run.rank = known[i] > 0 ? known[i] : wanted_rank(run.interval, digits);
+      }
+    }
+    end.node += run.rank;
+    end.response += run.rank * run.rank;
+    end.inverse += one * one;
+    end.kernel += one * two;
+    end.interpolation += (one + two) * run.rank;
+  }
+  theta.resize(end.node);
+  stretch.resize(end.node);
+  kernel.resize(end.kernel);
+  interpolation.resize(end.interpolation);
+  response.resize(end.response);
+  inverse.resize(end.inverse);
+  inner_potential.resize(end.interpolation);
+}
+
+WIDE void Tree::place_charges(int index) {
+  const Run& run = runs[index];
+  const int rank = run.rank;
+  Vector node(rank), share(rank);  // Chebyshev nodes, and their barycentric weights
+  for (int i = 0; i < rank; ++i) {
+    double t = pi * (rank - i - 0.5) / rank;
+    node[i] = std::cos(t);
+    share[i] = i % 2 == 0 ? std::sin(t) : -std::sin(t);
+    Place place = theta_at(run.interval, node[i]);
+    theta[run.node + i] = place.theta;
+    stretch[run.node + i] = place.stretch;
+  }
+  double* out = interpolation.data() + run.interpolation;
+  for (int half : run.half) {
+    const Run& child = runs[half];
+    fill_interpolation(run.interval, node, share, &theta[child.node], &stretch[child.node],
+                       child.rank, out);
+    out += child.rank * rank;
+  }
+  const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
+  fill_kernel(&theta[one.node], &stretch[one.node], one.rank, &theta[two.node],
+              &stretch[two.node], two.rank, &kernel[run.kernel]);
+}
+
+bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits) {
+  Run& run = runs[index];
+  if (run.rank > 0) {
+    run.interval = interval(gaps, run.range[0], run.range[1]);
+    // one charge fewer than required: CHARGE_MARGIN covers it
+    if (wanted_rank(run.interval, digits) > run.rank + 1) return false;
+  }
+  place_charges(index);
+  return true;
+}
+
+void Tree::factor(int index) {
+  Run& run = runs[index];
+  const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
+  const int n = one.rank, m = two.rank, r = run.rank;
+  const double *first = &response[one.response], *second = &response[two.response];
+  const double* k12 = &kernel[run.kernel];
+  // (1 - H R1)⁻¹, H = K12 R2 K21
+  Vector k21(m * n), half(n * m), reflected(n * n), matrix(n * n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < m; ++j) k21[j * n + i] = k12[i * m + j];
+  add_product(k12, second, n, m, m, half.data());
+  add_product(half.data(), k21.data(), n, m, n, reflected.data());
+  add_product(reflected.data(), first, n, n, n, matrix.data());
+  const double squares = trace_of_square(matrix.data(), n);
+  double* unit = &inverse[run.inverse];
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      unit[i * n + j] = i == j ? 1 : 0;
+      matrix[i * n + j] = unit[i * n + j] - matrix[i * n + j];
+    }
+  }
+  eliminate(matrix.data(), n, unit, n);
+  // With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
+  // than its halves: Haynsworth's formula, applied twice. These are none where the eigenvalues of
+  // H R1, real if one of both is definite, are below one.
+  run.count = {one.count.negative + two.count.negative, 1};
+  if (squares > WEAK_INTERACTION || (one.count.negative > 0 && two.count.negative > 0)) {
+    Vector own_first(first, first + n * n);
+    const NegativeCount pair = count_negative(reflected.data(), own_first.data(), n);
+    run.count.negative += n - pair.negative;
+    run.count.nearest = pair.nearest;
+  }
+  if (r == 0) return;
+  const double *e1 = &interpolation[run.interpolation], *e2 = e1 + n * r;
+  double *d1 = &inner_potential[run.interpolation], *d2 = d1 + n * r;
+  // D1 = (1 - H R1)⁻¹ (E1 + K12 R2 E2), D2 = E2 + K21 R1 D1
+  Vector drive(e1, e1 + n * r), charges((n + m) * r);  // by the potential, with the other sign
+  add_product(half.data(), e2, n, m, r, drive.data());
+  std::fill_n(d1, n * r, 0.0);
+  add_product(unit, drive.data(), n, n, r, d1);
+  add_product(first, d1, n, n, r, charges.data());
+  std::copy_n(e2, m * r, d2);
+  add_product(k21.data(), charges.data(), m, n, r, d2);
+  add_product(second, d2, m, m, r, charges.data() + n * r);
+  double* own = &response[run.response];
+  std::fill_n(own, r * r, 0.0);
+  add_transposed_product(e1, charges.data(), n + m, r, r, own);
+  for (int i = 0; i < r; ++i)
+    for (int j = 0; j < i; ++j)
+      own[i * r + j] = own[j * r + i] = 0.5 * (own[i * r + j] + own[j * r + i]);
+}
+
+WIDE void Tree::charge(int index, Charges& charges) const {
+  const Run& run = runs[index];
+  const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
+  const int n = one.rank, m = two.rank, r = run.rank;
+  const double *first = &response[one.response], *second = &response[two.response];
+  const double* k12 = &kernel[run.kernel];
+  double *g1 = &charges.potential_of_sibling[one.node], *g2 = &charges.potential_of_sibling[two.node];
+  const double *q1_alone = &charges.isolated[one.node], *q2_alone = &charges.isolated[two.node];
+  double q1[MOST_RANK], q2[MOST_RANK], g[MOST_RANK];
+  // g1 = -(1 - H R1)⁻¹ K12 (q2° + R2 K21 q1°);  g2 = -K21 q1
+  apply_transposed(k12, n, m, q1_alone, g2);
+  apply(second, m, m, g2, q2);
+  add(q2_alone, q2, m);
+  apply(k12, n, m, q2, g);
+  apply(&inverse[run.inverse], n, n, g, g1);  // still with the other sign
+  apply(first, n, n, g1, q1);
+  add(q1_alone, q1, n);
+  apply_transposed(k12, n, m, q1, g2);
+  apply(second, m, m, g2, q2);
+  add(q2_alone, q2, m);
+  for (int i = 0; i < n; ++i) g1[i] = -g1[i];
+  for (int i = 0; i < m; ++i) g2[i] = -g2[i];
+  if (r == 0) return;
+  double* q = &charges.isolated[run.node];
+  const double* up = &interpolation[run.interpolation];
+  apply_transposed(up, n, r, q1, q);
+  for (int i = 0; i < m; ++i) add_scaled(q2[i], up + (n + i) * r, q, r);
+}
+
+WIDE void Tree::pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const {
+  for (int index = run_count() - 1; index >= count; --index) {
+    if (!wanted[index]) continue;
+    const Run& run = runs[index];
+    const double* inward = inner_potential.data() + run.interpolation;
+    for (int half : run.half) {
+      const Run& child = runs[half];
+      if (wanted[half]) {
+        for (int i = 0; i < child.rank; ++i)
+          potential[child.node + i] = charges.potential_of_sibling[child.node + i] +
+                                      dot(inward + i * run.rank, potential.data() + run.node, run.rank);
+      }
+      inward += child.rank * run.rank;
+    }
+  }
+}
+
+void Tree::pass_down(const Charges& charges, Vector& potential) const {
+  pass_down(Flags(runs.size(), true), charges, potential);
+}
+
+}  // namespace adhesis

@@ -1,0 +1,116 @@
+// The binary tree of neighbouring gaps, whose runs act on each other through charges.
+//
+// In its own coordinate η (gap.hpp) a gap acts on the others through charges q_i = w_i f_i at its
+// nodes; the others' potentials g_i = (dθ/dη) g(θ_i) there are
+//
+//     g_i = -Σ_j K_ij q_j,      K_ij = (dθ/dη)_i (dθ/dη)_j / (4π sin²((θ_i - θ_j)/2)).
+//
+// A run of neighbouring gaps is an interval between two patches, just as a gap is one: in its
+// coordinate all that lies outside is again on the line Im η = π/(2α), however narrow the patches
+// at its ends. So it acts on the outside like a few charges at the Chebyshev nodes of η.
+//
+// With R the response of a run, q = q° - R g, a pair of neighbours 1, 2 obeys
+//
+//     g1 = E1 g - K12 q2,      g2 = E2 g - K21 q1,      q = E1ᵀ q1 + E2ᵀ q2:
+//
+// its potential g and the charges of both halves give g1 = c1 + D1 g and g2 = c2 + D2 g. Going up
+// the tree gives R, c and D of every run, going down the potentials at every gap. The work grows as
+// the number of gaps. The responses are symmetric, and the number of negative eigenvalues, that is
+// stability, is counted on the way up.
+#pragma once
+
+#include "equations.hpp"
+
+namespace adhesis {
+
+// The halves of every run; of a gap -1.
+using Halves = std::vector<std::array<int, 2>>;
+
+// Number of negative eigenvalues, and the distance of a gap's 2×2, or of the pair of a run's halves,
+// from singular: 1 without interaction.
+struct NegativeCount {
+  int negative = 0;
+  double nearest = 1;
+};
+
+// A run: one gap, or two neighbouring runs.
+struct Run {
+  std::array<int, 2> half = {-1, -1};  // of a gap none
+  std::array<int, 2> range;            // first and last gap
+  Gap interval;                        // not used of a whole period
+  int rank = 0;                        // number of charges
+  NegativeCount count;                 // of its eigenvalues
+
+  // Where the run's numbers begin in the arrays of the tree.
+  int node = 0, response = 0, inverse = 0, kernel = 0, interpolation = 0;
+};
+
+// Charges of all runs for one load.
+struct Charges {
+  Vector isolated;              // q°, without potentials from outside the run
+  Vector potential_of_sibling;  // c, of the other half of the parent, without any from outside that
+
+  explicit Charges(int size = 0) : isolated(size), potential_of_sibling(size) {}
+};
+
+// First the L gaps, then pairs of runs, the last one the whole.
+struct Tree {
+  std::vector<Run> runs;
+  int count = 0;             // of gaps
+  Vector theta, stretch;     // θ and dθ/dη of all charges
+  Vector kernel;             // K12 of all pairs
+  Vector interpolation;      // E of both halves of all pairs
+  Vector response;           // R of all runs
+  Vector inverse;            // (1 - K12 R2 K21 R1)⁻¹ of all pairs
+  Vector inner_potential;    // D of both halves of all pairs
+
+  Tree() = default;
+
+  // Allocate the tree of gaps in runs with these halves; `known` are numbers of charges, or 0.
+  Tree(const Nodes& nodes, const Halves& halves, const Integers& known, double digits);
+
+  int size() const { return int(theta.size()); }
+  int run_count() const { return int(runs.size()); }
+
+  Halves halves() const;
+
+  // Place the charges of a run, and compute its interpolation and kernel.
+  void place_charges(int run);
+
+  // Place the charges of a run anew; returns whether it has enough.
+  bool replace(int run, const std::vector<Gap>& gaps, double digits);
+
+  // Compute the response of a run from those of its halves.
+  void factor(int run);
+
+  // Compute the charges of a run from those of its halves, and the halves' potentials.
+  void charge(int run, Charges& charges) const;
+
+  // Compute the potentials of wanted runs; those that hold a wanted one must be wanted, too.
+  void pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const;
+  void pass_down(const Charges& charges, Vector& potential) const;
+};
+
+// Pair neighbouring runs, level by level.
+Halves pair_runs(int count);
+
+struct PairedAgain {
+  Halves halves;
+  Integers same;  // index of each run in the known tree, -1 if it has changed
+};
+
+// Pair the runs of gaps most of which are gaps of a known tree: source[k] is the index there, or
+// -1. A gap that is not in the tree replaces one that is gone, if there is one between the same
+// neighbours; else it is paired with the gap before it.
+PairedAgain pair_again(const Halves& known, const Integers& source);
+
+// Solve a y = x for the columns of x, both overwritten.
+void eliminate(double* a, int n, double* x, int columns);
+
+// Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.
+//
+// By pivots of two rows, one of each half: where h r is small they are far from singular. `nearest`
+// is the least of their determinants, without sign: about the least of those of 1 - h r.
+NegativeCount count_negative(double* h, double* r, int n);
+
+}  // namespace adhesis

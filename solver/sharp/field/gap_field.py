@@ -1,0 +1,146 @@
+"""Solve the elastic field of given contact edges: every gap is a crack in a full contact.
+
+Full contact carries the stress σ_full; the gaps relieve it. With θ = q0 x, S = 2σ/E*, T = q0 t (gap
+opening) and |D| the operator with symbol |m|,
+
+    S = S_full + p + |D| T,      S = 0 in the gaps,  T = 0 on the contact,  mean(T) = q0 s,
+
+p = 2p̄/E* the mean stress. In the coordinate η of each gap (``kernels/gap.hpp``)
+T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part of |D| is diagonal
+in the Chebyshev polynomials U_n(η), and the rest is smooth. So a few values of f per gap are
+enough, at its M second-kind Gauss-Chebyshev nodes:
+
+    (B + G) f = -(S~ + p X),     Xᵀ f = 2π q0 s,                                     (1)
+
+with quadrature weights w, X = w dθ/dη, B the straight crack (the same for every gap of M nodes),
+G_ij = -X_i X_j/(4π sin²(Δθ/2)) between gaps and, in the own gap, the same less the straight crack,
+-(w_i w_j/π)[α²/sinh²(α Δη) - 1/Δη²] - (X_i X_j/4π)[1/sin²(Δθ/2) - 4/Δθ²];
+the matrix is symmetric positive definite, being the elastic energy of the openings. S~ is S_full
+projected on the first M modes; its higher modes meet no smooth kernel and act as in a single
+straight crack, so their share of the edge opening is known in closed form. The error is spectral in
+M and hardly depends on how narrow the patches are.
+
+At an edge T ≈ C sqrt(r), r the distance from the edge in θ, and
+
+    C = sqrt(2 dη/dθ) [f(±1) - (s^± - Σ_{n<M} (±1)^n s_n)],      K = (E*/4) C sqrt(2π/q0),
+    G = K²/(2E*) = π E* C² / (16 q0).
+
+K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. (1) is assembled in
+``kernels/equations.cpp`` and solved on a tree of the gaps (``kernels/tree.hpp``) in
+``kernels/field.cpp``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from adhesis.solver._kernels import Field, LoadingDevice
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+
+
+def check_definite(solution: Field) -> None:
+    """Raise FloatingPointError if there is no solution."""
+    if math.isnan(solution.pressure):
+        raise FloatingPointError("the matrix of the gaps is not positive definite")
+
+
+class FixedEdgeResponse(NamedTuple):
+    """Derivatives by the prescribed quantity d at fixed edges.
+
+    Attributes
+    ----------
+    pressure : float
+        ∂p/∂d; negative.
+    separation : float
+        ∂(q0 s)/∂d.
+    opening : array, shape (2L,)
+        ∂C/∂d.
+    """
+
+    pressure: float
+    separation: float
+    opening: Array
+
+
+def respond_at_fixed_edges(solution: Field) -> FixedEdgeResponse:
+    """Differentiate a solution by d, at fixed edges; FloatingPointError if there is none."""
+    check_definite(solution)
+    pressure = -2 * np.pi / solution.resistance
+    separation = -solution.unit_mean * pressure / (2 * np.pi)
+    return FixedEdgeResponse(pressure, separation, solution.openings_by_prescribed())
+
+
+class GapField:
+    """Field of given gaps, solved when it is asked for.
+
+    Parameters
+    ----------
+    source : StressSource
+    gaps : array, shape (L, 2)
+        Left and right end of each gap in θ: increasing, the last right end below
+        gaps[0, 0] + 2π.
+    prescribed : float
+        d of :class:`LoadingDevice`: q0 s at fixed separation.
+    tolerance : float
+        Wanted relative accuracy of the interaction between gaps.
+    device : LoadingDevice
+    solve : callable
+        Solves (1) for these gaps.
+    nearly : tuple of float, optional
+        p = 2p̄/E* and q0 s to the accuracy of an equilibrium, where they are known before the field
+        is solved.
+    """
+
+    def __init__(
+        self,
+        source: StressSource,
+        gaps: Array,
+        prescribed: float,
+        tolerance: float,
+        device: LoadingDevice,
+        solve: Callable[[], Field],
+        nearly: tuple[float, float] | None = None,
+    ) -> None:
+        self.source, self.gaps, self.prescribed = source, gaps, prescribed
+        self.tolerance, self.device = tolerance, device
+        self._solve: Callable[[], Field] | None = solve
+        self._nearly = nearly
+
+    @property
+    def solution(self) -> Field:
+        """Solution of equation (1), solved at first access.
+
+        Raises
+        ------
+        FloatingPointError
+            If the matrix of the gaps is not positive definite to rounding.
+        """
+        if self._solve is not None:
+            self._solution, self._solve = self._solve(), None  # it may hold a response
+        check_definite(self._solution)
+        return self._solution
+
+    @property
+    def nearly(self) -> tuple[float, float]:
+        """2p̄/E* and q0 s to the accuracy of an equilibrium."""
+        return self._nearly or (self.pressure, self.separation)
+
+    @property
+    def pressure(self) -> float:
+        """2p̄/E*."""
+        return self.solution.pressure
+
+    @property
+    def separation(self) -> float:
+        """Separation q0 s."""
+        return self.solution.separation
+
+    @property
+    def opening(self) -> Array:
+        """C at each gap end, shape (L, 2)."""
+        return self.solution.opening.reshape(-1, 2)

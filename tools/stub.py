@@ -1,0 +1,26 @@
+"""Write the types of the kernels, from the module that was built, for mypy and editors.
+
+python tools/stub.py
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from nanobind.stubgen import StubGen
+
+from adhesis.solver import _kernels
+
+PATH = Path(__file__).resolve().parent.parent / "solver" / "_kernels.pyi"
+
+
+def stub() -> str:
+    """Return the types of the module; of arrays those of their numbers alone."""
+    generator = StubGen(_kernels)
+    generator.put(_kernels)
+    return re.sub(r"Annotated\[(NDArray\[[a-z0-9.]+\]), dict\([^)]*\)\]", r"\1", generator.get())
+
+
+if __name__ == "__main__":
+    PATH.write_text(stub())
