@@ -280,8 +280,10 @@ def _way_beyond(
     problem, turn = method.problem, state.separation
     way, dropped = min(longest, _OF_GAP * turn), 0.0
     x, end = problem.prescribed_in(state), turn - way
-    while state.separation > end:
-        x = max(x - step, end) if problem.control.is_fixed else x - step
+    fixed = problem.control.is_fixed
+    # what is prescribed ends a path at fixed separations: that of a state may be off by rounding
+    while (x if fixed else state.separation) > end:
+        x = max(x - step, end) if fixed else x - step
         step *= 2  # under a load the separation falls ever more slowly
         try:
             path = method.follow(state, x)
