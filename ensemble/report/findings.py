@@ -162,7 +162,7 @@ def missing(data: Aggregate) -> list[str]:
         out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.{why}")
     if empty := [cell_name(cell) for cell in data.cells if not cell.done and cell.pending]:
         out.append(f"No task is finished yet for {_listed(empty)}.")
-    if failed := failed_cells(data):
+    if failed := [cell_name(cell) for cell in failed_cells(data.cells)]:
         out.append(
             f"WARNING: all tasks failed for {_listed(failed)}: figures and averages lack "
             f"{'this cell' if len(failed) == 1 else 'these cells'}."
@@ -253,7 +253,7 @@ def quality(data: Aggregate) -> list[str]:
 
 def _preload(data: Aggregate) -> list[str]:
     """Report the loops whose mean stress did not reach the preload, by cell."""
-    short = short_of_preload(data)
+    short = short_of_preload(data.cells)
     if not short:
         return ["Every loop reached its preload."]
     return [

@@ -153,7 +153,7 @@ def _footnote(data: Aggregate) -> str:
     ]
     if data.campaign.cycle.under_load:
         parts.append("under a weight: it falls off, the energy of the fall is not counted")
-    if short_of_preload(data):
+    if short_of_preload(data.cells):
         parts.append("short: loops that turned before their preload was reached")
     if any(cell.work_of_adhesion > 0 for cell in data.cells):
         parts.append("W/γ: loss over work of adhesion")

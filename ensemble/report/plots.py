@@ -40,7 +40,7 @@ class Plots:
         with drawn_into(ax):
             shown = self._averages().shown
             figure = draw(shown)
-            figure.say_below(below(shown, common(shown)))
+            figure.say_below(below(shown.cells, common(shown)))
             return figure.finish()
 
     def loss_along(self, name: str, ax: object = None) -> Figure:

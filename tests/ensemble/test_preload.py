@@ -210,7 +210,8 @@ def test_loops_short_of_their_preload_are_counted_below_the_figures(tmp_path):
     text = re.sub(r"preload = .*", "preload = [1e8, 2e8]", text_of(realisations="1"))
     results = adhesis.Campaign(text).run(tmp_path / "c.h5")
     figure = results.plot.loss_along("preload")
-    assert figure.get_supxlabel() == "2 of 2 loops did not reach their preload"
+    below = figure.get_supxlabel().splitlines()
+    assert below == ["2 of 2 loops did not reach their preload", "n = 1 profile"]
     assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == SHORT
     assert [len(hollow(axes)) for axes in figure.axes] == [2] * 5
     said = " ".join(findings.agreement(results.averages))

@@ -22,6 +22,7 @@ from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.report.tables.works import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.schema import FAILED
 from adhesis.ensemble.results.status import as_text, read_status
 from tests.support.synthetic_results import campaign, rows, write
 
@@ -266,3 +267,62 @@ def test_spectra_are_of_cells_that_have_fields(tmp_path):
     plot = adhesis.open(write(tmp_path / "r.h5", plan, values)).plot
     (panel,) = plot.spectra_of_branches().axes
     assert "0.01 J/m²" in panel.get_title(loc="left")
+
+
+@pytest.fixture(scope="module")
+def with_failures(tmp_path_factory):
+    """Of 3 loops each, one failed at h_rms = 0.5 µm, all at 1 µm where the ratio is 50."""
+    text = campaign(hurst=(0.8,), gamma=(0.04,), realisations=3, ratio=[50, 100]).text
+    plan = parse_campaign(re.sub(r"h_rms = .*", 'h_rms = ["0.5 um", "1 um"]', text))
+    values = rows(plan)
+    ratio, height = (
+        np.array([dict(t.others)[n] for t in plan.tasks()]) for n in ("ratio", "h_rms")
+    )
+    values["status"][np.flatnonzero((ratio == 50) & (height == 0.5e-6))[0]] = FAILED
+    values["status"][(ratio == 50) & (height == 1e-6)] = FAILED
+    return write(tmp_path_factory.mktemp("failures") / "r.h5", plan, values)
+
+
+def test_a_mean_without_the_loops_that_failed_is_hollow(with_failures):
+    """What is left is what could be computed, which may be another kind of loops."""
+    figure = adhesis.open(with_failures).plot.loss_along("h_rms")
+    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
+    assert [x for line in marks for x in line.get_xdata()] == pytest.approx([0.5], abs=0.01)
+    assert figure.legends[0].get_texts()[-1].get_text() == "loops failed"
+    assert " ".join(figure.get_supxlabel().split()) == (
+        r"missing, as all tasks failed: H = 0.8, $\gamma$ = 0.04 J/m², ratio = 50, "
+        r"$h_\mathrm{rms}$ = 1 µm 1 of 9 loops failed, and are in no mean "
+        "n = 2 to 3 profiles, 95 % interval of the mean"
+    )
+    item = next(i for i in along_axes(aggregate(with_failures)) if i.name == "loss_along_h_rms")
+    assert "(paired)" in item.caption
+    assert "Hollow: means without loops that failed" in item.caption
+    assert "line" not in item.caption.lower()  # two points are not joined
+
+
+def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, monkeypatch):
+    notes = {}
+
+    def note(figure, stem):
+        notes[stem.name] = figure.get_supxlabel()
+        for suffix in (".png", ".pdf"):
+            stem.with_suffix(suffix).write_bytes(b"")
+
+    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", note)
+    write_report(with_failures, tmp_path / "report", io.StringIO())
+    for name in ("fig7_loop_against_penetration", "loss_by_mechanism", "jump_energies"):
+        assert notes[name] == r"ratio = 100, $h_\mathrm{rms}$ = 1 µm"
+    assert "failed" in notes["loss_along_ratio"]
+
+
+def test_a_loss_under_a_weight_says_so_at_its_axis(tmp_path):
+    text = campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=2).text
+    text = text.replace("max_penetration = 0.9", 'control = "load"\nmax_stress = [100, 200]')
+    plan = parse_campaign(text.replace("unloading_until = -2.0\n", ""))
+    plot = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan))).plot
+    labels = [axes.get_ylabel() for axes in plot.loss_along("max_stress").axes]
+    assert [label for label in labels if "mJ" in label] == [
+        "loss\nunder a weight (mJ/m²)",
+        "loss per contact\nunder a weight (mJ/m²)",
+    ]
+    assert "under a weight" in plot.loss_against_hurst().axes[0].get_ylabel()

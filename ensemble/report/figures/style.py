@@ -162,10 +162,11 @@ class PublishedFigure(Figure):
             self.legend(handles=handles, loc="outside upper center", ncols=columns)
 
     def say_below(self, text: str) -> None:
-        """Write below the panels what they have in common; nothing below axes that are given."""
+        """Write lines below the panels; nothing below axes that are given."""
         if text and not self.given:
             width = int(self.get_figwidth() / _WIDTH_OF_SIGN)
-            self.supxlabel(textwrap.fill(text, width), fontsize=_SMALL, x=0.99, ha="right")
+            lines = "\n".join(textwrap.fill(line, width) for line in text.splitlines())
+            self.supxlabel(lines, fontsize=_SMALL, x=0.99, ha="right")
 
     def finish(self) -> Figure:
         """Lay it out, and return the figure that was drawn into: this one, or that of the axes."""
