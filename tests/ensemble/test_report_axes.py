@@ -10,6 +10,7 @@ import re
 import numpy as np
 import pytest
 import xarray
+from matplotlib.figure import Figure
 
 import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
@@ -326,3 +327,32 @@ def test_a_loss_under_a_weight_says_so_at_its_axis(tmp_path):
         "loss per contact\nunder a weight (mJ/m²)",
     ]
     assert "under a weight" in plot.loss_against_hurst().axes[0].get_ylabel()
+
+
+def test_given_axes_have_the_note_the_caps_and_room_for_the_legend(with_failures):
+    results = adhesis.open(with_failures)
+    figure = Figure(layout="constrained")
+    axes = figure.subplots()
+    assert results.plot.loss_along("h_rms", ax=axes) is figure
+    (note,) = axes.texts
+    assert "1 of 9 loops failed, and are in no mean" in note.get_text().splitlines()
+    figure.draw_without_rendering()
+    assert note.get_window_extent().y0 >= 0
+    assert note.get_window_extent().y1 < axes.xaxis.label.get_window_extent().y0
+    legend = axes.get_legend().get_window_extent()
+    for container in axes.containers:
+        _, caps, (bars,) = container.lines
+        assert caps
+        highest = max(end[1] for ends in bars.get_segments() for end in ends)
+        assert axes.transData.transform((0, highest))[1] < legend.y0
+
+
+def test_a_note_that_is_cut_off_is_a_warning(with_failures):
+    axes = Figure().subplots()  # leaves no room below the label of the axis
+    plot = adhesis.open(with_failures).plot
+    about = r"below the axes: .*1 of 9 loops failed, and are in no"
+    with pytest.warns(UserWarning, match=about) as caught:
+        plot.loss_along("h_rms", ax=axes)
+    with pytest.warns(UserWarning, match="ratio = 100") as more:
+        plot.loss_against_hurst(ax=Figure(figsize=(3, 2)).subplots())
+    assert {warning.filename for warning in (*caught, *more)} == {__file__}

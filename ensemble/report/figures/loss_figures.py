@@ -18,6 +18,7 @@ from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.style import (
+    CAP,
     LINES,
     MM,
     MOST_CURVES,
@@ -221,7 +222,13 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
         mean, low, bars = _in_unit(found, 1e-3)
         edge: Any = {"edgecolor": "black", "linewidth": 0.5}
         axes.bar(place, mean, bottom=bottom, color=face, hatch=hatch, label=label, **edge)
-        line: Any = {"fmt": "none", "ecolor": "black", "elinewidth": 0.8, "label": "_"}
+        line: Any = {
+            "fmt": "none",
+            "ecolor": "black",
+            "elinewidth": 0.8,
+            "label": "_",
+            "capsize": CAP,
+        }
         axes.errorbar(place + aside, bottom + mean, yerr=bars, **line)
         mark_below_zero(axes, (place + aside)[bottom + low < 0], "black")
         bottom = bottom + mean
@@ -349,7 +356,7 @@ def errorbar(
     """
     mean, low, bars = _in_unit(found, unit)
     line = LINES[k] if x.size >= FEWEST_FOR_A_LINE else "none"
-    axes.errorbar(x + offset, mean, yerr=bars, linestyle=line, label=label, **look(k))
+    axes.errorbar(x + offset, mean, yerr=bars, linestyle=line, label=label, capsize=CAP, **look(k))
     if any(hollow):
         place = np.flatnonzero(hollow)
         options = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5, "label": "_"}
