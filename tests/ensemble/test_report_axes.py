@@ -356,3 +356,13 @@ def test_a_note_that_is_cut_off_is_a_warning(with_failures):
     with pytest.warns(UserWarning, match="ratio = 100") as more:
         plot.loss_against_hurst(ax=Figure(figsize=(3, 2)).subplots())
     assert {warning.filename for warning in (*caught, *more)} == {__file__}
+
+
+def test_a_notebook_tells_small_values_of_an_axis_apart(tmp_path):
+    text = campaign(hurst=(0.8,), gamma=(0.04,), realisations=2).text
+    plan = parse_campaign(re.sub(r"h_rms = .*", 'h_rms = ["1 um", "1.4 um"]', text))
+    results = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan)))
+    page = results._repr_html_()
+    assert ">1e-06</th>" in page
+    assert ">1.4e-06</th>" in page
+    assert results.losses.index.get_level_values("h_rms").tolist() == [1e-6, 1.4e-6]

@@ -11,7 +11,7 @@ from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.along import along, with_figure
-from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_of
+from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.selection import beside_paper, has_fields
 from adhesis.ensemble.report.figures.style import PublishedFigure
 from adhesis.ensemble.report.further_axes import together
@@ -223,7 +223,7 @@ def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
         caption += f" Marks of one look belong to {of_each}, and are moved aside a little."
     if len(axis.values) >= FEWEST_FOR_A_LINE:
         caption += " Lines join them to guide the eye."
-    if any(hollow_of(data.cells)):
+    if hollow_handle(data.cells):
         caption += " Hollow: means without loops that failed, or with loops short of their preload."
     if axis.name in TURNING_POINTS:
         caption += " Contact: the largest of the loop; loss per contact: over that largest area."
