@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.campaign.tasks import place
+from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
@@ -24,7 +24,9 @@ from adhesis.ensemble.report.further_axes import (
     together,
 )
 from adhesis.ensemble.report.tables.loss_tables import extreme
+from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import why_beyond
+from adhesis.ensemble.task.preload import INSTEAD, highest_stress, most_reached
 from adhesis.solver.loading.zero_range import ANY_RANGE
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
@@ -162,7 +164,7 @@ def missing(data: Aggregate) -> list[str]:
         out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.{why}")
     if empty := [cell_name(cell) for cell in data.cells if not cell.done and cell.pending]:
         out.append(f"No task is finished yet for {_listed(empty)}.")
-    if failed := failed_cells(data):
+    if failed := [cell_name(cell) for cell in failed_cells(data.cells)]:
         out.append(
             f"WARNING: all tasks failed for {_listed(failed)}: figures and averages lack "
             f"{'this cell' if len(failed) == 1 else 'these cells'}."
@@ -253,14 +255,25 @@ def quality(data: Aggregate) -> list[str]:
 
 def _preload(data: Aggregate) -> list[str]:
     """Report the loops whose mean stress did not reach the preload, by cell."""
-    short = short_of_preload(data)
+    short = short_of_preload(data.cells)
     if not short:
         return ["Every loop reached its preload."]
+    with Results(data.path) as results:
+        reached = [_highest_stress(results, cell) for _, cell in short]
+    listing = [
+        f"{count} at {cell_name(cell)} ({most_reached(highest)})"
+        for (count, cell), highest in zip(short, reached, strict=True)
+    ]
     return [
         f"WARNING: {sum(count for count, _ in short)} of {data.done} loops did not reach their "
-        "preload, and turned at the latest turning point: "
-        f"{_listed([f'{count} at {cell_name(cell)}' for count, cell in short])}."
+        f"preload, and turned at the latest turning point: {_listed(listing)}. {INSTEAD}."
     ]
+
+
+def _highest_stress(results: Results, cell: Cell) -> float:
+    """Return the highest mean stress at the load steps of loops short of their preload, in Pa."""
+    rows = np.sort(cell.rows[cell.values["preload_reached"] == 0])
+    return highest_stress(results.column("loading_mean_stress", rows))
 
 
 def _limit(data: Aggregate) -> list[str]:
@@ -370,23 +383,43 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
 
 
 def _along(data: Aggregate, axis: Axis) -> list[str]:
-    """Whether the mean loss is monotone along a further axis, in every line of cells."""
-    for_all = lines_along(data, axis)
-    steps = [np.diff([c.estimates["loss"].mean for c in line]) for line in for_all]
-    steps = [step for step in steps if step.size]
-    if not steps:
+    """Whether the mean loss is monotone along a further axis, in every line of cells.
+
+    Lines with loops short of their preload are left out: their cells are not alike in it.
+    """
+    lines = [line for line in lines_along(data, axis) if len(line) > 1]
+    if not lines:
         return []
+    moving = together(data, axis)
+    short = [
+        name_at(line[0].hurst, line[0].work_of_adhesion, _others(line[0], moving))
+        for line in lines
+        if short_of_preload(line)
+    ]
+    counted = [line for line in lines if not short_of_preload(line)]
+    low, high = (with_unit(axis.name, end) for end in (min(axis.values), max(axis.values)))
+    along = f"Along {axis.name} from {low} to {high}"
+    if not counted:
+        return [
+            f"{along} no trend is given: in every series of cells that are else alike, loops did "
+            "not reach their preload."
+        ]
+    steps = [np.diff([cell.estimates["loss"].mean for cell in line]) for line in counted]
     up = sum(bool(np.all(step > 0)) for step in steps)
     down = sum(bool(np.all(step < 0)) for step in steps)
     flat = sum(bool(np.all(step == 0)) for step in steps)
     verbs = {"grows": up, "falls": down, "stays the same": flat}
     verbs["is not monotone"] = len(steps) - sum(verbs.values())
     parts = [f"{verb} in {count}" for verb, count in verbs.items() if count]
-    low, high = (with_unit(axis.name, end) for end in (min(axis.values), max(axis.values)))
+    rest = f"; not counted, as loops did not reach their preload: {_listed(short)}" if short else ""
     return [
-        f"Along {axis.name} from {low} to {high} the mean loss in J/m² "
-        f"{', '.join(parts)} of {len(steps)} series of cells that are else alike."
+        f"{along} the mean loss in J/m² {', '.join(parts)} of {len(steps)} series of cells that "
+        f"are else alike{rest}."
     ]
+
+
+def _others(cell: Cell, moving: Collection[str]) -> list[tuple[str, float]]:
+    return [other for other in cell.others if other[0] not in moving]
 
 
 def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:

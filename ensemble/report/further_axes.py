@@ -11,12 +11,12 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
-from adhesis.ensemble.quantities import common_unit, with_unit
+from adhesis.ensemble.quantities import common_unit, gamma_text, with_unit
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
-    "max_stress": r"turning point $\bar p_\mathrm{max}$",
-    "preload": r"preload $\bar p_\mathrm{max}$",
+    "max_stress": r"turning point $\bar{p}_\mathrm{max}$",
+    "preload": r"preload $\bar{p}_\mathrm{max}$",
     "period": r"period $\lambda$",
     "n0": "lowest harmonic $n_0$",
     "ratio": r"$q_\mathrm{max}/q_\mathrm{min}$",
@@ -80,16 +80,14 @@ def common(data: Aggregate) -> list[tuple[str, float]]:
     return [other for other in data.cells[0].others if other in alike]
 
 
-def failed_cells(data: Aggregate) -> list[str]:
-    """Return the names of the cells of which every task failed."""
-    return [cell_name(cell) for cell in data.cells if not cell.done and not cell.pending]
+def failed_cells(cells: Sequence[Cell]) -> list[Cell]:
+    """Return the cells of which every task failed."""
+    return [cell for cell in cells if not cell.done and not cell.pending]
 
 
-def short_of_preload(data: Aggregate) -> list[tuple[int, Cell]]:
+def short_of_preload(cells: Sequence[Cell]) -> list[tuple[int, Cell]]:
     """Return the cells with loops that did not reach their preload, and how many these are."""
-    if data.campaign.cycle.preload is None:
-        return []
-    return [(count, cell) for cell in data.cells if (count := loops_short_of_preload(cell))]
+    return [(count, cell) for cell in cells if (count := loops_short_of_preload(cell))]
 
 
 def loops_short_of_preload(cell: Cell) -> int:
@@ -99,16 +97,22 @@ def loops_short_of_preload(cell: Cell) -> int:
     return int(np.sum(cell.values["preload_reached"] == 0))
 
 
-def below(data: Aggregate, others: Sequence[tuple[str, float]]) -> str:
-    """Return what stands below a figure: what its cells have in common, and what is amiss."""
-    failed = failed_cells(data)
+def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
+    """Return lines to stand below a figure: what its cells have in common, and what is amiss."""
     parts = [symbols(others)] if others else []
-    if failed:
+    if failed := failed_cells(cells):
+        first = failed[0]
+        gamma = f"$\\gamma$ = {gamma_text(first.work_of_adhesion)}"
+        name = ", ".join(filter(None, (f"H = {first.hurst:g}", gamma, symbols(first.others))))
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-        parts.append(f"missing, as all tasks failed: {failed[0]}{more}")
-    if short := sum(count for count, _ in short_of_preload(data)):
-        parts.append(f"{short} of {data.done} loops did not reach their preload")
-    return "; ".join(parts)
+        parts.append(f"missing, as all tasks failed: {name}{more}")
+    drawn = [cell for cell in cells if cell.done]
+    done, lost = sum(cell.done for cell in drawn), sum(cell.failed for cell in drawn)
+    if lost:
+        parts.append(f"{lost} of {done + lost} loops failed, and are in no mean")
+    if short := sum(count for count, _ in short_of_preload(drawn)):
+        parts.append(f"{short} of {done} loops did not reach their preload")
+    return "\n".join(parts)
 
 
 def shown_cells(data: Aggregate) -> str:

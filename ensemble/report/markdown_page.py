@@ -26,8 +26,11 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     figures = dict(sections)
     of_paper = paper.are_its_cells(data.shown.cells)
 
+    numbered = [i for name in ("losses", "loops") for i in figures.get(name, ()) if i.of_paper]
+
     def show(section: str) -> list[str]:
-        return [_shown(item, data, of_paper) for item in figures.get(section, ())]
+        items = figures.get(section, ())
+        return [_shown(item, data, of_paper, item in numbered[:1]) for item in items]
 
     losses, known = loss_tables.losses(data), loss_tables.precision(data)
     out = [
@@ -153,7 +156,7 @@ def _footnote(data: Aggregate) -> str:
     ]
     if data.campaign.cycle.under_load:
         parts.append("under a weight: it falls off, the energy of the fall is not counted")
-    if short_of_preload(data):
+    if short_of_preload(data.cells):
         parts.append("short: loops that turned before their preload was reached")
     if any(cell.work_of_adhesion > 0 for cell in data.cells):
         parts.append("W/γ: loss over work of adhesion")
@@ -183,11 +186,7 @@ def _origin(data: Aggregate) -> str:
         for name in shown
         if data.attributes.get(name)
     ]
-    results = f"Results file: {'; '.join(parts)}. " if parts else ""
-    return (
-        f"{results}Names of files with the number of a figure or table (fig3, table1) follow "
-        f"{paper.REFERENCE}."
-    )
+    return f"Results file: {'; '.join(parts)}." if parts else ""
 
 
 def _toml(text: str) -> str:
@@ -199,11 +198,16 @@ def _bullets(sentences: Sequence[str]) -> list[str]:
     return ["\n".join(f"- {markdown(sentence)}" for sentence in sentences)] if sentences else []
 
 
-def _shown(item: Illustration, data: Aggregate, of_paper: bool) -> str:
+def _shown(item: Illustration, data: Aggregate, of_paper: bool, first_numbered: bool) -> str:
     title = f"{item.title} (paper's {item.of_paper})" if of_paper and item.of_paper else item.title
     caption = item.caption
     if item.at_stress and data.campaign.cycle.turns_at_stress:
         caption += f" {item.at_stress}"
     if of_paper and item.beside_paper is not None:
         caption += f" {item.beside_paper(data if item.whole else data.shown)}"
+    if first_numbered:
+        caption += (
+            " The number in the name of its file, as in fig3 or table1, is that of "
+            f"{paper.REFERENCE}: other figures have none."
+        )
     return f"![{title}]({item.name}.png)\n\n**{title}.** {caption} ([PDF]({item.name}.pdf))"

@@ -107,7 +107,11 @@ class CampaignResults:
         if not self._counts["done"]:
             return page
         names = [f"loss_{part} [J/m^2]" for part in ("mean", "ci_low", "ci_high")]
-        table: str = self.losses[names].to_html(float_format="{:.4g}".format)
+        losses = self.losses[names]
+        # Of an index pandas writes six decimals, which small lengths have in common.
+        places = [tuple(f"{value:g}" for value in place) for place in losses.index]
+        losses.index = pd.MultiIndex.from_tuples(places, names=losses.index.names)
+        table: str = losses.to_html(float_format="{:.4g}".format)
         several = along.with_figure(self.averages) if len(self.averages.hursts) == 1 else []
         draw = partial(self.plot.loss_along, several[0].name) if several else None
         figure: Any = (draw or self.plot.loss_against_hurst)()

@@ -10,6 +10,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from adhesis.ensemble.campaign.axes import Axis
     from adhesis.ensemble.report.figures.style import PublishedFigure
 
 
@@ -28,19 +29,25 @@ class Plots:
         names = (name for name in vars(type(self)) if not name.startswith("_"))
         return f"<Plots: {', '.join(names)}>"
 
-    def _draw(self, name: str, ax: object) -> Figure:
-        from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
+    def _draw(self, name: str, ax: object, axis: Axis | None = None) -> Figure:
+        """Draw a figure of the cells that are shown, or that of an axis, which has a note itself.
+
+        Each method calls this alone, so that a warning is of the line that calls the method.
+        """
+        from adhesis.ensemble.report.figures import along, loops, loss_figures, shapes_and_spectra
         from adhesis.ensemble.report.figures.style import drawn_into
         from adhesis.ensemble.report.further_axes import below, common
 
         modules = (loops, loss_figures, shapes_and_spectra)
-        draw: Callable[[Aggregate], PublishedFigure] = next(
-            getattr(module, name) for module in modules if hasattr(module, name)
-        )
         with drawn_into(ax):
+            if axis is not None:
+                return along.along(axis)(self._averages()).finish()
+            draw: Callable[[Aggregate], PublishedFigure] = next(
+                getattr(module, name) for module in modules if hasattr(module, name)
+            )
             shown = self._averages().shown
             figure = draw(shown)
-            figure.say_below(below(shown, common(shown)))
+            figure.say_below(below(shown.cells, common(shown)))
             return figure.finish()
 
     def loss_along(self, name: str, ax: object = None) -> Figure:
@@ -51,17 +58,13 @@ class Plots:
         ValueError
             If the campaign has no such axis beside H and γ.
         """
-        from adhesis.ensemble.report.figures.along import along, with_figure
-        from adhesis.ensemble.report.figures.style import drawn_into
+        from adhesis.ensemble.report.figures.along import with_figure
 
-        data = self._averages()
-        axes = {axis.name: axis for axis in with_figure(data)}
+        axes = {axis.name: axis for axis in with_figure(self._averages())}
         if name not in axes:
             known = ", ".join(axes) or "none"
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
-        with drawn_into(ax):
-            figure = along(axes[name])(data)
-            return figure.finish()
+        return self._draw("loss_along", ax, axes[name])
 
     def contact_against_stress(self, ax: object = None) -> Figure:
         """Contact fraction against mean stress, a panel for each H."""

@@ -102,7 +102,7 @@ def _write_files(
         with style():
             figure = item.draw(data if item.whole else data.shown)
             if not item.whole:
-                figure.say_below(below(data, common(data.shown)))
+                figure.say_below(below(data.shown.cells, common(data.shown)))
         save(figure, directory / item.name)
     progress("pages")
     page = write_page(data, sections)

@@ -23,7 +23,9 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.plan import group_of, prior
 from adhesis.ensemble.task.compute import Runner
+from adhesis.ensemble.task.preload import INSTEAD, highest_stress, most_reached
 from adhesis.ensemble.task.row import Row
+from adhesis.solver.checks import counted
 from adhesis.solver.method import PathError
 
 # Loops are tried out for so long (s), one realisation of every cell after the other.
@@ -68,6 +70,10 @@ class Price:
     rank_bytes: int
     pilots: int  # loops that were computed to find out
     pilot_seconds: float  # their CPU time
+    # Pilot loops that turned before their preload, and the highest mean stress that one of these
+    # reached at a load step, in Pa
+    pilots_short: int = 0
+    highest_stress: float = -math.inf
     stop: str = ""  # with ``[stop]``: for how many realisations a cell the price is, and why
 
     def __str__(self) -> str:
@@ -155,6 +161,7 @@ def price(
         prepare(left.of_cells())
     to_try = _to_try(left, known)
     pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
+    short: list[float] = []
     for unit in _units(campaign, to_try):
         if time.monotonic() > end:
             break
@@ -166,6 +173,8 @@ def price(
             except PathError:  # a run records the task as failed; it costs what it took
                 row = {"cpu_time": time.process_time() - begun}
             took = float(row["cpu_time"])
+            if row.get("preload_reached") == 0:
+                short.append(highest_stress(row["loading_mean_stress"]))
             known.add(task.cell, took, float(row.get(campaign.stop.quantity, math.nan)))
             pilots, together = pilots + 1, together + took
             on_pilot(task, took)
@@ -180,6 +189,8 @@ def price(
         rank_bytes=_rank_bytes(),
         pilots=pilots,
         pilot_seconds=spent,
+        pilots_short=len(short),
+        highest_stress=max(short, default=-math.inf),
         stop=stop,
     )
 
@@ -252,8 +263,8 @@ def _cells(
     first = {task.cell: task for task in firsts}
     mean = {cell: float(np.mean(seconds)) for cell, seconds in known.seconds.items() if seconds}
     of_prior = _law([prior(first[cell]) for cell in mean], list(mean.values()))
-    counted = np.bincount(left.cell_of(), minlength=len(tasks.cells))
-    count = dict(zip(first, counted[firsts.cell_of()].tolist(), strict=True))
+    of_cell = np.bincount(left.cell_of(), minlength=len(tasks.cells))
+    count = dict(zip(first, of_cell[firsts.cell_of()].tolist(), strict=True))
     stop = ""
     if campaign.stop.relative_error is not None:
         wanted, stop = _realisations(campaign, known)
@@ -318,6 +329,15 @@ def _rank_bytes() -> int:
     return kibibytes if sys.platform == "darwin" else 1024 * kibibytes
 
 
+def _short(price: Price) -> str:
+    verb = "does" if price.pilots_short == 1 else "do"
+    return (
+        f"WARNING: {price.pilots_short} of {counted(price.pilots, 'pilot loop')} {verb} not reach "
+        f"the preload, and turn{'s' * (verb == 'does')} at the latest turning point: "
+        f"{most_reached(price.highest_stress)}. {INSTEAD}."
+    )
+
+
 def as_text(price: Price) -> str:
     """Return a price as lines for people."""
     tried = (
@@ -330,6 +350,7 @@ def as_text(price: Price) -> str:
         f"{price.left} tasks to do in {len(price.cells)} cells, {price.done} done; "
         "nothing was written",
         *([price.stop] if price.stop else []),
+        *([_short(price)] if price.pilots_short else []),
         f"{price.seconds / 3600:.3g} core hours, by {tried}; "
         f"the longest task takes about {duration(price.longest)}",
         f"results file {price.file_bytes / 1e6:.3g} MB{memory}",

@@ -130,7 +130,7 @@ def test_every_figure_is_drawn_into_axes_that_are_given(results):
     for name in names:
         draw = getattr(results.plot, name)
         alone = draw()
-        mine = Figure()
+        mine = Figure(figsize=(6, 20), layout="constrained")
         given = mine.subplots(len(alone.axes), 1, squeeze=False)
         assert draw(ax=given) is mine
         for panel, own in zip(given[:, 0], alone.axes, strict=True):
@@ -141,7 +141,7 @@ def test_every_figure_is_drawn_into_axes_that_are_given(results):
             ), name
             assert panel.get_xlabel(), name
         assert given[0, 0].get_legend() is not None, name
-        first = Figure().subplots()
+        first = Figure(layout="constrained").subplots()
         draw(ax=first)
         assert len(first.collections) == len(alone.axes[0].collections), name
         assert first.get_xlabel(), name

@@ -101,6 +101,32 @@ def test_a_pilot_loop_without_a_path_costs_what_it_took():
     assert reported.seconds == pytest.approx(others, rel=1e-3)  # it took no time
 
 
+def test_pilot_loops_short_of_their_preload_are_reported():
+    """Before hours are spent on loops that all turn at the latest turning point."""
+
+    def falls_short(campaign, task):
+        reached = float(task.work_of_adhesion == 0.01)
+        stress = np.array([0.0, -3000.0, 1500.0 * task.hurst, np.nan])
+        return compute(campaign, task) | {"preload_reached": reached, "loading_mean_stress": stress}
+
+    text = campaign_text(realisations="1").replace("max_penetration = 0.6", "preload = 5000")
+    campaign = parse_campaign(text)
+    (warning,) = (
+        s for s in as_text(price(campaign, compute=falls_short)).splitlines() if "WARN" in s
+    )
+    assert warning == (
+        "WARNING: 2 of 4 pilot loops do not reach the preload, and turn at the latest turning "
+        "point: at load steps the mean stress is at most 1.2 kPa. Rougher profiles, a stiffer "
+        "material or a smaller preload let loops reach it."
+    )
+
+    def pulls(campaign, task):
+        return falls_short(campaign, task) | {"loading_mean_stress": np.array([0.0, -3000.0])}
+
+    assert "at load steps the mean stress is a tension" in as_text(price(campaign, compute=pulls))
+    assert "preload" not in as_text(price(campaign, compute=compute))
+
+
 def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
     """Time is up after three cells; the prior says how the fourth compares."""
     clock = iter(range(100))

@@ -10,6 +10,7 @@ import re
 import numpy as np
 import pytest
 import xarray
+from matplotlib.figure import Figure
 
 import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
@@ -22,6 +23,7 @@ from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.report.tables.works import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.schema import FAILED
 from adhesis.ensemble.results.status import as_text, read_status
 from tests.support.synthetic_results import campaign, rows, write
 
@@ -266,3 +268,101 @@ def test_spectra_are_of_cells_that_have_fields(tmp_path):
     plot = adhesis.open(write(tmp_path / "r.h5", plan, values)).plot
     (panel,) = plot.spectra_of_branches().axes
     assert "0.01 J/m²" in panel.get_title(loc="left")
+
+
+@pytest.fixture(scope="module")
+def with_failures(tmp_path_factory):
+    """Of 3 loops each, one failed at h_rms = 0.5 µm, all at 1 µm where the ratio is 50."""
+    text = campaign(hurst=(0.8,), gamma=(0.04,), realisations=3, ratio=[50, 100]).text
+    plan = parse_campaign(re.sub(r"h_rms = .*", 'h_rms = ["0.5 um", "1 um"]', text))
+    values = rows(plan)
+    ratio, height = (
+        np.array([dict(t.others)[n] for t in plan.tasks()]) for n in ("ratio", "h_rms")
+    )
+    values["status"][np.flatnonzero((ratio == 50) & (height == 0.5e-6))[0]] = FAILED
+    values["status"][(ratio == 50) & (height == 1e-6)] = FAILED
+    return write(tmp_path_factory.mktemp("failures") / "r.h5", plan, values)
+
+
+def test_a_mean_without_the_loops_that_failed_is_hollow(with_failures):
+    """What is left is what could be computed, which may be another kind of loops."""
+    figure = adhesis.open(with_failures).plot.loss_along("h_rms")
+    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
+    assert [x for line in marks for x in line.get_xdata()] == pytest.approx([0.5], abs=0.01)
+    assert figure.legends[0].get_texts()[-1].get_text() == "loops failed"
+    assert " ".join(figure.get_supxlabel().split()) == (
+        r"missing, as all tasks failed: H = 0.8, $\gamma$ = 0.04 J/m², ratio = 50, "
+        r"$h_\mathrm{rms}$ = 1 µm 1 of 9 loops failed, and are in no mean "
+        "n = 2 to 3 profiles, 95 % interval of the mean"
+    )
+    item = next(i for i in along_axes(aggregate(with_failures)) if i.name == "loss_along_h_rms")
+    assert "(paired)" in item.caption
+    assert "Hollow: means without loops that failed" in item.caption
+    assert "line" not in item.caption.lower()  # two points are not joined
+
+
+def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, monkeypatch):
+    notes = {}
+
+    def note(figure, stem):
+        notes[stem.name] = figure.get_supxlabel()
+        for suffix in (".png", ".pdf"):
+            stem.with_suffix(suffix).write_bytes(b"")
+
+    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", note)
+    write_report(with_failures, tmp_path / "report", io.StringIO())
+    for name in ("fig7_loop_against_penetration", "loss_by_mechanism", "jump_energies"):
+        assert notes[name] == r"ratio = 100, $h_\mathrm{rms}$ = 1 µm"
+    assert "failed" in notes["loss_along_ratio"]
+
+
+def test_a_loss_under_a_weight_says_so_at_its_axis(tmp_path):
+    text = campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=2).text
+    text = text.replace("max_penetration = 0.9", 'control = "load"\nmax_stress = [100, 200]')
+    plan = parse_campaign(text.replace("unloading_until = -2.0\n", ""))
+    plot = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan))).plot
+    labels = [axes.get_ylabel() for axes in plot.loss_along("max_stress").axes]
+    assert [label for label in labels if "mJ" in label] == [
+        "loss\nunder a weight (mJ/m²)",
+        "loss per contact\nunder a weight (mJ/m²)",
+    ]
+    assert "under a weight" in plot.loss_against_hurst().axes[0].get_ylabel()
+
+
+def test_given_axes_have_the_note_the_caps_and_room_for_the_legend(with_failures):
+    results = adhesis.open(with_failures)
+    figure = Figure(layout="constrained")
+    axes = figure.subplots()
+    assert results.plot.loss_along("h_rms", ax=axes) is figure
+    (note,) = axes.texts
+    assert "1 of 9 loops failed, and are in no mean" in note.get_text().splitlines()
+    figure.draw_without_rendering()
+    assert note.get_window_extent().y0 >= 0
+    assert note.get_window_extent().y1 < axes.xaxis.label.get_window_extent().y0
+    legend = axes.get_legend().get_window_extent()
+    for container in axes.containers:
+        _, caps, (bars,) = container.lines
+        assert caps
+        highest = max(end[1] for ends in bars.get_segments() for end in ends)
+        assert axes.transData.transform((0, highest))[1] < legend.y0
+
+
+def test_a_note_that_is_cut_off_is_a_warning(with_failures):
+    axes = Figure().subplots()  # leaves no room below the label of the axis
+    plot = adhesis.open(with_failures).plot
+    about = r"below the axes: .*1 of 9 loops failed, and are in no"
+    with pytest.warns(UserWarning, match=about) as caught:
+        plot.loss_along("h_rms", ax=axes)
+    with pytest.warns(UserWarning, match="ratio = 100") as more:
+        plot.loss_against_hurst(ax=Figure(figsize=(3, 2)).subplots())
+    assert {warning.filename for warning in (*caught, *more)} == {__file__}
+
+
+def test_a_notebook_tells_small_values_of_an_axis_apart(tmp_path):
+    text = campaign(hurst=(0.8,), gamma=(0.04,), realisations=2).text
+    plan = parse_campaign(re.sub(r"h_rms = .*", 'h_rms = ["1 um", "1.4 um"]', text))
+    results = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan)))
+    page = results._repr_html_()
+    assert ">1e-06</th>" in page
+    assert ">1.4e-06</th>" in page
+    assert results.losses.index.get_level_values("h_rms").tolist() == [1e-6, 1.4e-6]

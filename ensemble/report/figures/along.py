@@ -11,18 +11,21 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.figures.loss_figures import errorbar, short_handle, short_of
+from adhesis.ensemble.report.figures.loss_figures import (
+    errorbar,
+    hollow_handle,
+    hollow_of,
+    loss_label,
+)
 from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, symbols, together
 
 _MOST_TICKS = 5
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
-_LOSS = ("loss", "loss (mJ/m²)", 1e-3)
 _OF_TURNING_POINT = (
     ("pull_off_stress", "largest tension (kPa)", 1e3),
     ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0),
     ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0),
-    ("loss_per_contact", "loss per contact (mJ/m²)", 1e-3),
 )
 
 
@@ -49,12 +52,16 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     """
     moving = together(data, axis)
     second = next((other for other in data.further if other.name not in moving), None)
-    fixed, lines = _lines(data, axis, second)
+    fixed, every = _lines(data, axis, second)
+    lines = {at: done for at, cells in every.items() if (done := [c for c in cells if c.done])}
     titles = list(dict.fromkeys(title for title, _ in lines))
     titles = [titles[round(k)] for k in style.spread_out(range(len(titles)), style.MOST_PANELS)]
     labels = list(dict.fromkeys(label for _, label in lines))
     labels = [labels[round(k)] for k in style.spread_out(range(len(labels)), style.MOST_CURVES)]
-    rows = [_LOSS, *(_OF_TURNING_POINT if axis.name in TURNING_POINTS else ())]
+    rows = [("loss", loss_label(data), 1e-3)]
+    if axis.name in TURNING_POINTS:
+        per_contact = ("loss_per_contact", loss_label(data, "loss per contact"), 1e-3)
+        rows += [*_OF_TURNING_POINT, per_contact]
     width = style.ONE_COLUMN if len(titles) == 1 else style.TWO_COLUMNS
     height = (22 + 40 * len(rows)) * style.MM
     figure = style.new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
@@ -74,7 +81,7 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
                 x /= axis_unit
                 found = [cell.estimates[name] for cell in line]
                 above = name != "pull_off_penetration"
-                hollow = short_of(line)
+                hollow = hollow_of(line)
                 errorbar(axes, x, found, k, of_line, unit=unit, from_zero=above, hollow=hollow)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
@@ -91,13 +98,26 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
             axes.set_xscale("log")
         elif len(ticks) <= _MOST_TICKS:
             axes.set_xticks(ticks)
+    # Beside what is drawn, cells without finished tasks; not what is left out for the eye's sake.
+    drawn = [
+        cell
+        for (title, label), cells in every.items()
+        if (title in titles and label in labels) or (title, label) not in lines
+        for cell in cells
+    ]
     handles, texts = grid[0][0].get_legend_handles_labels()
     if any(texts):
-        drawn = [cell for line in lines.values() for cell in line]
-        handles = [*handles, *short_handle(drawn)]
-        figure.legend_above(handles, 3 if second is None else 2)
-    figure.say_below(below(data, fixed))
+        figure.legend_above([*handles, *hollow_handle(drawn)], 3 if second is None else 2)
+    figure.say_below("\n".join(filter(None, (below(drawn, fixed), _sample(drawn)))))
     return figure
+
+
+def _sample(cells: list[Cell]) -> str:
+    """Return the number of profiles that means are over, and what their bars are."""
+    counts = sorted({cell.done for cell in cells if cell.done})
+    many = " to ".join(dict.fromkeys((f"{counts[0]}", f"{counts[-1]}")))
+    interval = ", 95 % interval of the mean" if counts[-1] > 1 else ""
+    return f"n = {many} {'profiles' if counts[-1] > 1 else 'profile'}{interval}"
 
 
 def _lines(
@@ -105,6 +125,7 @@ def _lines(
 ) -> tuple[list[tuple[str, float]], dict[tuple[str, str], list[Cell]]]:
     """Return the values that all lines share, and the cells by title of a panel and label.
 
+    The cells of a line ascend along the axis, and may have no finished task.
     Further axes beside these two are at one place, that of :attr:`Aggregate.shown`.
     """
     moving = together(data, axis)
@@ -114,15 +135,14 @@ def _lines(
         return [other for other in cell.others if other[0] not in moving | names]
 
     wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
-    lines = {}
-    for line in lines_along(data, axis):
-        cell = line[0]
+    lines: dict[tuple[str, str], list[Cell]] = {}
+    for cell in sorted(data.cells, key=lambda cell: dict(cell.others)[axis.name]):
         if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
             continue
         title, label = f"H = {cell.hurst:g}", style.gamma_label(cell.work_of_adhesion)
         if second is not None:
             value = dict(cell.others)[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])
-        lines[title, label] = line
+        lines.setdefault((title, label), []).append(cell)
     every = list(wanted.values())
     return [other for other in every[0] if all(other in one for one in every)], lines

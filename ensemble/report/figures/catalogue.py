@@ -11,6 +11,7 @@ from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.along import along, with_figure
+from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.selection import beside_paper, has_fields
 from adhesis.ensemble.report.figures.style import PublishedFigure
 from adhesis.ensemble.report.further_axes import together
@@ -212,18 +213,25 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
 
 def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
     with_it = together(data, axis) - {axis.name}
-    caption = "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
-    caption += "little."
+    further = {other.name for other in data.further} - {*with_it, axis.name}
+    caption = (
+        "Means with 95 % intervals. The profiles have the same phases in every cell (paired): "
+        "differences between cells are as a rule known better than overlapping bars suggest."
+    )
+    if further or len(data.works_of_adhesion) > 1:
+        of_each = "each value of the other axis" if further else "each γ"
+        caption += f" Marks of one look belong to {of_each}, and are moved aside a little."
+    if len(axis.values) >= FEWEST_FOR_A_LINE:
+        caption += " Lines join them to guide the eye."
+    if hollow_handle(data.cells):
+        caption += " Hollow: means without loops that failed, or with loops short of their preload."
     if axis.name in TURNING_POINTS:
         caption += " Contact: the largest of the loop; loss per contact: over that largest area."
     if axis.name == "max_penetration":
         caption += " Crosses: mean contact at the turning point."
     if with_it:
         caption += f" With it {', '.join(sorted(with_it))} varies."
-    if {other.name for other in data.further} - {*with_it, axis.name}:
-        caption += (
-            " All cells of two axes: a line for each value of the other one; more axes: as written "
-            "below the panels."
-        )
+    if len(further) > 1:
+        caption += " Further axes beside these two stand at one value, as written below the panels."
     name, title = f"loss_along_{axis.name}", f"Loss against {axis.name}"
     return Illustration(name, title, caption, along(axis), whole=True)

@@ -18,6 +18,7 @@ from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.style import (
+    CAP,
     LINES,
     MM,
     MOST_CURVES,
@@ -45,7 +46,7 @@ _MOST_BARS = 9  # in one column, so that their labels do not touch
 _MOST_BESIDE = 3  # panels beside each other in one column
 _MOST_TICKS = 4
 # Fewer points are not joined by a line: it would claim a course between them.
-_FEWEST_FOR_A_LINE = 5
+FEWEST_FOR_A_LINE = 5
 _STAR: Any = {
     "linestyle": "none",
     "marker": "*",
@@ -59,7 +60,14 @@ def loss_quantity(data: Aggregate) -> tuple[str, str, float]:
     """Return name, label and unit of the loss in figures: W~ where it is set beside the paper's."""
     if paper.are_its_cells(data.cells):
         return "loss_dimensionless", r"loss $\tilde W$", 1.0
-    return "loss", "loss (mJ/m²)", 1e-3
+    return "loss", loss_label(data), 1e-3
+
+
+def loss_label(data: Aggregate, what: str = "loss") -> str:
+    """Return the label of a loss in mJ/m², which says so if it is one under a weight."""
+    return (
+        f"{what}\nunder a weight (mJ/m²)" if data.campaign.cycle.under_load else f"{what} (mJ/m²)"
+    )
 
 
 def loss_against_hurst(data: Aggregate) -> PublishedFigure:
@@ -75,7 +83,7 @@ def loss_against_hurst(data: Aggregate) -> PublishedFigure:
         cells = _of_gamma(data, gamma)
         x = np.array([cell.hurst for cell in cells])
         found = [cell.estimates[name] for cell in cells]
-        errorbar(axes, x, found, k, "_", unit=unit, hollow=short_of(cells))
+        errorbar(axes, x, found, k, "_", unit=unit, hollow=hollow_of(cells))
         _stars(axes, [(cell.hurst + aside, papers_loss(cell), colour(k)) for cell in cells])
         label_panel(axes, gamma_label(gamma))
     for axes in figure.panels[len(shown) :]:
@@ -87,7 +95,7 @@ def loss_against_hurst(data: Aggregate) -> PublishedFigure:
             axes.set_xticks(hursts)
         axes.set_xlim(min(hursts) - 2.5 * aside, max(hursts) + 2.5 * aside)
     mean = key("mean and 95 % interval", color="0.3", marker="o", linestyle="none")
-    figure.legend_above([mean, *_star_handle(data), *short_handle(data.cells)], 2)
+    figure.legend_above([mean, *_star_handle(data), *hollow_handle(data.cells)], 2)
     return figure
 
 
@@ -101,13 +109,13 @@ def loss_against_slope(data: Aggregate) -> PublishedFigure:
             cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
             found = [cell.estimates[name] for cell in cells]
-            errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit, hollow=short_of(cells))
+            errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit, hollow=hollow_of(cells))
             _stars(axes, [(paper.m2(c.hurst), papers_loss(c), colour(k)) for c in cells])
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
         label_panel(axes, gamma_label(gamma))
     figure.label("mean square slope $m_2$", label)
     handles = [key(f"H = {h:g}", ls="none", **look(k)) for k, h in enumerate(hursts)]
-    figure.legend_above([*handles, *_star_handle(data), *short_handle(data.cells)], 4)
+    figure.legend_above([*handles, *_star_handle(data), *hollow_handle(data.cells)], 4)
     return figure
 
 
@@ -214,7 +222,13 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
         mean, low, bars = _in_unit(found, 1e-3)
         edge: Any = {"edgecolor": "black", "linewidth": 0.5}
         axes.bar(place, mean, bottom=bottom, color=face, hatch=hatch, label=label, **edge)
-        line: Any = {"fmt": "none", "ecolor": "black", "elinewidth": 0.8, "label": "_"}
+        line: Any = {
+            "fmt": "none",
+            "ecolor": "black",
+            "elinewidth": 0.8,
+            "label": "_",
+            "capsize": CAP,
+        }
         axes.errorbar(place + aside, bottom + mean, yerr=bars, **line)
         mark_below_zero(axes, (place + aside)[bottom + low < 0], "black")
         bottom = bottom + mean
@@ -227,7 +241,8 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
     unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     texts = [f"{cell.hurst:g}\n{cell.work_of_adhesion / size:g}" for cell in cells]
     axes.set_xticks(place, texts)
-    figure.label(rf"$H$ (upper line), $\gamma$ in {unit} (lower line)", "sum of drops (mJ/m²)")
+    drops = loss_label(data, "sum of drops")
+    figure.label(rf"$H$ (upper line), $\gamma$ in {unit} (lower line)", drops)
     axes.set_ylim(0, 1.12 * float(reach.max(initial=0)) or 1)
     middle, half = (len(cells) - 1) / 2, max(len(cells), _FEWEST_BARS) / 2
     axes.set_xlim(middle - half, middle + half)
@@ -287,11 +302,11 @@ def pull_off(data: Aggregate) -> PublishedFigure:
         found = [cell.estimates["pull_off_stress"] for cell in cells]
         # apart, so that intervals can be distinguished
         offset = (k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion) / size
-        hollow = short_of(cells)
+        hollow = hollow_of(cells)
         errorbar(axes, x, found, k, f"H = {hurst:g}", offset=offset, unit=1e3, hollow=hollow)
     figure.label(rf"work of adhesion $\gamma$ ({unit})", "largest tension (kPa)")
     axes.set_ylim(bottom=0)
-    handles = [*axes.get_legend_handles_labels()[0], *short_handle(data.cells)]
+    handles = [*axes.get_legend_handles_labels()[0], *hollow_handle(data.cells)]
     figure.legend_above(handles, 3)
     _second_scale(axes, data)
     return figure
@@ -336,12 +351,12 @@ def errorbar(
 ) -> None:
     """Draw means with their intervals, in multiples of a unit; joined if they are many.
 
-    Where the panel begins at 0, a mark there shows which intervals go on below. Marks of cells that
-    are short of their preload are hollow.
+    Where the panel begins at 0, a mark there shows which intervals go on below. Marks of
+    :func:`hollow_of` are hollow.
     """
     mean, low, bars = _in_unit(found, unit)
-    line = LINES[k] if x.size >= _FEWEST_FOR_A_LINE else "none"
-    axes.errorbar(x + offset, mean, yerr=bars, linestyle=line, label=label, **look(k))
+    line = LINES[k] if x.size >= FEWEST_FOR_A_LINE else "none"
+    axes.errorbar(x + offset, mean, yerr=bars, linestyle=line, label=label, capsize=CAP, **look(k))
     if any(hollow):
         place = np.flatnonzero(hollow)
         options = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5, "label": "_"}
@@ -359,17 +374,21 @@ def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
     return mean, low, np.nan_to_num(np.array([mean - low, high - mean]))
 
 
-def short_of(cells: Sequence[Cell]) -> list[bool]:
-    """Return whether loops of each cell turned before their preload, for :func:`errorbar`."""
-    return [loops_short_of_preload(cell) > 0 for cell in cells]
+def hollow_of(cells: Sequence[Cell]) -> list[bool]:
+    """Return whether loops of each cell failed or were short of their preload."""
+    return [cell.failed > 0 or loops_short_of_preload(cell) > 0 for cell in cells]
 
 
-def short_handle(cells: Sequence[Cell]) -> list[Line2D]:
+def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:
     """Return the entry of hollow marks in a legend, if there are any."""
-    if not any(short_of(cells)):
-        return []
-    look_of_mark: dict[str, Any] = {"color": "0.3", "marker": "o", "markerfacecolor": "white"}
-    return [Line2D([], [], linestyle="none", label="loops short of the preload", **look_of_mark)]
+    drawn = [cell for cell in cells if cell.done]
+    reasons = {
+        "failed": any(cell.failed for cell in drawn),
+        "short of the preload": any(loops_short_of_preload(cell) for cell in drawn),
+    }
+    label = " or ".join(reason for reason, holds in reasons.items() if holds)
+    look_of_mark: Any = {"color": "0.3", "marker": "o", "markerfacecolor": "white"}
+    return [key(f"loops {label}", linestyle="none", **look_of_mark)] if label else []
 
 
 def mark_below_zero(axes: Axes, x: np.ndarray, colour: str) -> None:

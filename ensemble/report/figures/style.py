@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import textwrap
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
@@ -21,7 +22,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
 from matplotlib.ticker import NullFormatter
 
 from adhesis.ensemble.aggregate.average import Aggregate
@@ -31,6 +34,8 @@ from adhesis.solver.checks import counted, shown
 STYLE = Path(__file__).parent / "adhesis.mplstyle"
 
 MM = 1 / 25.4  # inches
+_MOST_COLUMNS_INSIDE = 2  # of a legend in a panel that is given
+CAP = 2  # half of the width of an error bar's cap in points, also in axes that are given
 _DPI_OF_NOTEBOOK = 110
 _SMALL = 6  # points, and the mean width of a sign of that size in inches
 _WIDTH_OF_SIGN = 0.58 * _SMALL / 72
@@ -134,6 +139,8 @@ class PublishedFigure(Figure):
 
     given: tuple[Axes, ...] = ()  # those of :func:`drawn_into`, in place of its first panels
     columns = 1
+    inside: Legend | None = None  # at the top of the first panel given
+    note: Annotation | None = None  # below the last panel given
 
     @property
     def panels(self) -> list[Axes]:
@@ -155,25 +162,51 @@ class PublishedFigure(Figure):
                 axes.set_ylabel(text)
 
     def legend_above(self, handles: Sequence[Any], columns: int) -> None:
-        """Put the legend above the panels, where it hides no data; or into the first one given."""
+        """Put the legend above the panels, where it hides no data.
+
+        In the first panel given, whose surroundings are not the figure's own, :meth:`finish` makes
+        room for it.
+        """
         if self.given:
-            self.given[0].legend(handles=handles)
+            narrow = min(columns, _MOST_COLUMNS_INSIDE)
+            self.inside = self.given[0].legend(handles=handles, loc="upper center", ncols=narrow)
         else:
             self.legend(handles=handles, loc="outside upper center", ncols=columns)
 
     def say_below(self, text: str) -> None:
-        """Write below the panels what they have in common; nothing below axes that are given."""
-        if text and not self.given:
-            width = int(self.get_figwidth() / _WIDTH_OF_SIGN)
-            self.supxlabel(textwrap.fill(text, width), fontsize=_SMALL, x=0.99, ha="right")
+        """Write lines below the panels, or below the last one given."""
+        if not text:
+            return
+        if not self.given:
+            lines = _wrapped(text, self.get_figwidth())
+            self.supxlabel(lines, fontsize=_SMALL, x=0.99, ha="right")
+            return
+        axes = self.given[-1]
+        box = axes.get_window_extent()
+        below: Any = {"xycoords": ("axes fraction", axes.xaxis.label), "va": "top", "ha": "right"}
+        below |= {"textcoords": "offset points", "fontsize": _SMALL}
+        lines = _wrapped(text, box.width / axes.figure.dpi)
+        self.note = axes.annotate(lines, (1, 0), (0, -3), **below)
 
     def finish(self) -> Figure:
-        """Lay it out, and return the figure that was drawn into: this one, or that of the axes."""
+        """Lay it out, and return the figure that was drawn into: this one, or that of the axes.
+
+        A note that the layout of a given figure cuts off is a warning.
+        """
         if not self.given:
             self.canvas.draw()  # the layout is found with the style's own sizes
             return self
         found = self.given[0].get_figure(root=True)
         assert found is not None
+        found.draw_without_rendering()  # the layout decides how high axes and legend are
+        if self.inside is not None:
+            _make_room(self.given[0], self.inside)
+        if self.note is not None and self.note.get_window_extent().y0 < 0:
+            warnings.warn(
+                'a figure with layout="constrained" has room for the note below the axes: '
+                + "; ".join(self.note.get_text().splitlines()),
+                stacklevel=4,  # the line that calls a method of Plots
+            )
         return found
 
     def _repr_png_(self) -> bytes:
@@ -186,6 +219,23 @@ class PublishedFigure(Figure):
         """Save as :meth:`matplotlib.figure.Figure.savefig` does."""
         with mpl.rc_context({"pdf.fonttype": 42, "ps.fonttype": 42}):
             super().savefig(*args, **options)
+
+
+def _wrapped(text: str, width: float) -> str:
+    """Break small lines of text to a width in inches."""
+    signs = max(1, int(width / _WIDTH_OF_SIGN))
+    return "\n".join(textwrap.fill(line, signs) for line in text.splitlines())
+
+
+def _make_room(axes: Axes, legend: Legend) -> None:
+    """Raise the upper end of the y axis by the height of a legend that stands at the top."""
+    box = axes.get_window_extent()
+    share = (box.y1 - legend.get_window_extent().y0) / box.height
+    if share < 1:  # else the legend alone fills the panel
+        scale = axes.yaxis.get_transform()
+        low, high = scale.transform(axes.get_ylim())
+        top = scale.inverted().transform([low + (high - low) / (1 - share)])
+        axes.set_ylim(top=float(top[0]))
 
 
 def new_figure(
