@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.ensemble.bench.measure import Measured, Measurement, Run, measure
-from adhesis.ensemble.bench.scenes import FULL, GROWTH, WARM_UP, Scene
+from adhesis.ensemble.bench.scenes import FULL, GROWTH, Scene
 from adhesis.ensemble.bench.tamaas import has_tamaas
 
 # Doubling the nodes multiplies the time of a grid run by up to this factor.
@@ -101,7 +101,6 @@ def benchmark(
     one before it, is left out. Both give lines with a note.
     """
     lines: list[Line] = []
-    _fill_caches()
     for scene in scenes:
         reference = _reference(scene, seconds)
         for run in _runs(scene, seconds):
@@ -117,7 +116,6 @@ def growth(*, seconds: float = 360.0, on_line: Callable[[Line], None] | None = N
     """Measure the growth of cost; these lines have no reference and no error."""
     unknown = Reference(math.nan, "none")
     lines: list[Line] = []
-    _fill_caches()
     for scene in GROWTH:
         for run in sorted(_runs(scene, seconds), key=lambda run: run.method == "grid"):
             lines.append(Line(run, unknown, measure(run)))
@@ -235,11 +233,6 @@ def _left_out(run: Run, before: Sequence[Line]) -> Measurement | None:
     if last * _COST_OF_DOUBLING <= run.seconds:
         return None
     return Measurement(note=f"left out: it would take more than {run.seconds:g} s")
-
-
-def _fill_caches() -> None:
-    """Fill the cache of compiled code: a compiler in the process would count as its memory."""
-    measure(Run(WARM_UP, "sharp", 1e-2, WARM_UP.load_steps, 60.0))
 
 
 def _reference(scene: Scene, seconds: float) -> Reference:

@@ -1,6 +1,6 @@
 """Measure one loop in a process of its own: ``python -m adhesis.ensemble.bench.measure``.
 
-Peak memory belongs to a process, not to a call, and compiled code is loaded at its first use. So
+Peak memory belongs to a process, not to a call, and libraries are loaded at their first use. So
 every measured loop has a fresh process: it reads a :class:`Run` as JSON from its argument, runs a
 small loop first, and prints a :class:`Measurement` as JSON.
 """
@@ -63,7 +63,7 @@ class Measurement:
 
     cpu_seconds: float = float("nan")  # time from the problem to the finished loop
     # megabytes, megabytes_before: largest resident memory of the process, and the same before the
-    # loop: interpreter, libraries, compiled code
+    # loop: interpreter, libraries
     megabytes: float = float("nan")
     megabytes_before: float = float("nan")
     loss: float = float("nan")  # loop integral in J/m² of nominal area

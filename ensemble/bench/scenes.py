@@ -162,8 +162,7 @@ GROWTH = tuple(
 )
 """Scenes for the growth of cost with the number of patches (small γ) and of wave numbers."""
 
-# Has touch, jumps, merging and vanishing in well below a second, so that a method compiles all
-# code.
+# Has touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
 WARM_UP = Scene(
     name="warm-up",
     title="warm-up",

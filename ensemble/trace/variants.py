@@ -103,13 +103,8 @@ def make_plan(
         )
         seconds[run.name] = expected_seconds(job)
     base = profiles[repr([])]
-    # The cheapest loop is first and alone, as it compiles; then the longest ones, for balance.
-    first = min(runs, key=lambda run: seconds[run.name])
-    order = sorted(runs, key=lambda run: (run is not first, -seconds[run.name]))
-    wall = max(
-        seconds[first.name] + (sum(seconds.values()) - seconds[first.name]) / max(processes, 1),
-        max(seconds.values()),
-    )
+    order = sorted(runs, key=lambda run: -seconds[run.name])  # the longest first, for balance
+    wall = max(sum(seconds.values()) / max(processes, 1), max(seconds.values()))
     plan = Plan(
         runs=tuple(runs),
         jobs=tuple(jobs[run.name] for run in order),
