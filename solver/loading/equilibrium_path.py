@@ -219,6 +219,15 @@ class EquilibriumPath(ByValue, ResultViews):
         """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
 
+    def work_of_displacement(self, states: slice) -> float:
+        """Compute ∫ p̄ du_tot over some states, in J/m² of nominal area; Δ is u_tot for a load."""
+        return self.problem.control.work_of_displacement(
+            self.work_along(states),
+            self.separation[states],
+            self.mean_stress[states],
+            self.problem.profile.h_max,
+        )
+
     def work_along(self, states: slice) -> float:
         """Compute -∫ Y dx over some states anew, in J/m² of nominal area."""
         control, h_max = self.problem.control, self.problem.profile.h_max

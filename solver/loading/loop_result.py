@@ -65,7 +65,7 @@ class LoopResult(EquilibriumPath):
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
     work_gained, work_spent : float
         Work that is gained on loading and spent on unloading, in J/m² of nominal area: ∓∫ p̄ du_tot
-        along the branch. Their difference is the loss.
+        along the branch, jumps included; under a load u_tot is Δ. Their difference is the loss.
 
     References
     ----------
@@ -449,7 +449,11 @@ def result_of(
             "resolve it"
         )
     turn = record.branches.index("unloading")  # the turning point's state stands in both branches
-    gained = -record.slice(0, turn).work(problem)
+    loading = slice(turn)
+    gained = -problem.control.work_of_displacement(
+        record.slice(0, turn).work(problem),
+        *(fields["separation"][loading], fields["mean_stress"][loading], problem.profile.h_max),
+    )
     max_penetration = turning_point
     if not problem.control.is_fixed:
         max_penetration = float(fields["penetration"][turn])
