@@ -114,7 +114,9 @@ def table_of_runs(answer: Answer) -> Any:
 
     from adhesis.ensemble.trace.answer import run_rows
 
-    hidden = ("range_warnings", "preload_warnings", "failed")
+    hidden = (
+        *("range_warnings", "preload_warnings", "fall_warnings", "strain_warnings", "failed"),
+    )
     rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
     return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
 

@@ -192,6 +192,7 @@ class LoopResult(EquilibriumPath):
     def warnings(self) -> tuple[str, ...]:
         """Reasons to doubt the loss, one sentence each; none for most loops."""
         found = self.preload_warnings
+        found += self.fall_warnings()
         slope = float(np.sqrt(self.problem.profile.m2))
         if slope > STEEP:
             found.append(

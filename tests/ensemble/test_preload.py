@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -16,6 +17,7 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings
+from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
@@ -76,7 +78,11 @@ def test_the_loss_of_a_weight_says_so(tmp_path, capsys):
     (line,) = (line for line in text.splitlines() if line.startswith("loss"))
     assert document["loss_note"] in line
     assert document["loss_note"].startswith("under a weight; it falls off at ")
-    assert document["loss_note"].endswith("the energy of the fall is not counted")
+    *before, last = (jump["energy_drop"] for jump in document["jumps"])
+    assert document["loss_note"].endswith(
+        f": drops before the fall {1e3 * sum(before):.3g} mJ/m², closed at the separation of the "
+        f"fall {1e3 * (sum(before) + last):.3g} mJ/m²"
+    )
     machine, text, _ = run(tmp_path, capsys, "--preload", "500")
     assert machine["loss_note"] == ""
     assert machine["loss"] > document["loss"]
@@ -285,10 +291,36 @@ def test_a_campaign_under_a_weight_says_so_in_its_status_and_report(tmp_path, ca
     assert main(["run", str(file), "--out", str(out)]) == 0
     capsys.readouterr()
     assert main(["status", str(out)]) == 0
-    assert "under a weight: it falls off, the energy of the fall" in capsys.readouterr().out
-    outcome = findings.verdict(aggregate(out))[0]
+    assert "under a weight: closed at the separation of its fall" in capsys.readouterr().out
+    data = aggregate(out)
+    outcome = findings.verdict(data)[0]
     assert "under a weight, which falls off at " in outcome
-    assert "(the energy of the fall is not counted)" in outcome
+    assert "(the loop is closed at the separation of the fall)" in outcome
+
+
+def test_shares_of_a_campaign_under_a_weight_are_of_the_drops_before_the_fall(tmp_path):
+    """Of profiles that are nearly in full contact when the weight tears them off."""
+    file, out = tmp_path / "c.toml", tmp_path / "c.h5"
+    changes = {"realisations": "2", "ratio": "6", "work_of_adhesion": "[0.014]"}
+    file.write_text(text_of('control = "load"\nmax_stress = 200', **changes))
+    assert main(["run", str(file), "--out", str(out)]) == 0
+    with h5py.File(out) as results:
+        drops, after = results["jump_energy_drop"][:], results["jump_patches_after"][:]
+        last = drops[after == 0]
+        assert (last < 0).all()
+        before = np.where(after > 0, drops, 0).sum(axis=1)
+        scales = results["loss_small_scale"][:] + results["loss_large_scale"][:]
+        np.testing.assert_allclose(scales, before, rtol=1e-12)
+        np.testing.assert_allclose(results["loss_from_drops"][:], before + last, rtol=1e-9)
+    data = aggregate(out)
+    (cell,) = data.cells
+    assert ((cell.values["small_scale_share"] >= 0) & (cell.values["small_scale_share"] <= 1)).all()
+    table = mechanism_tables.jumps(data)
+    share = table.columns.index(next(c for c in table.columns if c.name == "share_of_drops"))
+    shares = [row[share] for row in table.rows]
+    assert min(shares) >= 0
+    assert sum(shares) == pytest.approx(1)
+    assert data.jumps.histogram.sum() == (after > 0).sum()
 
 
 def test_preloads_of_a_campaign_do_not_become_more():
