@@ -158,7 +158,7 @@ def _footnote(data: Aggregate) -> str:
         f"± steps: {steps}",
     ]
     if data.campaign.cycle.under_load:
-        parts.append("under a weight: closed at the separation of the fall, whose drop may be negative")
+        parts.append("under a weight: closed at the separation of its fall")
     if short_of_preload(data):
         parts.append("short: loops that turned before their preload was reached")
     if any(cell.work_of_adhesion > 0 for cell in data.cells):

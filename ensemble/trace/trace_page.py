@@ -22,6 +22,7 @@ from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.equilibrium_path import friction_text
+from adhesis.solver.model.problem import sticking_text
 
 
 def summary(answer: Answer) -> str:
@@ -93,7 +94,10 @@ def _scope(answer: Answer) -> str:
         if largest > 0
         else "the mean stress is a tension on the whole loop"
     )
-    return f"one period of parallel grooves, {length_text(answer.main['period'])} wide; {pressed}"
+    wide = length_text(answer.main["period"])
+    sticks = sticking_text(answer.main["full_contact_energy"], answer.main["work_of_adhesion"])
+    clauses = (f"one period of parallel grooves, {wide} wide", pressed, sticks)
+    return "; ".join(clause for clause in clauses if clause)
 
 
 def _range(answer: Answer) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.checks import choice, counted, real, reals
+from adhesis.solver.checks import STRESS, choice, counted, real, reals
 from adhesis.solver.loading.equilibrium_path import (
     EquilibriumPath,
     path_fields,
@@ -264,6 +264,7 @@ class LoopResult(EquilibriumPath):
                 f"{self._opening_text}"
                 f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",
+                *(f"contact    {text}" for text in (self.problem.sticking_note,) if text),
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²"
@@ -383,7 +384,7 @@ class LoopResult(EquilibriumPath):
         >>> round(state.mean_stress, 3), state.fields().gap.shape
         (100.0, (32,))
         """
-        stress, chosen = real("stress", stress), self.states(branch)
+        stress, chosen = real("stress", stress, STRESS), self.states(branch)
         if self.new_method is None or not self.contact_states:
             raise ValueError(
                 "this loop holds no contact states: it was loaded from a file; run it again, or "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -16,9 +17,11 @@ from adhesis import Control, HalfSpace, prepare_trace, read_trace, run_loop
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.command.trace import _Progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
+from adhesis.ensemble.trace.loops import Loops
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 
@@ -87,6 +90,31 @@ def test_the_loss_of_a_weight_says_so(tmp_path, capsys):
     assert machine["loss_note"] == ""
     assert machine["loss"] > document["loss"]
     assert "under a weight" not in text
+
+
+def test_the_way_under_a_weight_has_a_unit(monkeypatch, tmp_path, capsys):
+    words = ["--stiffness", "0", "--max-stress", "500", "--json", str(tmp_path / "loop.json")]
+    assert main([word for word in [*SCENE, *words] if word != "--quiet"]) == 0
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert re.search(r"unloading step +-\d+  p̄ -[\d.]+ k?Pa  A/A0", last)
+    monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
+    loops = Loops((), 1)
+    plan = SimpleNamespace(runs=(), seconds={"answer": 2.0})
+    text = _Progress(plan, True)._text(loops, False)
+    assert "running answer (unloading, p̄ -34 kPa);" in text
+    text = _Progress(plan, False)._text(loops, False)
+    assert "(unloading, Δ/h_max -3.4e+04)" in text
+
+
+def test_a_surface_that_is_flat_enough_to_stick_says_so(tmp_path, capsys):
+    words = ("--h-rms", "0.2um", "--preload", "0.5kPa")
+    document, text, _ = run(tmp_path, capsys, *words)
+    full = document["full_contact_energy"]
+    assert full < document["work_of_adhesion"]
+    (line,) = (line for line in text.splitlines() if line.startswith("contact"))
+    assert f"flat enough to stick: full contact costs {1e3 * full:.3g} mJ/m² of γ = 5 mJ/m²" in line
+    _, text, _ = run(tmp_path, capsys, "--preload", "0.5kPa")
+    assert "stick" not in text
 
 
 def test_a_mean_stress_that_the_loop_does_not_have_is_refused(tmp_path, monkeypatch, capsys):

@@ -213,6 +213,7 @@ def test_a_state_at_a_mean_stress_has_the_contact_and_the_gap_of_the_closed_form
     a, penetration = johnson(wanted)
     for branch in ("loading", "unloading"):
         state = loop.at_stress(wanted, branch)
+        assert state.separation == state.state.separation
         assert state.branch == branch
         assert not state.after_jump
         assert state.mean_stress == pytest.approx(wanted, rel=1e-8)
@@ -236,6 +237,8 @@ def test_a_mean_stress_that_a_branch_does_not_have_is_refused(tmp_path):
         loop.at_stress(600.0, "loading")
     with pytest.raises(ValueError, match="stress is nan"):
         loop.at_stress(np.nan)
+    with pytest.raises(TypeError, match="stress is '10 kPa': it must be a finite number, in Pa"):
+        loop.at_stress("10 kPa")
     loop.save(tmp_path / "loop.nc")
     again = load(tmp_path / "loop.nc")
     assert again == loop
