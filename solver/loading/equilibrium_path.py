@@ -34,6 +34,8 @@ PathOrLoop = TypeVar("PathOrLoop", bound="EquilibriumPath")
 
 # Share of the loss below which a negative closing drop changes nothing that is read off.
 _FALL_SHARE = 0.01
+# Largest A/A0 from which on harder pressing can add a hundredth of the area at most.
+_NEARLY_FULL = 0.99
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
 
@@ -149,6 +151,14 @@ class EquilibriumPath(ByValue, ResultViews):
     def largest_contact_fraction(self) -> float:
         """Largest A/A0 on the path."""
         return float(self.contact_fraction.max())
+
+    @property
+    def sticking_note(self) -> str:
+        """Return a clause where adhesion makes the contact nearly full; else empty."""
+        problem = self.problem
+        return sticking_text(
+            problem.full_contact_energy, problem.work_of_adhesion, self.largest_contact_fraction
+        )
 
     @property
     def largest_interior_tension(self) -> float:
@@ -380,6 +390,18 @@ def friction_text(work_of_adhesion_open: float, lost: float, friction: float) ->
     return (
         f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²; "
         f"{lost - friction:.6g} J/m² lost by instability"
+    )
+
+
+def sticking_text(
+    full_contact_energy: float, work_of_adhesion: float, contact_fraction: float
+) -> str:
+    """Return a clause where adhesion makes the largest contact nearly full; energies in J/m²."""
+    if full_contact_energy >= work_of_adhesion or contact_fraction < _NEARLY_FULL:
+        return ""
+    return (
+        f"flat enough to stick: full contact costs {1e3 * full_contact_energy:.3g} mJ/m² of γ = "
+        f"{1e3 * work_of_adhesion:.3g} mJ/m²; pressing harder hardly changes the loss"
     )
 
 

@@ -264,7 +264,7 @@ class LoopResult(EquilibriumPath):
                 f"{self._opening_text}"
                 f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",
-                *(f"contact    {text}" for text in (self.problem.sticking_note,) if text),
+                *(f"sticking   {text}" for text in (self.sticking_note,) if text),
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²"

@@ -54,17 +54,6 @@ def check_slope(rms_slope: float) -> None:
         raise ValueError(f"rms slope is {shown}: it must be {RMS_SLOPE.text}")
 
 
-def sticking_text(full_contact_energy: float, work_of_adhesion: float) -> str:
-    """Return a clause where full contact costs less than the adhesion gains; values in J/m²."""
-    if full_contact_energy >= work_of_adhesion:
-        return ""
-    return (
-        f"flat enough to stick: full contact costs {1e3 * full_contact_energy:.3g} mJ/m² of γ = "
-        f"{1e3 * work_of_adhesion:.3g} mJ/m²; where contact is nearly full the loss hardly depends "
-        "on the turning point"
-    )
-
-
 def strength_of(
     work_of_adhesion: float, adhesion_range: float | None, strength: float | None = None
 ) -> float:
@@ -228,11 +217,6 @@ class Problem(ByValue):
         For much larger γ contact runs into full contact spontaneously.
         """
         return 0.25 * self.half_space.modulus * self.profile.moment(1)
-
-    @property
-    def sticking_note(self) -> str:
-        """Return a clause where full contact costs less than it gains; else empty."""
-        return sticking_text(self.full_contact_energy, self.work_of_adhesion)
 
     def separation(self, penetration: float) -> float:
         """Compute the separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""

@@ -111,7 +111,7 @@ def test_a_surface_that_is_flat_enough_to_stick_says_so(tmp_path, capsys):
     document, text, _ = run(tmp_path, capsys, *words)
     full = document["full_contact_energy"]
     assert full < document["work_of_adhesion"]
-    (line,) = (line for line in text.splitlines() if line.startswith("contact"))
+    (line,) = (line for line in text.splitlines() if line.startswith("sticking"))
     assert f"flat enough to stick: full contact costs {1e3 * full:.3g} mJ/m² of γ = 5 mJ/m²" in line
     _, text, _ = run(tmp_path, capsys, "--preload", "0.5kPa")
     assert "stick" not in text
