@@ -290,7 +290,7 @@ class EquilibriumPath(ByValue, ResultViews):
         return [
             f"the drop at which the weight falls off is {1e3 * self.closing_drop:.3g} mJ/m², "
             "negative: the loss is less than that of the drops before; for the loss of a "
-            "separation take a machine, with a preload in place of max_stress"
+            "separation take a machine that turns at a preload, in place of a weight"
         ]
 
     def states_before_jumps(self) -> list[int]:
