@@ -10,6 +10,7 @@ import io
 import json
 import multiprocessing
 import pickle
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -213,6 +214,11 @@ def test_a_bar_on_stderr_follows_the_path_and_changes_nothing(run, capsys):
     assert "0 patches" in shown.err
     with pytest.raises(TypeError, match="progress is 3"):
         run(progress=3)
+
+
+def test_a_bar_under_a_weight_has_a_unit(capsys):
+    run_loop(wave_method(Control(0.0)), max_stress=2000.0, load_steps=4, progress=True)
+    assert re.search(r"unloading +p̄ -?[\d.]+ k?Pa of 2 kPa", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("thing", [HalfSpace(1e6, 0.5), wave_method()], ids=["solid", "method"])

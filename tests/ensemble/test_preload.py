@@ -13,7 +13,15 @@ import pytest
 from matplotlib.axes import Axes
 
 import adhesis
-from adhesis import Control, HalfSpace, prepare_trace, read_trace, run_loop
+from adhesis import (
+    Control,
+    HalfSpace,
+    Problem,
+    prepare_trace,
+    read_trace,
+    run_loop,
+    self_affine_profile,
+)
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
@@ -21,6 +29,8 @@ from adhesis.ensemble.command.trace import _Progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
+from adhesis.ensemble.trace.job import Cycle, Job
+from adhesis.ensemble.trace.job import run as compute_job
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
@@ -104,6 +114,19 @@ def test_the_way_under_a_weight_has_a_unit(monkeypatch, tmp_path, capsys):
     assert "running answer (unloading, p̄ -34 kPa);" in text
     text = _Progress(plan, False)._text(loops, False)
     assert "(unloading, Δ/h_max -3.4e+04)" in text
+
+
+def test_a_trace_doubts_a_fall_and_takes_shares_of_the_drops_before_it():
+    profile = self_affine_profile(0.8, period=1e-3, n0=3, ratio=6, seed=4, h_rms=1e-6)
+    half_space, gamma, stress = HalfSpace(1e6, 0.5), 0.012, 2000.0
+    cycle = Cycle(half_space, (gamma,), (stress,), load_steps=5, control=Control(0.0))
+    found = compute_job(Job("answer", profile, cycle, gamma, stress))
+    problem = Problem(profile, half_space, gamma, Control(0.0))
+    loop = run_loop(make_method("auto", problem), max_stress=stress, load_steps=5)
+    assert found["fall_warnings"] == loop.fall_warnings() != []
+    small = sum(jump.energy_drop for jump in loop.jumps[:-1] if jump.small_scale)
+    before = sum(jump.energy_drop for jump in loop.jumps[:-1])
+    assert found["small_scale_share"] == pytest.approx(small / before)
 
 
 def test_a_surface_that_is_flat_enough_to_stick_says_so(tmp_path, capsys):
