@@ -378,7 +378,7 @@ class LoopResult(EquilibriumPath):
         Examples
         --------
         >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
-        >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+        >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.001)
         >>> loop = run_loop(make_method("sharp", problem), preload=500, load_steps=8)
         >>> state = loop.at_stress(100, "unloading")
         >>> round(state.mean_stress, 3), state.fields().gap.shape

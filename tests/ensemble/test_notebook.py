@@ -42,6 +42,7 @@ from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import views
+from adhesis.solver.loading import loop_result
 from adhesis.solver.references.exact_wave import ExactWave
 
 WAVE = single_wave(1e-6, 1e-3)
@@ -464,7 +465,9 @@ def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "module", [_campaign, saved, views, measured_trace], ids=lambda module: module.__name__
+    "module",
+    [_campaign, saved, views, measured_trace, loop_result],
+    ids=lambda module: module.__name__,
 )
 def test_the_examples_of_the_docstrings_are_right(module):
     done = doctest.testmod(module)
