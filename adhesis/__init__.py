@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.loading.loop_result import LoopResult
+    from adhesis.solver.loading.loop_state import LoopState
     from adhesis.solver.loading.path import MinorLoop, PathResult, run_path
     from adhesis.solver.loading.turning_points import run_loops
     from adhesis.solver.method import ContactState, Fields, Method, Opening, Path, PathError
@@ -52,6 +53,7 @@ _MODULES = {
     "InputError": "ensemble.errors",
     "Jump": "solver.model.jump",
     "LoopResult": "solver.loading.loop_result",
+    "LoopState": "solver.loading.loop_state",
     "Method": "solver.method",
     "MinorLoop": "solver.loading.path",
     "Opening": "solver.method",
@@ -84,6 +86,7 @@ __all__ = [
     "InputError",
     "Jump",
     "LoopResult",
+    "LoopState",
     "Method",
     "MinorLoop",
     "Opening",

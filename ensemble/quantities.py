@@ -196,6 +196,12 @@ QUANTITIES = {q.unit: q for q in (LENGTH, STRESS, STIFFNESS, WORK_OF_ADHESION)}
 
 length_text, stress_text = LENGTH.text, STRESS.text
 
+
+def drive_text(drive: float, load: bool) -> str:
+    """Show how far a loop is on its way: Δ/h_max (u_tot/h_max of a stiffness), or a load in Pa."""
+    return f"p̄ {stress_text(drive)}" if load else f"Δ/h_max {drive:+.4g}"
+
+
 _WHOLE = re.compile(r"[+\-]?\d+")
 _DIGITS = re.compile(r"\d+(?![\d.])")
 

@@ -125,6 +125,7 @@ STIFFNESS = Bounds(
     note=" (0 is load control, infinite a fixed separation)",
 )
 SPRING = Bounds(_LEAST, _MOST, unit="Pa/m of nominal area")
+STRESS = Bounds(unit="Pa")
 MAX_STRESS = Bounds(_LEAST, _MOST, unit="Pa")
 # Nearer to full contact no method resolves the last gap: losses at 1 - 1e-7 and 1 - 1e-8 were wrong
 # by 1 and by 25 %.

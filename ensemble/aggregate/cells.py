@@ -76,7 +76,8 @@ class Cell:
     realisation: NDArray[np.int64]
     seed: NDArray[np.int64]
     # Each of shape (done,); per-task numbers under the names of the results file, and
-    # ``small_scale_share`` (loss_small_scale / loss_from_drops); ``loss_error_dimensionless``,
+    # ``small_scale_share`` (loss_small_scale / loss_from_drops, under a load over the
+    # drops before the solid falls off); ``loss_error_dimensionless``,
     # ``energy_at_stake_dimensionless`` (in W~); ``loss_per_contact``,
     # ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
     # spent per largest contact area, in J/m²)
@@ -146,6 +147,8 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         rows = rows[np.argsort(realisation[rows], kind="stable")]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
         drops = values["loss_from_drops"]
+        if campaign.cycle.under_load:  # without the drop that closes the loop
+            drops = values["loss_small_scale"] + values["loss_large_scale"]
         values["small_scale_share"] = np.divide(
             values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
         )

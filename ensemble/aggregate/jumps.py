@@ -1,7 +1,8 @@
 """Count the jumps of the catalogue by kind and energy drop.
 
 The catalogue (task × jump) is read in blocks of rows. Of a task with more jumps than the catalogue
-holds it has those with the largest drops; ``truncated`` counts such tasks.
+holds it has those with the largest drops; ``truncated`` counts such tasks. The jump at which a
+weight falls off is not counted: its drop depends on where the loop is closed.
 """
 
 from __future__ import annotations
@@ -63,6 +64,8 @@ def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpS
         flags = results.column("jump_kind", block)
         drops = results.column("jump_energy_drop", block)
         used = (flags >= 0) & (cells >= 0)[:, None]
+        if results.campaign.cycle.under_load:
+            used &= results.column("jump_patches_after", block) > 0
         cell = np.broadcast_to(cells[:, None], flags.shape)[used]
         kind, drop = flags[used].astype(np.intp), drops[used]
         bin_of_drop = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)

@@ -19,6 +19,7 @@ from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, 
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
+from adhesis.ensemble.quantities import drive_text
 from adhesis.ensemble.reporter import StatusLine, following
 from adhesis.ensemble.trace.options import (
     delimiter_of,
@@ -344,12 +345,11 @@ def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool)
 def _progress(step: float, load: bool) -> Progress:
     """Return what reports the branch, the load step, the contact and the time on stderr."""
     line = StatusLine(_SECONDS_BETWEEN_LINES)
-    name = "p̄ in Pa" if load else "Δ/h_max"
 
     def show(branch: Branch, drive: float, state: ContactState) -> None:
         line.show(
             lambda: (
-                f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  A/A0 "
+                f"{branch:<9} step {round(drive / step):>4}  {drive_text(drive, load)}  A/A0 "
                 f"{state.contact_fraction:.4f}  patches {state.patches:>4}  {line.seconds:.0f} s"
             ),
             last=branch == "unloading" and not state.patches,

@@ -10,7 +10,13 @@ from adhesis.ensemble.exit_codes import SOME_FAILED
 from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration, read_words, words_of
+from adhesis.ensemble.quantities import (
+    WORK_OF_ADHESION,
+    drive_text,
+    duration,
+    read_words,
+    words_of,
+)
 from adhesis.ensemble.reporter import StatusLine
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.loops import Loops
@@ -55,7 +61,8 @@ def execute(args: argparse.Namespace) -> int:
     if args.plan:
         return 0
     try:
-        answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
+        progress = None if args.quiet else _Progress(plan, control.is_load)
+        answer = run_plan(prepared, cycle, plan, progress)
     except NoAnswer as error:
         print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
@@ -82,8 +89,8 @@ def execute(args: argparse.Namespace) -> int:
 class _Progress:
     """Lines on stderr: loops done, what is running, time left; none is longer silent than 10 s."""
 
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
+    def __init__(self, plan: Plan, load: bool) -> None:
+        self.plan, self.load = plan, load
         self.line = StatusLine(_SECONDS_BETWEEN_LINES)
 
     def __call__(self, loops: Loops) -> None:
@@ -92,7 +99,8 @@ class _Progress:
 
     def _text(self, loops: Loops, finished: bool) -> str:
         running = ", ".join(
-            f"{name} ({branch} {drive:+.3g})" for name, (_, branch, drive) in loops.running.items()
+            f"{name} ({branch}, {drive_text(drive, self.load)})"
+            for name, (_, branch, drive) in loops.running.items()
         )
         left = self._left(loops)
         line = f"{len(loops.done)} of {len(self.plan.runs)} loops"

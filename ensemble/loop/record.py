@@ -127,6 +127,7 @@ def loop_summary(result: LoopResult) -> str:
             f"(dimensionless {result.loss_dimensionless:.6g})"
             f"{f'; {result.loss_note}' if result.loss_note else ''}",
             *_friction(result),
+            *(f"sticking    {text}" for text in (result.sticking_note,) if text),
             _range(result),
             _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "

@@ -292,7 +292,7 @@ def _works(result: Result) -> dict[str, float]:
         ends = result.potential[[-1, 0]]
         change = float(ends[0] - ends[1]) / result.problem.profile.period
         return {"work": work, "energy_change": change}
-    gained = -result.work_along(slice(0, _turn(result)))
+    gained = -result.work_of_displacement(slice(_turn(result)))
     return {"loss": work, "work_gained": gained, "work_spent": work + gained}
 
 

@@ -14,7 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble.outputs import check_output_folder
-from adhesis.ensemble.quantities import UNITS, in_works_of_adhesion, with_units
+from adhesis.ensemble.quantities import (
+    UNITS,
+    drive_text,
+    in_works_of_adhesion,
+    stress_text,
+    with_units,
+)
 from adhesis.ensemble.reporter import bar
 from adhesis.solver import checks
 from adhesis.solver.loading.loop import Progress
@@ -114,7 +120,9 @@ def table_of_runs(answer: Answer) -> Any:
 
     from adhesis.ensemble.trace.answer import run_rows
 
-    hidden = ("range_warnings", "preload_warnings", "failed")
+    hidden = (
+        *("range_warnings", "preload_warnings", "fall_warnings", "strain_warnings", "failed"),
+    )
     rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
     return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
 
@@ -176,15 +184,16 @@ def _rows(shown: Any) -> list[tuple[str, str]]:
 
 
 @contextmanager
-def progress_bar(top: float) -> Iterator[Progress]:
+def progress_bar(top: float, load: bool) -> Iterator[Progress]:
     """Show a bar on stderr, or in the notebook, while a loop or path is followed.
 
     It is full at the turning point ``top``; unloading has no end that is known ahead.
     """
+    end = stress_text(top) if load else f"{top:g}"
     with bar("loading") as shown:
 
         def show(branch: Branch, drive: float, state: ContactState) -> None:
-            text = f"{branch:<9} {drive:+.3f} of {top:g}, {state.patches} patches"
+            text = f"{branch:<9} {drive_text(drive, load)} of {end}, {state.patches} patches"
             if branch == "loading":
                 shown(drive / top, 1.0, text)
             else:

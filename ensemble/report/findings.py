@@ -44,20 +44,22 @@ def _outcome(data: Aggregate) -> str:
     cells.sort(key=lambda cell: cell.estimates["loss"].mean)
     cycle = data.campaign.cycle
     top = f"A loop to {turning_point(data)} and back until detached loses"
+    what = "it is lost"
     if cycle.under_load:
         falls = _all(data, "pull_off_stress")
         ends = " to ".join(dict.fromkeys(stress_text(end) for end in (falls.min(), falls.max())))
         top = (
             f"A loop to {turning_point(data)} and back under a weight, which falls off at {ends} "
-            "(the energy of the fall is not counted), loses"
+            "(the loop is closed at the separation of the fall), loses"
         )
+        what = "the drops before the fall are lost"
     friction = _friction(data, cells)
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}{friction}."
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
     return (
         f"{top}, on average over realisations, from {_loss(cells[0])} to {_loss(cells[-1])}; "
-        f"{100 * min(share):.0f} to {100 * max(share):.0f} % of it is lost where edges run inside "
+        f"{100 * min(share):.0f} to {100 * max(share):.0f} % of {what} where edges run inside "
         f"patches{friction}."
     )
 

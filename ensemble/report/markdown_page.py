@@ -85,7 +85,13 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         "## Mechanisms",
         "A jump is *small scale* if edges only run inside existing patches (spreading, receding), "
         "and *large scale* if patches come or go (snap-in, merging, splitting, vanishing, "
-        "pull-off).",
+        "pull-off)."
+        + (
+            " The jump at which a weight falls off is of neither: its drop closes the loop, and "
+            "may be negative."
+            if data.campaign.cycle.under_load
+            else ""
+        ),
         mechanism_tables.mechanisms(data).markdown(),
         *show("mechanisms"),
         "### Share of the drops by kind of the jump",
@@ -155,7 +161,7 @@ def _footnote(data: Aggregate) -> str:
         f"± steps: {steps}",
     ]
     if data.campaign.cycle.under_load:
-        parts.append("under a weight: it falls off, the energy of the fall is not counted")
+        parts.append("under a weight: closed at the separation of its fall")
     if short_of_preload(data.cells):
         parts.append("short: loops that turned before their preload was reached")
     if any(cell.work_of_adhesion > 0 for cell in data.cells):

@@ -209,7 +209,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  {loss}"]
         lines += [_group_line(group, further) for group in groups]
     if status["under_load"]:
-        lines += ["", "losses under a weight: it falls off, the energy of the fall is not counted"]
+        lines += ["", "losses under a weight: closed at the separation of its fall"]
     if status["preload_not_reached"]:
         lines += ["", f"{counted(status['preload_not_reached'], 'loop')} did not reach the preload"]
     if status["damaged"]:

@@ -7,8 +7,7 @@ One table, from which the results file is laid out, written, read and documented
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
-from operator import attrgetter
+from operator import attrgetter, methodcaller
 from typing import Any
 
 import numpy as np
@@ -63,10 +62,6 @@ def _jump(name: str, dtype: str, unit: str, meaning: str, *value: Any, **flags_:
     return _dataset(f"jump_{name}", dtype, unit, meaning, take, dims, **flags_)
 
 
-def _drops(loop: LoopResult, *, small_scale: bool) -> float:
-    return float(sum([j.energy_drop for j in loop.jumps if j.small_scale is small_scale]))
-
-
 def _of_interior(name: str) -> Callable[[LoopResult], float]:
     return lambda loop: float(getattr(loop.interior, name, np.nan))
 
@@ -87,11 +82,11 @@ NUMBERS = (
     _dataset("loss_from_drops", FLOAT, "J m-2", "energy drops at jumps, and friction between them"),
     _dataset(
         *("loss_small_scale", FLOAT, "J m-2", "energy drops of edges running inside a patch"),
-        partial(_drops, small_scale=True),
+        methodcaller("drops", small_scale=True),
     ),
     _dataset(
         *("loss_large_scale", FLOAT, "J m-2", "energy drops of patches that come and go"),
-        partial(_drops, small_scale=False),
+        methodcaller("drops", small_scale=False),
     ),
     _dataset("friction", FLOAT, "J m-2", "part of the loss that edges dissipate as they recede"),
     _dataset(

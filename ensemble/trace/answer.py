@@ -558,7 +558,8 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
             f"“{largest}” ({DOUBTS.get(largest, 'error of the loop itself')}; standard uncertainty "
             f"{100 * loss.doubts[largest]:.0f} %): {_REMEDIES[largest]}"
         )
-    found += [*answer.main["range_warnings"], *answer.main["strain_warnings"]]
+    for kind in ("fall_warnings", "range_warnings", "strain_warnings"):
+        found += answer.main[kind]
     races = answer.main["races"]
     if races:
         found.append(

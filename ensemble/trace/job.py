@@ -107,7 +107,7 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
     turn = turn_arguments(cycle.control, job.turning_point, cycle.at_preload, cycle.latest)
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
-    small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
+    drops = loop.loss_from_drops - loop.closing_drop
     return loop.numbers() | {
         "range_warnings": range_warnings(
             *(problem, loop.valid_range, loop.loss, loop.contact_fraction),
@@ -118,11 +118,12 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
             problem, loop.mean_stress, loop.separation, loop.patches
         ),
         "preload_warnings": loop.preload_warnings,
+        "fall_warnings": loop.fall_warnings(),
         "loss_note": loop.loss_note,
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),
-        "small_scale_share": small / loop.loss_from_drops if loop.loss_from_drops > 0 else 0.0,
+        "small_scale_share": loop.drops(small_scale=True) / drops if drops > 0 else 0.0,
         "waves": profile.highest_harmonic,
         "states": {name: values.tolist() for name, values in loop.columns().items()},
     }

@@ -21,7 +21,7 @@ from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Uncer
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.equilibrium_path import friction_text
+from adhesis.solver.loading.equilibrium_path import friction_text, sticking_text
 
 
 def summary(answer: Answer) -> str:
@@ -93,7 +93,12 @@ def _scope(answer: Answer) -> str:
         if largest > 0
         else "the mean stress is a tension on the whole loop"
     )
-    return f"one period of parallel grooves, {length_text(answer.main['period'])} wide; {pressed}"
+    wide = length_text(answer.main["period"])
+    main = answer.main
+    of_sticking = ("full_contact_energy", "work_of_adhesion", "contact_fraction")
+    sticks = sticking_text(*(main[name] for name in of_sticking))
+    clauses = (f"one period of parallel grooves, {wide} wide", pressed, sticks)
+    return "; ".join(clause for clause in clauses if clause)
 
 
 def _range(answer: Answer) -> str:

@@ -32,6 +32,10 @@ from adhesis.solver.views import ResultViews
 
 PathOrLoop = TypeVar("PathOrLoop", bound="EquilibriumPath")
 
+# Share of the loss below which a negative closing drop changes nothing that is read off.
+_FALL_SHARE = 0.01
+# Largest A/A0 from which on harder pressing can add a hundredth of the area at most.
+_NEARLY_FULL = 0.99
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
 
@@ -149,6 +153,14 @@ class EquilibriumPath(ByValue, ResultViews):
         return float(self.contact_fraction.max())
 
     @property
+    def sticking_note(self) -> str:
+        """Return a clause where adhesion makes the contact nearly full; else empty."""
+        problem = self.problem
+        return sticking_text(
+            problem.full_contact_energy, problem.work_of_adhesion, self.largest_contact_fraction
+        )
+
+    @property
     def largest_interior_tension(self) -> float:
         """Largest local maximum of tension inside patches, in Pa; 0 if there is none."""
         return self.interior.tension if self.interior is not None else 0.0
@@ -219,6 +231,15 @@ class EquilibriumPath(ByValue, ResultViews):
         """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
 
+    def work_of_displacement(self, states: slice) -> float:
+        """Compute ∫ p̄ du_tot over some states, in J/m² of nominal area; Δ is u_tot for a load."""
+        return self.problem.control.work_of_displacement(
+            self.work_along(states),
+            self.separation[states],
+            self.mean_stress[states],
+            self.problem.profile.h_max,
+        )
+
     def work_along(self, states: slice) -> float:
         """Compute -∫ Y dx over some states anew, in J/m² of nominal area."""
         control, h_max = self.problem.control, self.problem.profile.h_max
@@ -231,15 +252,46 @@ class EquilibriumPath(ByValue, ResultViews):
 
     @property
     def loss_note(self) -> str:
-        """Return what the loss of a path under a load leaves out; empty for all other paths."""
+        """Return where the loss of a path under a load is closed; empty for all other paths."""
         if not self.problem.control.is_load:
             return ""
         if self.patches[-1]:
             return "under a weight"
+        before = self.loss_from_drops - self.closing_drop
         return (
-            f"under a weight; it falls off at {stress_text(0.0 - self.mean_stress.min())}, the "
-            "energy of the fall is not counted"
+            f"under a weight; it falls off at {stress_text(0.0 - self.mean_stress.min())}: drops "
+            f"before the fall {1e3 * before:.3g} mJ/m², closed at the separation of the fall "
+            f"{1e3 * self.loss_from_drops:.3g} mJ/m²"
         )
+
+    @property
+    def closing_drop(self) -> float:
+        """Drop at which the solid falls off under a load, in J/m² of nominal area; else 0.
+
+        It closes the loop at the separation of the fall, and is U there, of either sign
+        (:mod:`adhesis.solver.model.control`).
+        """
+        falls = self.problem.control.is_load and not self.patches[-1] and self.jumps
+        return self.jumps[-1].energy_drop if falls and not self.jumps[-1].patches_after else 0.0
+
+    def drops(self, small_scale: bool) -> float:
+        """Sum the energy drops of one scale, in J/m², without ``closing_drop``.
+
+        The closing drop depends on where the loop is closed, and may be negative: it is the loss of
+        no mechanism.
+        """
+        found = sum(jump.energy_drop for jump in self.jumps if jump.small_scale is small_scale)
+        return float(found if small_scale else found - self.closing_drop)
+
+    def fall_warnings(self) -> list[str]:
+        """Return a sentence where the closing drop takes more than a hundredth off the loss."""
+        if self.closing_drop >= -_FALL_SHARE * abs(self.lost):
+            return []
+        return [
+            f"the drop at which the weight falls off is {1e3 * self.closing_drop:.3g} mJ/m², "
+            "negative: the loss is less than that of the drops before; for the loss of a "
+            "separation take a machine that turns at a preload, in place of a weight"
+        ]
 
     def states_before_jumps(self) -> list[int]:
         """Return the index of the state before each jump; the next one is that after it."""
@@ -338,6 +390,18 @@ def friction_text(work_of_adhesion_open: float, lost: float, friction: float) ->
     return (
         f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²; "
         f"{lost - friction:.6g} J/m² lost by instability"
+    )
+
+
+def sticking_text(
+    full_contact_energy: float, work_of_adhesion: float, contact_fraction: float
+) -> str:
+    """Return a clause where adhesion makes the largest contact nearly full; energies in J/m²."""
+    if full_contact_energy >= work_of_adhesion or contact_fraction < _NEARLY_FULL:
+        return ""
+    return (
+        f"flat enough to stick: full contact costs {1e3 * full_contact_energy:.3g} mJ/m² of γ = "
+        f"{1e3 * work_of_adhesion:.3g} mJ/m²; pressing harder hardly changes the loss"
     )
 
 

@@ -41,7 +41,9 @@ Progress = Callable[[Branch, float, ContactState], None]
 
 
 @contextmanager
-def progress_of(progress: Progress | bool | None, top: float) -> Iterator[Progress | None]:
+def progress_of(
+    progress: Progress | bool | None, top: float, control: Control
+) -> Iterator[Progress | None]:
     """Return the function to call after each load step: the given one, or for True a bar.
 
     Parameters
@@ -49,6 +51,8 @@ def progress_of(progress: Progress | bool | None, top: float) -> Iterator[Progre
     progress : callable or bool, optional
     top : float
         The largest turning point, at which the bar is full.
+    control : Control
+        Of the path: a load is shown with its unit.
 
     Raises
     ------
@@ -56,7 +60,7 @@ def progress_of(progress: Progress | bool | None, top: float) -> Iterator[Progre
         If it is neither.
     """
     if progress is True:
-        with views.maker().progress_bar(top) as bar:
+        with views.maker().progress_bar(top, control.is_load) as bar:
             yield bar
     elif progress is False:
         yield None
@@ -148,7 +152,7 @@ def run_loop(
     record = Record(on_state)
     axis = Axis(turning_point, load_steps)
     state = method.detached(method.problem.profile.h_max)
-    with progress_of(progress, turning_point) as report:
+    with progress_of(progress, turning_point, control) as report:
         record.visit("loading", False, state)
         for i in range(load_steps + 1):
             path, reached = load_step(method, record, axis(i), preload)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.checks import choice, counted, real, reals
+from adhesis.solver.checks import STRESS, choice, counted, real, reals
 from adhesis.solver.loading.equilibrium_path import (
     EquilibriumPath,
     path_fields,
@@ -65,7 +65,7 @@ class LoopResult(EquilibriumPath):
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
     work_gained, work_spent : float
         Work that is gained on loading and spent on unloading, in J/m² of nominal area: ∓∫ p̄ du_tot
-        along the branch. Their difference is the loss.
+        along the branch, jumps included; under a load u_tot is Δ. Their difference is the loss.
 
     References
     ----------
@@ -192,6 +192,7 @@ class LoopResult(EquilibriumPath):
     def warnings(self) -> tuple[str, ...]:
         """Reasons to doubt the loss, one sentence each; none for most loops."""
         found = self.preload_warnings
+        found += self.fall_warnings()
         slope = float(np.sqrt(self.problem.profile.m2))
         if slope > STEEP:
             found.append(
@@ -263,6 +264,7 @@ class LoopResult(EquilibriumPath):
                 f"{self._opening_text}"
                 f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",
+                *(f"sticking   {text}" for text in (self.sticking_note,) if text),
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²"
@@ -376,13 +378,13 @@ class LoopResult(EquilibriumPath):
         Examples
         --------
         >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
-        >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+        >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.001)
         >>> loop = run_loop(make_method("sharp", problem), preload=500, load_steps=8)
         >>> state = loop.at_stress(100, "unloading")
         >>> round(state.mean_stress, 3), state.fields().gap.shape
         (100.0, (32,))
         """
-        stress, chosen = real("stress", stress), self.states(branch)
+        stress, chosen = real("stress", stress, STRESS), self.states(branch)
         if self.new_method is None or not self.contact_states:
             raise ValueError(
                 "this loop holds no contact states: it was loaded from a file; run it again, or "
@@ -449,7 +451,11 @@ def result_of(
             "resolve it"
         )
     turn = record.branches.index("unloading")  # the turning point's state stands in both branches
-    gained = -record.slice(0, turn).work(problem)
+    loading = slice(turn)
+    gained = -problem.control.work_of_displacement(
+        record.slice(0, turn).work(problem),
+        *(fields["separation"][loading], fields["mean_stress"][loading], problem.profile.h_max),
+    )
     max_penetration = turning_point
     if not problem.control.is_fixed:
         max_penetration = float(fields["penetration"][turn])

@@ -40,6 +40,11 @@ class LoopState(ByValue):
     method: Method
 
     @property
+    def separation(self) -> float:
+        """Separation s in m."""
+        return self.state.separation
+
+    @property
     def mean_stress(self) -> float:
         """p̄ in Pa, compression positive."""
         return self.state.mean_stress

@@ -271,7 +271,7 @@ def run_path(
     load_steps = int(load_steps)
     function("on_state", on_state)
     started = process_time()
-    with progress_of(progress, max(points)) as report:
+    with progress_of(progress, max(points), method.problem.control) as report:
         runner = _PathRunner(method, Axis(max(points), load_steps), Record(on_state), report)
         for point in points:
             runner.follow_leg(point)

@@ -249,6 +249,7 @@ def run_loops(
         wanted = [latest_turn(problem, point, one, max_stress) for point in points]
         latest = max(wanted, default=None)
     branch = LoadingBranch(method, points, load_steps=load_steps, latest=latest)
-    with progress_of(progress, max(points) if latest is None else latest) as report:
+    top = max(points) if latest is None else latest
+    with progress_of(progress, top, method.problem.control) as report:
         loops = {turn: branch.loop(turn, progress=report) for turn in sorted(points)}
     return tuple(loops[turn] for turn in points)

@@ -10,6 +10,7 @@ import io
 import json
 import multiprocessing
 import pickle
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -41,6 +42,7 @@ from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import views
+from adhesis.solver.loading import loop_result
 from adhesis.solver.references.exact_wave import ExactWave
 
 WAVE = single_wave(1e-6, 1e-3)
@@ -213,6 +215,11 @@ def test_a_bar_on_stderr_follows_the_path_and_changes_nothing(run, capsys):
     assert "0 patches" in shown.err
     with pytest.raises(TypeError, match="progress is 3"):
         run(progress=3)
+
+
+def test_a_bar_under_a_weight_has_a_unit(capsys):
+    run_loop(wave_method(Control(0.0)), max_stress=800.0, load_steps=4, progress=True)
+    assert re.search(r"unloading +p̄ -?[\d.]+ k?Pa of 800 Pa", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("thing", [HalfSpace(1e6, 0.5), wave_method()], ids=["solid", "method"])
@@ -458,7 +465,9 @@ def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "module", [_campaign, saved, views, measured_trace], ids=lambda module: module.__name__
+    "module",
+    [_campaign, saved, views, measured_trace, loop_result],
+    ids=lambda module: module.__name__,
 )
 def test_the_examples_of_the_docstrings_are_right(module):
     done = doctest.testmod(module)

@@ -5,18 +5,33 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
 import adhesis
-from adhesis import Control, HalfSpace, prepare_trace, read_trace, run_loop
+from adhesis import (
+    Control,
+    HalfSpace,
+    Problem,
+    prepare_trace,
+    read_trace,
+    run_loop,
+    self_affine_profile,
+)
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.command.trace import _Progress
 from adhesis.ensemble.report import findings
+from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
+from adhesis.ensemble.trace.job import Cycle, Job
+from adhesis.ensemble.trace.job import run as compute_job
+from adhesis.ensemble.trace.loops import Loops
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.synthetic_results import campaign, rows, write
@@ -77,11 +92,53 @@ def test_the_loss_of_a_weight_says_so(tmp_path, capsys):
     (line,) = (line for line in text.splitlines() if line.startswith("loss"))
     assert document["loss_note"] in line
     assert document["loss_note"].startswith("under a weight; it falls off at ")
-    assert document["loss_note"].endswith("the energy of the fall is not counted")
+    *before, last = (jump["energy_drop"] for jump in document["jumps"])
+    assert document["loss_note"].endswith(
+        f": drops before the fall {1e3 * sum(before):.3g} mJ/m², closed at the separation of the "
+        f"fall {1e3 * (sum(before) + last):.3g} mJ/m²"
+    )
     machine, text, _ = run(tmp_path, capsys, "--preload", "500")
     assert machine["loss_note"] == ""
     assert machine["loss"] > document["loss"]
     assert "under a weight" not in text
+
+
+def test_the_way_under_a_weight_has_a_unit(monkeypatch, tmp_path, capsys):
+    words = ["--stiffness", "0", "--max-stress", "500", "--json", str(tmp_path / "loop.json")]
+    assert main([word for word in [*SCENE, *words] if word != "--quiet"]) == 0
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert re.search(r"unloading step +-\d+  p̄ -[\d.]+ k?Pa  A/A0", last)
+    monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
+    loops = Loops((), 1)
+    plan = SimpleNamespace(runs=(), seconds={"answer": 2.0})
+    text = _Progress(plan, True)._text(loops, False)
+    assert "running answer (unloading, p̄ -34 kPa);" in text
+    text = _Progress(plan, False)._text(loops, False)
+    assert "(unloading, Δ/h_max -3.4e+04)" in text
+
+
+def test_a_trace_doubts_a_fall_and_takes_shares_of_the_drops_before_it():
+    profile = self_affine_profile(0.8, period=1e-3, n0=3, ratio=6, seed=4, h_rms=1e-6)
+    half_space, gamma, stress = HalfSpace(1e6, 0.5), 0.012, 2000.0
+    cycle = Cycle(half_space, (gamma,), (stress,), load_steps=5, control=Control(0.0))
+    found = compute_job(Job("answer", profile, cycle, gamma, stress))
+    problem = Problem(profile, half_space, gamma, Control(0.0))
+    loop = run_loop(make_method("auto", problem), max_stress=stress, load_steps=5)
+    assert found["fall_warnings"] == loop.fall_warnings() != []
+    small = sum(jump.energy_drop for jump in loop.jumps[:-1] if jump.small_scale)
+    before = sum(jump.energy_drop for jump in loop.jumps[:-1])
+    assert found["small_scale_share"] == pytest.approx(small / before)
+
+
+def test_a_surface_that_is_flat_enough_to_stick_says_so(tmp_path, capsys):
+    words = ("--h-rms", "0.2um", "--preload", "0.5kPa")
+    document, text, _ = run(tmp_path, capsys, *words)
+    full = document["full_contact_energy"]
+    assert full < document["work_of_adhesion"]
+    (line,) = (line for line in text.splitlines() if line.startswith("sticking"))
+    assert f"flat enough to stick: full contact costs {1e3 * full:.3g} mJ/m² of γ = 5 mJ/m²" in line
+    _, text, _ = run(tmp_path, capsys, "--preload", "0.5kPa")
+    assert "stick" not in text
 
 
 def test_a_mean_stress_that_the_loop_does_not_have_is_refused(tmp_path, monkeypatch, capsys):
@@ -303,10 +360,36 @@ def test_a_campaign_under_a_weight_says_so_in_its_status_and_report(tmp_path, ca
     assert main(["run", str(file), "--out", str(out)]) == 0
     capsys.readouterr()
     assert main(["status", str(out)]) == 0
-    assert "under a weight: it falls off, the energy of the fall" in capsys.readouterr().out
-    outcome = findings.verdict(aggregate(out))[0]
+    assert "under a weight: closed at the separation of its fall" in capsys.readouterr().out
+    data = aggregate(out)
+    outcome = findings.verdict(data)[0]
     assert "under a weight, which falls off at " in outcome
-    assert "(the energy of the fall is not counted)" in outcome
+    assert "(the loop is closed at the separation of the fall)" in outcome
+
+
+def test_shares_of_a_campaign_under_a_weight_are_of_the_drops_before_the_fall(tmp_path):
+    """Of profiles that are nearly in full contact when the weight tears them off."""
+    file, out = tmp_path / "c.toml", tmp_path / "c.h5"
+    changes = {"realisations": "2", "ratio": "6", "work_of_adhesion": "[0.014]"}
+    file.write_text(text_of('control = "load"\nmax_stress = 200', **changes))
+    assert main(["run", str(file), "--out", str(out)]) == 0
+    with h5py.File(out) as results:
+        drops, after = results["jump_energy_drop"][:], results["jump_patches_after"][:]
+        last = drops[after == 0]
+        assert (last < 0).all()
+        before = np.where(after > 0, drops, 0).sum(axis=1)
+        scales = results["loss_small_scale"][:] + results["loss_large_scale"][:]
+        np.testing.assert_allclose(scales, before, rtol=1e-12)
+        np.testing.assert_allclose(results["loss_from_drops"][:], before + last, rtol=1e-9)
+    data = aggregate(out)
+    (cell,) = data.cells
+    assert ((cell.values["small_scale_share"] >= 0) & (cell.values["small_scale_share"] <= 1)).all()
+    table = mechanism_tables.jumps(data)
+    share = table.columns.index(next(c for c in table.columns if c.name == "share_of_drops"))
+    shares = [row[share] for row in table.rows]
+    assert min(shares) >= 0
+    assert sum(shares) == pytest.approx(1)
+    assert data.jumps.histogram.sum() == (after > 0).sum()
 
 
 def test_preloads_of_a_campaign_do_not_become_more():

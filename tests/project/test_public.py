@@ -26,6 +26,7 @@ PUBLIC = [
     "InputError",
     "Jump",
     "LoopResult",
+    "LoopState",
     "Method",
     "MinorLoop",
     "Opening",

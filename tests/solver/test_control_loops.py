@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile, single_wave
 from adhesis.solver.loading.loop_result import LoopResult
@@ -48,6 +49,26 @@ def test_wave_loses_what_the_closed_form_says(relative):
         assert loop.pull_off_stress == pytest.approx(-exact.fold_mean_stress, rel=1e-6)
 
 
+@pytest.mark.parametrize("relative", [np.inf, *STIFFNESSES])
+def test_the_work_of_each_branch_of_a_wave_is_that_of_the_closed_form(relative):
+    wave = wave_of(0.2)
+    stiffness = relative * wave.full_contact_stress / AMPLITUDE
+    profile = single_wave(AMPLITUDE, PERIOD)
+    loop = loop_of(profile, wave.work_of_adhesion, stiffness, 0.1, accuracy=1e-6)
+
+    def power(a: float) -> float:  # p̄ du_tot/da; at the two jumps no work is done
+        spring = wave.mean_stress_slope(a) / stiffness if stiffness else 0.0
+        return float(wave.mean_stress(a) * (spring - wave.separation_slope(a)))
+
+    exact = wave.loop_under(stiffness)
+    turn = float(loop.contact_fraction.max()) * PERIOD / 2
+    gained = -quad(power, exact.touch_half_width, turn, epsabs=0, epsrel=1e-10)[0]
+    spent = quad(power, turn, exact.fold_half_width, epsabs=0, epsrel=1e-10)[0]
+    bound = 1e-5 * exact.loss  # as for the loss
+    assert loop.work_gained == pytest.approx(gained, abs=bound)
+    assert loop.work_spent == pytest.approx(spent, abs=bound)
+
+
 @pytest.fixture(scope="module")
 def rough() -> Profile:
     return self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)
@@ -61,6 +82,18 @@ def test_rough_loops_are_audited_under_every_control(rough, relative):
     assert abs(loop.audit_residual) < 1e-4
     lost = loop.jumps[-1:] if relative == 0 else ()  # under a load it is U, of either sign
     assert min(j.energy_drop for j in loop.jumps if j not in lost) >= 0
+
+
+def test_jumps_under_a_weight_do_work_on_their_branch(rough):
+    loop = loop_of(rough, 0.01, 0.0, 0.4)
+    before = [k for k in loop.states_before_jumps() if loop.branch[k] == "loading"]
+    assert np.abs(loop.mean_stress[before]).max() > 0
+    depth = rough.h_max - loop.separation
+    for branch, work in (("loading", -loop.work_gained), ("unloading", loop.work_spent)):
+        chosen = loop.branch == branch
+        by_states = np.trapezoid(loop.mean_stress[chosen], depth[chosen])
+        assert work == pytest.approx(by_states, rel=3e-3)
+    assert loop.work_spent - loop.work_gained == pytest.approx(loop.loss, rel=1e-12)
 
 
 @pytest.mark.parametrize("relative", [1.0, 0.0])

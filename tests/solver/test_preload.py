@@ -213,6 +213,7 @@ def test_a_state_at_a_mean_stress_has_the_contact_and_the_gap_of_the_closed_form
     a, penetration = johnson(wanted)
     for branch in ("loading", "unloading"):
         state = loop.at_stress(wanted, branch)
+        assert state.separation == state.state.separation
         assert state.branch == branch
         assert not state.after_jump
         assert state.mean_stress == pytest.approx(wanted, rel=1e-8)
@@ -236,6 +237,8 @@ def test_a_mean_stress_that_a_branch_does_not_have_is_refused(tmp_path):
         loop.at_stress(600.0, "loading")
     with pytest.raises(ValueError, match="stress is nan"):
         loop.at_stress(np.nan)
+    with pytest.raises(TypeError, match="stress is '10 kPa': it must be a finite number, in Pa"):
+        loop.at_stress("10 kPa")
     loop.save(tmp_path / "loop.nc")
     again = load(tmp_path / "loop.nc")
     assert again == loop
@@ -247,7 +250,7 @@ def test_a_mean_stress_that_a_branch_does_not_have_is_refused(tmp_path):
 
 def test_a_loss_under_a_weight_says_so_where_it_stands():
     weight = run_loop(make_method("sharp", rough(Control(0.0))), max_stress=PRELOAD, load_steps=5)
-    note = f"under a weight; it falls off at {1e-3 * weight.pull_off_stress:.3g} kPa, the energy of"
+    note = f"under a weight; it falls off at {1e-3 * weight.pull_off_stress:.3g} kPa: drops before"
     (line,) = (line for line in str(weight).splitlines() if line.startswith("loss"))
     assert note in line
     assert "under a weight" in repr(weight)
@@ -255,6 +258,23 @@ def test_a_loss_under_a_weight_says_so_where_it_stands():
     machine = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=5)
     assert machine.loss_note == ""
     assert "weight" not in str(machine) + repr(machine) + machine._repr_html_()
+
+
+def test_a_closing_drop_that_is_negative_is_doubted():
+    profile = self_affine_profile(0.8, period=1e-3, n0=3, ratio=6, seed=4, h_rms=1e-6)
+    for max_stress, count in ((500.0, 0), (2000.0, 1)):  # the same branch, turned early and late
+        problem = Problem(profile, HalfSpace(1e6, 0.5), 0.012, Control(0.0))
+        loop = run_loop(make_method("sharp", problem), max_stress=max_stress, load_steps=5)
+        assert loop.closing_drop == loop.jumps[-1].energy_drop
+        assert (loop.closing_drop < 0) == bool(count)
+        doubts = [text for text in loop.warnings if "at which the weight falls off" in text]
+        assert len(doubts) == count
+        before = sum(jump.energy_drop for jump in loop.jumps[:-1])
+        assert loop.drops(small_scale=True) + loop.drops(small_scale=False) == pytest.approx(before)
+        assert f"drops before the fall {1e3 * before:.3g} mJ/m²" in loop.loss_note
+    machine = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=5)
+    assert machine.closing_drop == 0
+    assert machine.fall_warnings() == []
 
 
 def test_a_branch_that_is_interrupted_goes_on_with_the_same_bits():
