@@ -113,7 +113,7 @@ def test_one_wave_is_measured_against_its_exact_loss():
     assert 0 < measured.cpu_seconds < 30
     assert 20 < measured.megabytes_before <= measured.megabytes < 600 < peak_megabytes()
     assert ballast[0] == 1
-    assert (measured.jumps, measured.patches, measured.compiled) == (2, 1, False)
+    assert (measured.jumps, measured.patches) == (2, 1)
     assert measured.solutions > 10
 
 
