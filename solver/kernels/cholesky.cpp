@@ -64,8 +64,7 @@ WIDE bool factor_rows(double* a, int n, int stride) {
     const int first = std::max(last - block, 0);
     for (int k = last - 1; k >= first; --k) {
       double* row = a + k * stride;
-      for (int i = k + 1; i < last; ++i)
-        subtract(a[i * stride + k], a + i * stride, row, k + 1);
+      for (int i = k + 1; i < last; ++i) subtract(a[i * stride + k], a + i * stride, row, k + 1);
       if (!(row[k] > 0)) return false;
       scale(1 / std::sqrt(row[k]), row, k + 1);
     }

@@ -9,8 +9,8 @@ namespace {
 Vector low_openings(const Field& field, int k, const GaussRule& rule) {
   Vector out(rule.count);
   for (int i = 0; i < rule.count; ++i)
-    out[i] = field.scaled_opening[field.nodes.offset[k] + i] *
-             std::sqrt(1 - rule.eta[i] * rule.eta[i]);
+    out[i] =
+        field.scaled_opening[field.nodes.offset[k] + i] * std::sqrt(1 - rule.eta[i] * rule.eta[i]);
   return out;
 }
 
@@ -20,12 +20,10 @@ double clearance_since(const Field& field, int k, const SearchedGap& was,
   const Gap& gap = field.nodes.gaps[k];
   const double furthest = lengths.max_displacement;
   const double begin = gap.end[0] - was.end[0], end = gap.end[1] - was.end[1];
-  if (std::abs(begin) > furthest || std::abs(end) > furthest ||
-      field.nodes.orders[k] != was.order)
+  if (std::abs(begin) > furthest || std::abs(end) > furthest || field.nodes.orders[k] != was.order)
     return -1;
   const double within = NO_MINIMUM_WITHIN / COMPARABLE * furthest;
-  const double by_edges =
-      lengths.closing_per_motion * (std::max(begin, 0.0) + std::max(-end, 0.0));
+  const double by_edges = lengths.closing_per_motion * (std::max(begin, 0.0) + std::max(-end, 0.0));
   const Vector opening = low_openings(field, k, rule);
   double closed = 0, most = 0;
   bool none_inside = true;
@@ -99,8 +97,8 @@ Vector least_clearances(const std::vector<Minimum>& minima, int gaps,
                         const SearchLengths& lengths) {
   Vector out(gaps, infinity);
   for (const Minimum& minimum : minima)
-    out[minimum.gap] = std::min(out[minimum.gap],
-                                clearance_of(minimum.opening, minimum.curvature, lengths));
+    out[minimum.gap] =
+        std::min(out[minimum.gap], clearance_of(minimum.opening, minimum.curvature, lengths));
   return out;
 }
 

@@ -134,8 +134,7 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
     ModelFlow flow = flow_through(openings, limit, equal_speeds, is_long, strongest, law);
     for (int i = 0; i < count; ++i) motion[edges[i]] = flow.motion[i];
     const bool vanished = shortest_length(move_edges(ends, motion)) < law.smallest;
-    const bool runs_on =
-        flow.is_at_limit || largest(motion) > RUNNING_LENGTH * law.longest_step;
+    const bool runs_on = flow.is_at_limit || largest(motion) > RUNNING_LENGTH * law.longest_step;
     if (!is_long || (runs_on && !vanished)) return flow;
     is_long = false;
   }
@@ -145,8 +144,8 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
 //
 // By the tangent at their end, to first order. The order of both ends of a gap or patch that has
 // vanished does not matter.
-bool may_race(const Integers& edges, const Matrix& tangent, const Vector& start,
-              const Vector& ends, const EdgeLaw& law) {
+bool may_race(const Integers& edges, const Matrix& tangent, const Vector& start, const Vector& ends,
+              const EdgeLaw& law) {
   const double ran = RAN * law.longest_step / LONGEST_STEP;
   for (int i = 0; i < tangent.n; ++i) {
     const int e = edges[i];

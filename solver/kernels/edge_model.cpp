@@ -25,8 +25,7 @@ double share_within(const EdgeModel& model, const Vector& step, const Vector& li
 
 // Shorten steps that lead across the memory: there an edge may be pinned. From there it moves with
 // its force only.
-void stop_at_memory(const EdgeModel& model, const Vector& force, Vector& step,
-                    const EdgeLaw& law) {
+void stop_at_memory(const EdgeModel& model, const Vector& force, Vector& step, const EdgeLaw& law) {
   for (size_t c = 0; c < step.size(); ++c) {
     const double way = way_from_memory(model.edges[c].edge, model.edges[c].theta, law);
     if (way == 0) {
@@ -105,8 +104,7 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
 
 void EdgeModel::evaluate(MovingEdge& edge) const {
   auto [half_plane, slope] = half_plane_opening(edge.theta, edge.edge % 2, panels_);
-  auto [critical, drift, pinned] =
-      critical_of(edge.edge, edge.theta, edge.opening, law_, panels_);
+  auto [critical, drift, pinned] = critical_of(edge.edge, edge.theta, edge.opening, law_, panels_);
   edge.half_plane = half_plane;
   edge.pinned = pinned;
   edge.rate = edge.own + outwards(edge.edge) * slope;
@@ -143,10 +141,10 @@ void EdgeModel::follow_lengths(const Vector& step) {
     const double first = coupling_(e, f), last = first * length / later;
     coupling_(e, f) = coupling_(f, e) = last;
     const double by_length = (is_patch ? -first : first) / later;
-    one.own += (by_length * two.opening + first * last * one.opening) *
-               (is_patch ? both : 0.5 * step[f]);
-    two.own += (by_length * one.opening + first * last * two.opening) *
-               (is_patch ? both : 0.5 * step[e]);
+    one.own +=
+        (by_length * two.opening + first * last * one.opening) * (is_patch ? both : 0.5 * step[f]);
+    two.own +=
+        (by_length * one.opening + first * last * two.opening) * (is_patch ? both : 0.5 * step[e]);
   }
   for (size_t e = 0; e < edges.size(); ++e)
     edges[e].theta += outwards(edges[e].edge) * 0.5 * step[e];
@@ -154,8 +152,8 @@ void EdgeModel::follow_lengths(const Vector& step) {
 
 void EdgeModel::forces(Vector& force) const {
   for (size_t e = 0; e < edges.size(); ++e)
-    force[e] = edges[e].critical * edges[e].critical -
-               edges[e].opening * std::abs(edges[e].opening);
+    force[e] =
+        edges[e].critical * edges[e].critical - edges[e].opening * std::abs(edges[e].opening);
 }
 
 void EdgeModel::hessian(Matrix& out) const {
@@ -190,8 +188,8 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
     model.hessian(hessian);
     Vector step = implicit_step(hessian, force, longest, equal_speeds);
     if (law.pinning > 0) stop_at_memory(model, force, step, law);
-    if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
-                                        total < FAINT_SADDLE * law.force_error))
+    if (!(largest(step) > shortest) &&
+        (distance_to_minimum(hessian, force) <= shortest || total < FAINT_SADDLE * law.force_error))
       break;
     share = share_within(model, step, limit);
     if (share < 1)

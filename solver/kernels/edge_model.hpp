@@ -22,14 +22,14 @@ namespace adhesis {
 
 // An edge on its way from where it was solved.
 struct MovingEdge {
-  int edge;               // its number
-  int after;              // index of the edge after it, -1 if that is none of the moving ones
+  int edge;   // its number
+  int after;  // index of the edge after it, -1 if that is none of the moving ones
   double theta, motion = 0;
-  double opening, rate;   // C, and ∂C/∂n
-  double half_plane;      // R
+  double opening, rate;            // C, and ∂C/∂n
+  double half_plane;               // R
   double critical, critical_rate;  // C_c, and its derivative by n
   bool pinned;                     // whether C lies between both critical openings
-  double own;             // ∂C/∂n, less that of a half-plane crack
+  double own;                      // ∂C/∂n, less that of a half-plane crack
 };
 
 class EdgeModel {
@@ -78,9 +78,9 @@ double distance_to_minimum(const Matrix& hessian, const Vector& force);
 
 // Flow through the model.
 struct ModelFlow {
-  Vector motion;    // outward motion of the contact at every edge
-  Vector opening;   // C of the model at the end
-  Vector lengths;   // largest motion up to each step
+  Vector motion;                  // outward motion of the contact at every edge
+  Vector opening;                 // C of the model at the end
+  Vector lengths;                 // largest motion up to each step
   std::vector<Vector> residuals;  // C - C_c of the model after each step
   bool is_at_limit = false;       // whether an edge came to its limit
 };
@@ -88,8 +88,8 @@ struct ModelFlow {
 // Follow the flow ṅ = C_c² - C² by linearly implicit Euler steps, (1/Δτ + H) Δn = force, until an
 // edge is at its limit, or at rest; a long step, or near balance. `strongest` is the largest norm
 // of the forces on the way so far. A short step ends where the forces have fallen, too: how far a
-// shallow minimum is from a saddle only the field shows. With equal speeds, for comparison, the time
-// Δτ is each edge's own.
+// shallow minimum is from a saddle only the field shows. With equal speeds, for comparison, the
+// time Δτ is each edge's own.
 ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds, bool is_long,
                        double strongest, const EdgeLaw& law);
 

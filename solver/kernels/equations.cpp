@@ -136,7 +136,7 @@ double mapped_kernel(double alpha, double x) {
 }
 
 WIDE void end_charges(const Nodes& nodes, const Equations& equations, int k, int side,
-                 const GaussRule& rule, double* density, double* load, double* charge) {
+                      const GaussRule& rule, double* density, double* load, double* charge) {
   const int m = rule.count, first = nodes.offset[k];
   const double* block = &equations.blocks[nodes.square[k]];
   const double point = pi / (m + 1);  // weight at the edge itself
@@ -149,8 +149,8 @@ WIDE void end_charges(const Nodes& nodes, const Equations& equations, int k, int
   for (int i = 0; i < m; ++i) {
     double total = dot_difference(&rule.crack[i * m], block + i * m, density, m);
     double near = rule.weights[i] * point * mapped_kernel(alpha, rule.eta[i] - (2 * side - 1));
-    double far = nodes.weight[first + i] * singular_weight *
-                 periodic_images(nodes.theta[first + i] - edge);
+    double far =
+        nodes.weight[first + i] * singular_weight * periodic_images(nodes.theta[first + i] - edge);
     load[i] = total + (near + far) / (4 * pi);
   }
 }

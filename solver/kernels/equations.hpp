@@ -11,12 +11,12 @@ namespace adhesis {
 // Gaps and their Gauss-Chebyshev nodes, N of all L gaps together.
 struct Nodes {
   std::vector<Gap> gaps;
-  Integers orders;   // of each gap's rule
-  Integers offset;   // first node of each gap, and N
-  Integers square;   // first element of the M×M matrix of each gap, and of all
-  Vector theta, weight;                        // θ and X
-  Vector sine, cosine;                         // of θ/2
-  std::vector<std::array<double, 2>> slope;    // dη/dθ at both ends of each gap
+  Integers orders;       // of each gap's rule
+  Integers offset;       // first node of each gap, and N
+  Integers square;       // first element of the M×M matrix of each gap, and of all
+  Vector theta, weight;  // θ and X
+  Vector sine, cosine;   // of θ/2
+  std::vector<std::array<double, 2>> slope;  // dη/dθ at both ends of each gap
 
   Nodes() = default;
   Nodes(std::vector<Gap> gaps, Integers orders);
@@ -32,8 +32,8 @@ using EndTerms = std::array<std::array<double, 2>, 2>;  // [side][field]
 // Diagonal blocks of B + G, flat, and loads; X is the weight of the nodes.
 struct Equations {
   Vector blocks;
-  Vector load, load_of_slope;        // S~, and S~' if asked for
-  std::vector<EndTerms> end_terms;   // terms that the modes of S and S' above M add at the ends
+  Vector load, load_of_slope;       // S~, and S~' if asked for
+  std::vector<EndTerms> end_terms;  // terms that the modes of S and S' above M add at the ends
 };
 
 Equations allocate_equations(const Nodes& nodes);

@@ -92,8 +92,8 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
   for (int k = 0; k < count; ++k) {
     fill_gap(k, fields, field.nodes, field.equations, model);
     const int at = nodes.square[k];
-    solvable &= invert_definite(&field.equations.blocks[at], nodes.size_of(k),
-                                &out.factored.inverse[at]);
+    solvable &=
+        invert_definite(&field.equations.blocks[at], nodes.size_of(k), &out.factored.inverse[at]);
   }
   out.factored.tree = build_tree(nodes, model.digits);
   Tree& tree = out.factored.tree;
@@ -170,9 +170,9 @@ Vector gap_potentials(const Field& field) {
     const int m = nodes.size_of(k), first = nodes.offset[k];
     for (int i = 0; i < m; ++i) {
       // A f + w g + S~ + p X = 0
-      double total = field.equations.load[first + i] + field.pressure * nodes.weight[first + i] +
-                     dot(&field.equations.blocks[nodes.square[k] + i * m],
-                         &field.scaled_opening[first], m);
+      double total =
+          field.equations.load[first + i] + field.pressure * nodes.weight[first + i] +
+          dot(&field.equations.blocks[nodes.square[k] + i * m], &field.scaled_opening[first], m);
       out[first + i] = -total / w[i];
     }
   }

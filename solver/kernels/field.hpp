@@ -12,13 +12,13 @@ struct Field {
   Model model;
   Nodes nodes;
   Equations equations;
-  Pair solved;            // (B + G)⁻¹ of S~ and of X; empty if the potential was known
+  Pair solved;                       // (B + G)⁻¹ of S~ and of X; empty if the potential was known
   double unit_mean = not_a_number;   // Xᵀ (B + G)⁻¹ X
   double resistance = not_a_number;  // -2π/resistance is ∂p/∂d at fixed edges
   double pressure = not_a_number;    // p; NaN if there is no field
   double separation = not_a_number;  // q0 s
-  Vector scaled_opening;  // f: the openings over sqrt(1-η²)
-  Vector opening;         // C at each edge
+  Vector scaled_opening;             // f: the openings over sqrt(1-η²)
+  Vector opening;                    // C at each edge
 
   explicit Field(const Model& model) : model(model) {}
 };

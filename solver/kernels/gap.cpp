@@ -16,7 +16,7 @@ Vector tabulate_expm1() {
 }  // namespace
 
 WIDE void place_nodes(const Gap& gap, std::span<const double> cosine, std::span<const double> sine,
-                 double* theta, double* theta_by_t) {
+                      double* theta, double* theta_by_t) {
   static const Vector table = tabulate_expm1();
   const int count = int(cosine.size());
   const double alpha = 2 * gap.alpha;

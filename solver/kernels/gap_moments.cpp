@@ -15,7 +15,7 @@ namespace adhesis {
 namespace {
 
 constexpr double largest_series = 0.36;  // z up to which artanh z is a short series
-constexpr double surely_smooth = 2.0;  // modes·length/distance of a panel that surely spans less
+constexpr double surely_smooth = 2.0;    // modes·length/distance of a panel that surely spans less
 
 // Nodes of the moments: 1 - η and 1 + η, and the weights times S and S'.
 struct MomentNodes {
@@ -110,8 +110,7 @@ struct Tile {
 };
 
 // Tile the gap between finest panels `first` and `last`, for as many modes.
-std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes,
-                           const Panels& panels) {
+std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes, const Panels& panels) {
   std::vector<Tile> tiles;
   const int levels = int(panels.level_start.size());
   for (long panel = first; panel < last; panel += tiles.back().size) {
@@ -217,7 +216,7 @@ MomentNodes place_moment_nodes(const Gap& gap, int modes, int fields, const Pane
 }  // namespace
 
 WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
-                 std::array<std::array<double, 2>, 2>& ends) {
+                      std::array<std::array<double, 2>, 2>& ends) {
   MomentNodes nodes = place_moment_nodes(gap, modes, fields, panels);
   for (; nodes.count % 4 != 0; ++nodes.count) {  // whole vectors, the last ones without weight
     nodes.from_end[0][nodes.count] = nodes.from_end[1][nodes.count] = 1;
@@ -253,7 +252,8 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int field
   for (int field = 0; field < fields; ++field) {
     ends[0][field] = sum_lanes(low[field]);
     ends[1][field] = sum_lanes(high[field]);
-    for (int n = 0; n < modes; ++n) s[n * fields + field] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
+    for (int n = 0; n < modes; ++n)
+      s[n * fields + field] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
   }
 }
 

@@ -32,7 +32,7 @@ struct Space {
 WIDE void add_near_potential(const Nodes& nodes, const Vector& opening, int k, Space& space) {
   const int count = nodes.gap_count(), first = nodes.offset[k], m = nodes.size_of(k);
   const double *sine = &nodes.sine[first], *cosine = &nodes.cosine[first];
-  double *__restrict near = space.near.data(), *__restrict slope = space.near_slope.data();
+  double* __restrict near = space.near.data(), * __restrict slope = space.near_slope.data();
   for (int side = 0; side < std::min(2, count - 1); ++side) {
     const int other = (k - 1 + 2 * side + count) % count;
     for (int j = nodes.offset[other]; j < nodes.offset[other + 1]; ++j) {
@@ -62,11 +62,10 @@ void load_gap(const LinearResponse& response, int k, const GaussRule& rule, Spac
     for (int j = 0; j < m; ++j)
       by_eta += rule.derivative[i * m + j] * (space.smooth[j] - space.smooth[i]);
     const double w = rule.weights[i];
-    space.loads[by_field][i] =
-        -(equations.load[first + i] + pressure * weight[i] + w * about[i]);
+    space.loads[by_field][i] = -(equations.load[first + i] + pressure * weight[i] + w * about[i]);
     space.loads[by_pressure][i] = weight[i];
-    space.loads[by_motion][i] = -(equations.load_of_slope[first + i] +
-                                  weight[i] * space.near_slope[i] + w * by_eta);
+    space.loads[by_motion][i] =
+        -(equations.load_of_slope[first + i] + weight[i] * space.near_slope[i] + w * by_eta);
   }
   for (int side = 0; side < 2; ++side)
     end_charges(nodes, equations, k, side, rule, space.density.data(),
@@ -82,8 +81,7 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& mode
   Space space(m);
   load_gap(*this, k, rule, space);
   for (int c = 0; c < columns; ++c)
-    for (int i = 0; i < m; ++i)
-      space.solved[c][i] = dot(own + i * m, space.loads[c].data(), m);
+    for (int i = 0; i < m; ++i) space.solved[c][i] = dot(own + i * m, space.loads[c].data(), m);
   std::copy(space.solved[by_field].begin(), space.solved[by_field].end(),
             scaled_opening.begin() + first);
 
@@ -162,7 +160,8 @@ WIDE void LinearResponse::condense(int k, double pinning) {
   const double pull_left = -residual_left - a * left.here - b * right.here;
   const double pull_right = -residual_right - c * left.here - d * right.here;
   const double* potential_here = &about[first];
-  const double *by_left = &opening_by_potential[0][first], *by_right = &opening_by_potential[1][first];
+  const double *by_left = &opening_by_potential[0][first],
+               *by_right = &opening_by_potential[1][first];
   for (int side = 0; side < 2; ++side) {
     Edge& edge = edges[2 * k + side];
     auto [x, y] = edge.compliance;
@@ -170,8 +169,8 @@ WIDE void LinearResponse::condense(int k, double pinning) {
     for (int j = 0; j < m; ++j) follows[j] = x * by_left[j] + y * by_right[j];
     edge.isolated_correction = edge.here + x * pull_left + y * pull_right;
     edge.motion[1] = x * left.opening_by_pressure + y * right.opening_by_pressure;
-    edge.motion[0] = edge.isolated_correction - edge.motion[1] * pressure -
-                     dot(follows, potential_here, m);
+    edge.motion[0] =
+        edge.isolated_correction - edge.motion[1] * pressure - dot(follows, potential_here, m);
   }
   const double *own = &inverse[nodes.square[k]], *stretch = &tree.stretch[first];
   double* response = &tree.response[tree.runs[k].response];
@@ -184,8 +183,8 @@ WIDE void LinearResponse::condense(int k, double pinning) {
                0.5 * (q_left[i] * n_left[j] + q_left[j] * n_left[i]) -
                0.5 * (q_right[i] * n_right[j] + q_right[j] * n_right[i]);
     mean_by_potential[first + i] = dot(row, stretch, m);
-    const double by_p = held_charge[1][first + i] + q_left[i] * left.motion[1] +
-                        q_right[i] * right.motion[1];
+    const double by_p =
+        held_charge[1][first + i] + q_left[i] * left.motion[1] + q_right[i] * right.motion[1];
     charges[1].isolated[first + i] = by_p;
     charges[0].isolated[first + i] =
         held_charge[0][first + i] + q_left[i] * left.isolated_correction +

@@ -58,8 +58,7 @@ double inverse_form(double* matrix, const double* vector, int n) {
   Vector y(n);
   for (int i = 0; i < n; ++i) {
     double* row = matrix + i * n;
-    for (int j = 0; j < i; ++j)
-      row[j] = (row[j] - dot(row, matrix + j * n, j)) / matrix[j * n + j];
+    for (int j = 0; j < i; ++j) row[j] = (row[j] - dot(row, matrix + j * n, j)) / matrix[j * n + j];
     row[i] = std::sqrt(row[i] - dot(row, row, i));
     y[i] = (vector[i] - dot(row, y.data(), i)) / row[i];
     sum += y[i] * y[i];

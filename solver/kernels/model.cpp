@@ -20,7 +20,7 @@ ValueAndSlope evaluate_series(const Vector& coefficients, double theta, const Pa
 }
 
 WIDE void interpolate(const Vector& coefficients, const double* position, int count,
-                 const Panels& panels, double* out) {
+                      const Panels& panels, double* out) {
   const int terms = int(coefficients.size()) / panels.finest_count;
   const int last = panels.finest_count - 1;
   // four recurrences side by side: each waits for its last term

@@ -23,16 +23,16 @@ struct LengthRule {
 struct Panels {
   double width;
   int finest_count;
-  Vector x, w;                              // Gauss-Legendre rule of a panel
-  Vector stress, slope;                     // Chebyshev coefficients of S, S' on each panel
-  Vector tilt;                              // of h'
-  std::array<Vector, 2> half_plane;         // of C of a half-plane crack that begins, ends at θ
-  std::array<Vector, 2> weights;            // ω for S and S' of every panel of every level
-  Integers level_start;                     // row of the weights at which each level starts
-  Vector end_x, end_w;                      // Gauss-Legendre rule on (0, 1) of an end piece
-  ShortRule short_rule;                     // of a short gap, unless it needs more nodes
+  Vector x, w;                       // Gauss-Legendre rule of a panel
+  Vector stress, slope;              // Chebyshev coefficients of S, S' on each panel
+  Vector tilt;                       // of h'
+  std::array<Vector, 2> half_plane;  // of C of a half-plane crack that begins, ends at θ
+  std::array<Vector, 2> weights;     // ω for S and S' of every panel of every level
+  Integers level_start;              // row of the weights at which each level starts
+  Vector end_x, end_w;               // Gauss-Legendre rule on (0, 1) of an end piece
+  ShortRule short_rule;              // of a short gap, unless it needs more nodes
   LengthRule length;
-  int top;                                  // highest harmonic of the profile
+  int top;  // highest harmonic of the profile
 
   int nodes() const { return int(x.size()); }
 };

@@ -1,8 +1,7 @@
 #include "newton.hpp"
 
-#include "signals.hpp"
-
 #include "condensed.hpp"
+#include "signals.hpp"
 
 namespace adhesis {
 
@@ -51,8 +50,8 @@ void share_openings(Equilibrium& out, LinearResponse& response, const Flags& pin
   const Integers edges = indices(pinned);
   const HeldEdges held(response, edges, out.at, model.device);
   const Vector residual = held.residual(), closing = held.closing_by_pressure();
-  const double by_pressure = model.device.separation_weight * response.mean[1] -
-                             2 * pi * model.device.compliance;
+  const double by_pressure =
+      model.device.separation_weight * response.mean[1] - 2 * pi * model.device.compliance;
   out.pinned_share.assign(out.ends.size(), not_a_number);
   out.pinned_rate = out.pinned_share;
   for (size_t c = 0; c < edges.size(); ++c) {
@@ -64,8 +63,8 @@ void share_openings(Equilibrium& out, LinearResponse& response, const Flags& pin
 
 }  // namespace
 
-Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed,
-                             double reach, bool strict, const EdgeLaw& law, const Model& model) {
+Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed, double reach,
+                             bool strict, const EdgeLaw& law, const Model& model) {
   const int edges = int(ends.size());
   Equilibrium out;
   Flags pinned = at_memory(ends, law);

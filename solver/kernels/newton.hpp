@@ -9,7 +9,7 @@ struct Equilibrium {
   bool found = false;        // whether a stable equilibrium was found within reach
   bool is_outgrown = false;  // whether a gap or run needs more nodes than the response has
   Vector ends;
-  Vector potential;          // of the other gaps at the reference nodes, as G
+  Vector potential;  // of the other gaps at the reference nodes, as G
   ResponseSolution at;
   int corrections = 0;
   std::vector<Gap> references;  // of the gaps, and the orders of their rules
@@ -24,7 +24,7 @@ struct Equilibrium {
 // than that to which the response is accurate. Where the edges are not stable on the way, or the
 // corrections hardly shrink, the iteration ends. Unless `strict`, edges that are nearly in
 // equilibrium are taken as they are.
-Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed,
-                             double reach, bool strict, const EdgeLaw& law, const Model& model);
+Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed, double reach,
+                             bool strict, const EdgeLaw& law, const Model& model);
 
 }  // namespace adhesis

@@ -16,8 +16,8 @@ LeadingEdge follow_edge(int edge, const TwoPoints& points, double fastest) {
   const double gone = (points.ends[edge] - points.ends_before[edge]) * outwards(edge);
   const double before = gone / (points.way * points.rate_before[edge]);
   const double here = gone / (points.way * points.rate[edge]);
-  LeadingEdge out = {edge, fastest, gone, not_a_number, not_a_number, not_a_number, infinity,
-                     infinity};
+  LeadingEdge out = {edge,         fastest,      gone,     not_a_number,
+                     not_a_number, not_a_number, infinity, infinity};
   if (!(0 < before && before < infinity && 0 < here && here < infinity)) return out;
   out.here = here;
   out.square = 2 * here + before - 3;

@@ -36,8 +36,8 @@ GaussRule::GaussRule(int m)
 const std::vector<GaussRule>& gauss_rules() {
   static const std::vector<GaussRule> rules = [] {
     std::vector<GaussRule> all;
-    for (int count : {4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14,
-                      16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128})
+    for (int count :
+         {4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128})
       all.emplace_back(count);
     return all;
   }();

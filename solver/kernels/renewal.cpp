@@ -8,8 +8,8 @@ namespace {
 
 // Move the reference of a gap, filled in already, with the potential there; `old` is where it was.
 // Returns whether it has a field.
-bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
-               const EdgeLaw& law, const Model& model) {
+bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure, const EdgeLaw& law,
+               const Model& model) {
   const Nodes& nodes = response.nodes;
   Tree& tree = response.tree;
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
@@ -48,9 +48,7 @@ bool replace_runs(LinearResponse& response, const Flags& changed, const Model& m
   return true;
 }
 
-bool any(const Flags& flags) {
-  return std::find(flags.begin(), flags.end(), true) != flags.end();
-}
+bool any(const Flags& flags) { return std::find(flags.begin(), flags.end(), true) != flags.end(); }
 
 }  // namespace
 
@@ -182,7 +180,8 @@ void condense_gaps(LinearResponse& response, const Flags& some, const EdgeLaw& l
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
                      const EdgeLaw& law, const Model& model) {
   const double pressure = response.pressure_at(prescribed, model.device);
-  if (!move_references(response, ends, at_memory(ends, law), pressure, prescribed, law, model)) return false;
+  if (!move_references(response, ends, at_memory(ends, law), pressure, prescribed, law, model))
+    return false;
   response.solve(prescribed, law, model.device);
   return true;
 }

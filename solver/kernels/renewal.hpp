@@ -29,8 +29,8 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 // Move the references of gaps to these edges where they have departed from them.
 //
 // `held` marks the edges that are held from now on. `pressure` is p, with which the last solution
-// gives the potentials. Returns false where a gap or run needs more nodes than it has, or many gaps are
-// far from their references: then another response is to be set up.
+// gives the potentials. Returns false where a gap or run needs more nodes than it has, or many gaps
+// are far from their references: then another response is to be set up.
 bool move_references(LinearResponse& response, const Vector& ends, const Flags& held,
                      double pressure, double prescribed, const EdgeLaw& law, const Model& model);
 

@@ -66,8 +66,8 @@ void LinearResponse::update_softness(const Pair& motion, double by_pressure, con
                                      const Device& device) {
   // the compliance with which edges follow their openings, over that of their gap by itself or by
   // roughness of the shortest wave, at the prescribed d: edges by p, times how much more p changes
-  // than with all edges held. Modes that p does not excite, as of symmetric states, show in how near
-  // a 2×2 or a pair of runs is to singular.
+  // than with all edges held. Modes that p does not excite, as of symmetric states, show in how
+  // near a 2×2 or a pair of runs is to singular.
   const int count = gap_count();
   double held_mean = dot(tree.stretch.data(), held_charge[1].data(), nodes.size());
   held_mean = device.separation_weight * held_mean - 2 * pi * device.compliance;

@@ -19,16 +19,16 @@ namespace adhesis {
 
 // An edge in its reference.
 struct Edge {
-  double opening = 0, residual = 0;   // C and C - C_c, C_c that of an edge that advances
-  double drift = 0;                   // ∂C_c/∂n
-  bool recedes = false;               // whether it is behind its memory, with two works of adhesion
-  double opening_by_pressure = 0;     // ∂C/∂p between held edges
+  double opening = 0, residual = 0;  // C and C - C_c, C_c that of an edge that advances
+  double drift = 0;                  // ∂C_c/∂n
+  bool recedes = false;              // whether it is behind its memory, with two works of adhesion
+  double opening_by_pressure = 0;    // ∂C/∂p between held edges
   std::array<double, 2> tangent = {};  // ∂(C - C_c)/∂n of both edges of its gap, at the others' g
-  bool held = false;                  // whether it stays where it is,
-  double here = 0;                    // so far from the reference; 0 if it is not held
+  bool held = false;                   // whether it stays where it is,
+  double here = 0;                     // so far from the reference; 0 if it is not held
   std::array<double, 2> compliance = {};  // inverse of the tangents of edges that are not held
-  double isolated_correction = 0;     // motion that would balance the gap by itself
-  std::array<double, 2> motion = {};  // without potentials and p, and by a unit of p
+  double isolated_correction = 0;         // motion that would balance the gap by itself
+  std::array<double, 2> motion = {};      // without potentials and p, and by a unit of p
 
   // C - C_c and its derivative by the edge's own motion, by the law of where the edge is now. The
   // law is asked at every use, so a response stays valid where an edge begins to recede.
@@ -40,28 +40,28 @@ struct Edge {
 
 // All edges as the response has them at a prescribed quantity d.
 struct ResponseSolution {
-  Vector motion, rate;      // n from the reference, and dn/dd along the branch
-  Vector by_pressure;       // ∂n/∂p
+  Vector motion, rate;  // n from the reference, and dn/dd along the branch
+  Vector by_pressure;   // ∂n/∂p
   double pressure = not_a_number, separation = not_a_number;
   double slope = not_a_number;  // dY/dd along the branch: Y is p, under a load q0 s
   bool stable = false;
 };
 
 struct LinearResponse {
-  Nodes nodes;            // between the reference edges
-  Equations equations;    // with S and S'
-  Vector inverse;         // of the blocks
+  Nodes nodes;          // between the reference edges
+  Equations equations;  // with S and S'
+  Vector inverse;       // of the blocks
   Tree tree;
   std::array<Charges, 2> charges;  // without potentials and p, and by a unit of p
   Vector about, about_pressure;    // potentials and p of the references
-  Vector scaled_opening;  // f there
+  Vector scaled_opening;           // f there
   std::vector<Edge> edges;
-  Pair opening_by_potential;  // ∂C_e/∂g by the potential at its nodes, with the other sign
-  Pair charge_by_edge;        // charges by the motion of each edge
-  Pair held_charge;           // between held edges in the reference, and by a unit of p
-  Pair motion_by_potential;   // motion of both edges by the potential at each node
-  Vector mean_by_potential;   // mean opening, times 2π, likewise, with the other sign
-  Pair potential;             // of the last solution, without p and by a unit of p
+  Pair opening_by_potential;        // ∂C_e/∂g by the potential at its nodes, with the other sign
+  Pair charge_by_edge;              // charges by the motion of each edge
+  Pair held_charge;                 // between held edges in the reference, and by a unit of p
+  Pair motion_by_potential;         // motion of both edges by the potential at each node
+  Vector mean_by_potential;         // mean opening, times 2π, likewise, with the other sign
+  Pair potential;                   // of the last solution, without p and by a unit of p
   std::array<double, 2> mean = {};  // its mean opening, times 2π, likewise
   Vector softness;  // compliance of each gap's edges, over that from which on gaps are soft
 

@@ -109,9 +109,9 @@ NewResponse set_up_response(const Vector& ends, double prescribed, const Integer
   auto [field, factored] = solve_field(ends, prescribed, orders, 2, model);
   const int count = field.nodes.gap_count(), n = field.nodes.size();
   const Vector about = gap_potentials(field);
-  NewResponse made = {LinearResponse(std::move(field.nodes), std::move(field.equations),
-                                     std::move(factored.tree)),
-                      std::isfinite(field.pressure)};
+  NewResponse made = {
+      LinearResponse(std::move(field.nodes), std::move(field.equations), std::move(factored.tree)),
+      std::isfinite(field.pressure)};
   LinearResponse& out = made.response;
   if (!made.has_field) return made;
   out.inverse = std::move(factored.inverse);
@@ -120,8 +120,8 @@ NewResponse set_up_response(const Vector& ends, double prescribed, const Integer
   out.scaled_opening = field.scaled_opening;
   std::copy(about.begin(), about.end(), out.potential[0].begin());
   out.mean[1] = -field.unit_mean;
-  out.mean[0] = dot(out.nodes.weight.data(), out.scaled_opening.data(), n) -
-                field.pressure * out.mean[1];
+  out.mean[0] =
+      dot(out.nodes.weight.data(), out.scaled_opening.data(), n) - field.pressure * out.mean[1];
   for (Edge& edge : out.edges) edge.held = law.pinning > 0;  // which are pinned is not known yet
   for (int k = 0; k < count; ++k) out.linearise(k, law, model);
   out.factor_runs(Flags(count, true));
@@ -185,8 +185,7 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
       continue;
     }
     const int square = out.nodes.square[k];
-    if (!invert_definite(&out.equations.blocks[square], out.nodes.size_of(k),
-                         &out.inverse[square]))
+    if (!invert_definite(&out.equations.blocks[square], out.nodes.size_of(k), &out.inverse[square]))
       return made;
     out.linearise(k, law, model);
   }

@@ -17,7 +17,8 @@ void take_twos(int parts, int stride, const Circle& circle, const Complex& x, Co
   for (int p = 0; p < parts; ++p) {
     const double c = circle.cosine[4 * p * stride], s = circle.sine[4 * p * stride];
     const double *re = &x.re[stride * p], *im = &x.im[stride * p];
-    double *__restrict to_re = &out.re[2 * stride * p], *__restrict to_im = &out.im[2 * stride * p];
+    double* __restrict to_re = &out.re[2 * stride * p], * __restrict to_im =
+                                                            &out.im[2 * stride * p];
     for (int q = 0; q < stride; ++q) {
       const double a = re[q] - re[far + q], b = im[q] - im[far + q];
       to_re[q] = re[q] + re[far + q];
@@ -36,7 +37,8 @@ void take_fours(int parts, int stride, const Circle& circle, const Complex& x, C
     const double c2 = circle.cosine[2 * w], s2 = circle.sine[2 * w];
     const double c3 = circle.cosine[3 * w], s3 = circle.sine[3 * w];
     const double *re = &x.re[stride * p], *im = &x.im[stride * p];
-    double *__restrict to_re = &out.re[4 * stride * p], *__restrict to_im = &out.im[4 * stride * p];
+    double* __restrict to_re = &out.re[4 * stride * p], * __restrict to_im =
+                                                            &out.im[4 * stride * p];
     for (int q = 0; q < stride; ++q) {
       const double ac_re = re[q] + re[2 * far + q], ac_im = im[q] + im[2 * far + q];
       const double bd_re = re[far + q] + re[3 * far + q], bd_im = im[far + q] + im[3 * far + q];

@@ -23,7 +23,7 @@ int wanted_rank(const Gap& interval, double digits) {
 
 // Compute K between two sets of charges.
 WIDE void fill_kernel(const double* theta, const double* stretch, int rows, const double* other,
-                 const double* other_stretch, int columns, double* out) {
+                      const double* other_stretch, int columns, double* out) {
   Vector sine(columns), cosine(columns);
   for (int j = 0; j < columns; ++j) {
     sine[j] = std::sin(0.5 * other[j]);
@@ -61,7 +61,7 @@ void fill_interpolation(const Gap& interval, const Vector& node, const Vector& s
 
 // out += a b, a of (rows, inner), b of (inner, columns).
 WIDE void add_product(const double* a, const double* __restrict b, int rows, int inner, int columns,
-                 double* __restrict out) {
+                      double* __restrict out) {
   for (int i = 0; i < rows; ++i) {
     double* row = out + i * columns;
     const double* c = a + i * inner;
@@ -78,7 +78,7 @@ WIDE void add_product(const double* a, const double* __restrict b, int rows, int
 
 // out += aᵀ b, a of (inner, rows), b of (inner, columns).
 WIDE void add_transposed_product(const double* a, const double* __restrict b, int inner, int rows,
-                            int columns, double* __restrict out) {
+                                 int columns, double* __restrict out) {
   int k = 0;
   for (; k + 4 <= inner; k += 4) {
     const double *b0 = b + k * columns, *b1 = b0 + columns, *b2 = b1 + columns;
@@ -328,8 +328,8 @@ WIDE void Tree::place_charges(int index) {
     out += child.rank * rank;
   }
   const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
-  fill_kernel(&theta[one.node], &stretch[one.node], one.rank, &theta[two.node],
-              &stretch[two.node], two.rank, &kernel[run.kernel]);
+  fill_kernel(&theta[one.node], &stretch[one.node], one.rank, &theta[two.node], &stretch[two.node],
+              two.rank, &kernel[run.kernel]);
 }
 
 bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits) {
@@ -401,7 +401,8 @@ WIDE void Tree::charge(int index, Charges& charges) const {
   const int n = one.rank, m = two.rank, r = run.rank;
   const double *first = &response[one.response], *second = &response[two.response];
   const double* k12 = &kernel[run.kernel];
-  double *g1 = &charges.potential_of_sibling[one.node], *g2 = &charges.potential_of_sibling[two.node];
+  double *g1 = &charges.potential_of_sibling[one.node],
+         *g2 = &charges.potential_of_sibling[two.node];
   const double *q1_alone = &charges.isolated[one.node], *q2_alone = &charges.isolated[two.node];
   double q1[MOST_RANK], q2[MOST_RANK], g[MOST_RANK];
   // g1 = -(1 - H R1)⁻¹ K12 (q2° + R2 K21 q1°);  g2 = -K21 q1
@@ -433,8 +434,9 @@ WIDE void Tree::pass_down(const Flags& wanted, const Charges& charges, Vector& p
       const Run& child = runs[half];
       if (wanted[half]) {
         for (int i = 0; i < child.rank; ++i)
-          potential[child.node + i] = charges.potential_of_sibling[child.node + i] +
-                                      dot(inward + i * run.rank, potential.data() + run.node, run.rank);
+          potential[child.node + i] =
+              charges.potential_of_sibling[child.node + i] +
+              dot(inward + i * run.rank, potential.data() + run.node, run.rank);
       }
       inward += child.rank * run.rank;
     }

@@ -26,8 +26,8 @@ namespace adhesis {
 // The halves of every run; of a gap -1.
 using Halves = std::vector<std::array<int, 2>>;
 
-// Number of negative eigenvalues, and the distance of a gap's 2×2, or of the pair of a run's halves,
-// from singular: 1 without interaction.
+// Number of negative eigenvalues, and the distance of a gap's 2×2, or of the pair of a run's
+// halves, from singular: 1 without interaction.
 struct NegativeCount {
   int negative = 0;
   double nearest = 1;
@@ -56,13 +56,13 @@ struct Charges {
 // First the L gaps, then pairs of runs, the last one the whole.
 struct Tree {
   std::vector<Run> runs;
-  int count = 0;             // of gaps
-  Vector theta, stretch;     // θ and dθ/dη of all charges
-  Vector kernel;             // K12 of all pairs
-  Vector interpolation;      // E of both halves of all pairs
-  Vector response;           // R of all runs
-  Vector inverse;            // (1 - K12 R2 K21 R1)⁻¹ of all pairs
-  Vector inner_potential;    // D of both halves of all pairs
+  int count = 0;           // of gaps
+  Vector theta, stretch;   // θ and dθ/dη of all charges
+  Vector kernel;           // K12 of all pairs
+  Vector interpolation;    // E of both halves of all pairs
+  Vector response;         // R of all runs
+  Vector inverse;          // (1 - K12 R2 K21 R1)⁻¹ of all pairs
+  Vector inner_potential;  // D of both halves of all pairs
 
   Tree() = default;
 

@@ -24,8 +24,6 @@ from adhesis import (
 )
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.references.exact_wave import ExactWave
-from adhesis.solver.runtime import threads as one_thread
-from adhesis.solver.runtime.threads import on_one_thread
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
@@ -225,24 +223,6 @@ def test_threads_that_share_a_method_get_the_bits_of_one_alone(index):
             assert list(pool.map(in_thread, turns)) == alone
     finally:
         sys.setswitchinterval(interval)
-
-
-def test_one_caller_at_a_time_changes_the_number_of_threads():
-    """Else the first to leave would restore it while the other is at work."""
-
-    @on_one_thread
-    def limited(pool: ThreadPoolExecutor) -> bool:
-        return pool.submit(enters).result()
-
-    def enters() -> bool:
-        entered = one_thread._in_use.acquire(blocking=False)
-        if entered:
-            one_thread._in_use.release()
-        return entered
-
-    with ThreadPoolExecutor(1) as pool:
-        assert not limited(pool)
-        assert pool.submit(enters).result()
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from threadpoolctl import ThreadpoolController
 
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.registry import make_method
+from adhesis.solver.runtime.threads import on_one_thread
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from tests.support.scenes import small_problem
 
@@ -63,3 +64,20 @@ def test_two_loops_in_two_threads_have_the_bits_of_one_after_the_other():
     expected = [loss(work) for work in works]
     with ThreadPoolExecutor(2) as pool:
         assert list(pool.map(loss, works)) == expected
+
+
+def test_the_first_caller_to_leave_restores_nothing_while_another_is_at_work():
+    @on_one_thread
+    def shorter() -> set[int]:
+        return threads()
+
+    @on_one_thread
+    def longer(pool: ThreadPoolExecutor) -> set[int]:
+        assert pool.submit(shorter).result() == {1}
+        return threads()
+
+    with ThreadpoolController().limit(limits=2), ThreadPoolExecutor(1) as pool:
+        if threads() != {2}:
+            pytest.skip("this linear algebra has no threads")
+        assert longer(pool) == {1}
+        assert threads() == {2}
