@@ -251,3 +251,12 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Sign
         assert "the same command resumes it (out/study.h5)" in script.stderr.readline()
     finally:
         os.killpg(script.pid, signal.SIGKILL)  # the stand-in's sleep
+
+
+def test_modules_are_not_searched_for_above_the_checkout() -> None:
+    """A file of the user there, beside the clone, would be taken for a library."""
+    code = "import sys; print(*sys.path, sep='\\n')"
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True
+    )
+    assert str(ROOT.parent) not in done.stdout.splitlines()
