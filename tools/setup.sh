@@ -163,11 +163,11 @@ needs() { # NAME PROGRAM: does a test want a program that is missing and may be 
 }
 need_programs() { needs slurm slurmctld || needs browser chromium; }
 install_program() { # NAME TEXT PACKAGE…
-    local name=$1 text=$2
+    local name=$1 whom=$2
     shift 2
-    say "system packages for $text: $*"
+    say "system packages for $whom: $*"
     # Tried once: the tests are skipped and say so, and set-up stays quick.
-    step "$name" "system packages for $text" apt_install "$@" || touch ".setup/no-$name"
+    step "$name" "system packages for $whom" apt_install "$@" || touch ".setup/no-$name"
 }
 install_programs() {
     if needs slurm slurmctld; then install_program slurm "the test of the batch script" $SLURM; fi
