@@ -7,7 +7,7 @@ import numpy
 from numpy.typing import NDArray
 
 
-COMPILER: str = 'GNU 12.2.0'
+COMPILER: str
 
 class Panels:
     """The full-contact stress of a profile, compressed on panels."""

@@ -16,10 +16,11 @@ PATH = Path(__file__).resolve().parent.parent / "solver" / "_kernels.pyi"
 
 
 def stub() -> str:
-    """Return the types of the module; of arrays those of their numbers alone."""
+    """Return the types of the module: of arrays those of their numbers, and no compiler's name."""
     generator = StubGen(_kernels)
     generator.put(_kernels)
-    return re.sub(r"Annotated\[(NDArray\[[a-z0-9.]+\]), dict\([^)]*\)\]", r"\1", generator.get())
+    text = re.sub(r"^(COMPILER: str) = .*$", r"\1", generator.get(), flags=re.MULTILINE)
+    return re.sub(r"Annotated\[(NDArray\[[a-z0-9.]+\]), dict\([^)]*\)\]", r"\1", text)
 
 
 if __name__ == "__main__":

@@ -58,7 +58,8 @@ class DiskFile(io.RawIOBase):
     def close(self) -> None:
         """Close the file, after h5py has closed its own."""
         try:
-            self._file.close()
+            if hasattr(self, "_file"):  # Python closes the object also if it could not be opened
+                self._file.close()
         except OSError as error:  # some disks report only now that they are full
             self._error = self._error or error
         super().close()

@@ -548,6 +548,7 @@ def test_no_row_is_written_into_a_file_that_is_not_at_its_path(path, campaign, h
             writer.write_result(0, row)
 
 
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
 def test_a_file_that_is_gone_when_it_is_opened_to_write_is_one_sentence(path):
     path.unlink()
     with pytest.raises(WriteError, match=r"r\.h5 could not be opened: No such file or directory"):
