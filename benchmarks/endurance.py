@@ -39,7 +39,7 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.launch import ONE_THREAD, launch_environment, launcher
 from adhesis.ensemble.run.ranks import world
 from adhesis.ensemble.run.session import Engine, run_campaign
-from adhesis.ensemble.task.compute import Runner, check_task, methods_of
+from adhesis.ensemble.task.compute import Runner, check_task
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.fields import field_plan
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
@@ -93,13 +93,11 @@ def measured(times: Times, pretend: float | None) -> Engine:
 
     compute = Runner() if pretend is None else do_nothing(pretend)
     check = check_task if pretend is None else lambda *_: None
-    methods = methods_of if pretend is None else lambda *_: ()
     return Engine(
         compute=compute,
         check=check,
         writer=TimedWriter,
         watch=watch,
-        methods=methods,
     )
 
 

@@ -2,8 +2,7 @@
 
     python benchmarks/paths.py [--profiles 3] [--turns 8]
 
-Prints the tables of docs/paths.md. CPU time of one process; the first loop is run beforehand, so
-that nothing is compiled meanwhile.
+Prints the tables of docs/paths.md. CPU time of one process, after a first loop.
 """
 
 from __future__ import annotations

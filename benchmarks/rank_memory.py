@@ -2,9 +2,9 @@
 
     python benchmarks/rank_memory.py
 
-Each line adds something to the process: libraries, the solver, the code that is compiled (loaded
-from its cache), a loop of the paper's scale. "of its own" are pages that no other process on the
-node shares; files of libraries are shared by all its ranks.
+Each line adds something to the process: libraries, the solver, a loop of the paper's scale. "of its
+own" are pages that no other process on the node shares; files of libraries are shared by all its
+ranks.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ def main() -> None:
     parser.add_argument("--crests", type=int, default=0, help="lowest wave number (drawn: 1 to 3)")
     parser.add_argument("--shift", type=float, default=SHIFT, help="of one phase, in rad")
     args = parser.parse_args()
-    run(scene(0), scene(0).even, 1e-2)  # compile
+    run(scene(0), scene(0).even, 1e-2)  # loads what is needed
     beyond = slow = count = 0
     print(
         "| profile | accuracy | loss (J/m²) | difference/loss_error | time/time | patches | races |"

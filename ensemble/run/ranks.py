@@ -134,25 +134,6 @@ def wait_for_all(comm: Any, seconds: float = math.inf) -> bool:
     return True
 
 
-def one_a_node_first(comm: Any, function: Callable[[bool], T]) -> T:
-    """Run a function on one rank of each node, with True, and then on the others, with False."""
-    if comm.size == 1:
-        return function(True)
-    from mpi4py import MPI
-
-    wait_for_all(comm)  # in the split, and in what follows, a rank that waits would burn a core
-    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    first: bool = node.rank == 0
-    if first:
-        result = function(True)
-    wait_for_all(node)
-    if not first:
-        result = function(False)
-    wait_for_all(node)
-    node.Free()
-    return result
-
-
 class MpiChannel:
     """:class:`adhesis.ensemble.run.dispatch.Channel` over MPI.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -39,7 +39,7 @@ from adhesis.ensemble.run.progress import Counts, ProgressLine
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
-from adhesis.ensemble.task.compute import Runner, check_task, methods_of
+from adhesis.ensemble.task.compute import Runner, check_task
 from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
@@ -61,8 +61,6 @@ class Engine:
     all_write: bool = bool(h5py.get_config().mpi)
     # Makes what stands around a rank's loop of handing out or working
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
-    # The methods that tasks are computed by: they are compiled before the first task
-    methods: Callable[[Campaign, Iterable[Task]], Collection[str]] = methods_of
     silence: float = SILENCE  # how long a rank may not be heard from until the run ends, in s
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,12 +61,6 @@ def _make_method(campaign: Campaign, task: Task) -> Method:
         accuracy=campaign.solver.accuracy,
         nodes_per_wave=campaign.solver.nodes_per_wave,
     )
-
-
-def methods_of(campaign: Campaign, tasks: Iterable[Task]) -> set[str]:
-    """Return the names of the methods that compute the tasks."""
-    of_adhesion = {task.work_of_adhesion: task for task in tasks}
-    return {_make_method(campaign, task).name for task in of_adhesion.values()}
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The running program: compilation, its cache on disk, threads, signals, memory.
+"""The running program: threads, signals, memory.
 
 Import from its modules.
 """

@@ -1,8 +1,8 @@
 """Tolerances of method ``sharp``: one table, with unit, reason and the measurement behind each.
 
 Units: λ_min is the shortest wavelength of the profile, C_c the critical opening of an edge on a
-flat piece, h_max the highest crest, d the prescribed quantity in the units of the field. Compiled
-code reads these values when it is compiled.
+flat piece, h_max the highest crest, d the prescribed quantity in the units of the field. Those of
+the kernels stand in ``solver/kernels/tolerances.hpp``, too.
 """
 
 from __future__ import annotations

@@ -103,9 +103,7 @@ def fake_engine(behaviour: str) -> Engine:
                 resource.setrlimit(resource.RLIMIT_FSIZE, limits)
             super().write_result(row, result, rank)
 
-    engine = Engine(
-        run_task, lambda campaign, task: None, FakeWriter, methods=lambda campaign, tasks: ()
-    )
+    engine = Engine(run_task, lambda campaign, task: None, FakeWriter)
     if "silence" in settings:
         engine = replace(engine, silence=float(settings["silence"]))
     return replace(engine, all_write=False) if "serial" in settings else engine

@@ -111,8 +111,8 @@ class Loops:
 class First:
     """The first loops of a process."""
 
-    def __init__(self, longest: float, *, compare: bool) -> None:
-        self._longest, self._compare = longest, compare
+    def __init__(self, longest: float) -> None:
+        self._longest = longest
 
     def once(self, rng: np.random.Generator) -> str:
         """Interrupt once; then the loop runs to its end."""
@@ -123,7 +123,7 @@ class First:
             return found.loss.hex()
 
         ended = interrupted(loop, float(rng.uniform(0.0, self._longest)) + 1e-6)
-        return f"{ended} {loop()}" if self._compare else ended
+        return f"{ended} {loop()}"
 
 
 class Traces:
@@ -216,9 +216,7 @@ def kind_of(name: str) -> Any:
     if name == "grid":
         return Loops("grid", 0.04, 8)
     if name == "first":
-        return First(3.0, compare=True)
-    if name == "compile":
-        return First(60.0, compare=False)
+        return First(3.0)
     if name == "trace":
         return Traces(0, 2.0)
     if name == "pool":
