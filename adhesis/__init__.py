@@ -25,11 +25,10 @@ if TYPE_CHECKING:
     from adhesis.ensemble.trace.answer import loss_of_trace
     from adhesis.ensemble.trace.prepare import prepare_trace
     from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
-    from adhesis.solver.loading.loop import run_loop
+    from adhesis.solver.loading.loop import run_loop, run_loops
     from adhesis.solver.loading.loop_result import LoopResult
     from adhesis.solver.loading.loop_state import LoopState
     from adhesis.solver.loading.path import MinorLoop, PathResult, run_path
-    from adhesis.solver.loading.turning_points import run_loops
     from adhesis.solver.method import ContactState, Fields, Method, Opening, Path, PathError
     from adhesis.solver.model.control import Control
     from adhesis.solver.model.half_space import HalfSpace
@@ -71,7 +70,7 @@ _MODULES = {
     "profile_from_heights": "solver.model.profile",
     "read_trace": "ensemble.trace.reading.measured_trace",
     "run_loop": "solver.loading.loop",
-    "run_loops": "solver.loading.turning_points",
+    "run_loops": "solver.loading.loop",
     "run_path": "solver.loading.path",
     "self_affine_profile": "solver.model.profile",
     "single_wave": "solver.model.profile",

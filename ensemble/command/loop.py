@@ -29,11 +29,11 @@ from adhesis.ensemble.trace.options import (
     what_was_read,
 )
 from adhesis.solver.checks import plain
-from adhesis.solver.loading.loop import Progress, run_loop
+from adhesis.solver.loading.loop import run_loop, run_loops
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import field_nodes
 from adhesis.solver.loading.path import PathResult, run_path
-from adhesis.solver.loading.turning_points import run_loops
+from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, ContactState, Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem, strength_of

@@ -10,7 +10,7 @@ from typing import Any
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import STRESS, read_words, words_of
-from adhesis.solver.loading.loop import check_cycle, latest_turn, turn_arguments
+from adhesis.solver.loading.cycle import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace

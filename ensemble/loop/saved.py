@@ -22,7 +22,6 @@ from adhesis.ensemble.quantities import UNITS, with_units
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult
-from adhesis.solver.loading.path_record import dissipated
 from adhesis.solver.loading.zero_range import InteriorTension
 from adhesis.solver.method import MethodReport
 from adhesis.solver.model.control import Control
@@ -273,10 +272,10 @@ def _recomputed(result: Result) -> dict[str, Any]:
     """Compute anew what a result keeps beside the states and jumps that it follows from."""
     values: dict[str, Any] = {
         "penetration": result.problem.penetration(result.separation),
-        "loss_from_drops": dissipated(
-            result.problem, result.jumps, result.states_before_jumps(), result.receded
-        ),
+        "loss_from_drops": result.ledger.loss,
     }
+    if isinstance(result, PathResult):
+        values["potential"] = result.ledger.stored * result.problem.profile.period
     if isinstance(result, LoopResult):
         deepest = result.penetration[_turn(result)]
         is_fixed = result.problem.control.is_fixed
@@ -287,13 +286,11 @@ def _recomputed(result: Result) -> dict[str, Any]:
 
 def _works(result: Result) -> dict[str, float]:
     """Compute the work of a result anew, in J/m² of nominal area."""
-    work = result.work_along(slice(None))
+    ledger = result.ledger
     if isinstance(result, PathResult):
-        ends = result.potential[[-1, 0]]
-        change = float(ends[0] - ends[1]) / result.problem.profile.period
-        return {"work": work, "energy_change": change}
-    gained = -result.work_of_displacement(slice(_turn(result)))
-    return {"loss": work, "work_gained": gained, "work_spent": work + gained}
+        return {"work": ledger.work, "energy_change": ledger.rise}
+    gained = -ledger.part(0, _turn(result)).displacement_work
+    return {"loss": ledger.work, "work_gained": gained, "work_spent": ledger.work + gained}
 
 
 def _turn(result: LoopResult) -> int:

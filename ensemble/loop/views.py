@@ -23,9 +23,9 @@ from adhesis.ensemble.quantities import (
 )
 from adhesis.ensemble.reporter import bar
 from adhesis.solver import checks
-from adhesis.solver.loading.loop import Progress
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
+from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, ContactState, Method
 from adhesis.solver.values import brief
 

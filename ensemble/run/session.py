@@ -43,7 +43,7 @@ from adhesis.ensemble.task.compute import Runner, check_task
 from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
-from adhesis.solver.loading.loop import Progress
+from adhesis.solver.loading.path_record import Progress
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.dataset import sizes_of
 from adhesis.ensemble.task.fields import FieldPlan, FieldRecorder, field_plan
 from adhesis.ensemble.task.row import Row, row_of, row_scales
-from adhesis.solver.loading.loop import Progress, run_loop, turn_arguments
-from adhesis.solver.loading.turning_points import LoadingBranch
+from adhesis.solver.loading.cycle import turn_arguments
+from adhesis.solver.loading.loop import LoadingBranch, run_loop
+from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace

@@ -22,7 +22,7 @@ from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Plan, Run, default_tables, make_plan
 from adhesis.solver import checks, views
-from adhesis.solver.loading.loop import check_cycle, check_preload, turning_of
+from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Measure, Problem

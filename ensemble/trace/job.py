@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from adhesis.ensemble.quantities import stress_text
-from adhesis.solver.loading.loop import run_loop, turn_arguments
-from adhesis.solver.loading.loop_result import strain_warnings
-from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
+from adhesis.solver.loading.cycle import turn_arguments
+from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.method import Branch, ContactState
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -109,14 +108,8 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
     drops = loop.loss_from_drops - loop.closing_drop
     return loop.numbers() | {
-        "range_warnings": range_warnings(
-            *(problem, loop.valid_range, loop.loss, loop.contact_fraction),
-            *loop.outer_ranges,
-        )
-        + opening_warnings(loop.jumps, loop.loss),
-        "strain_warnings": strain_warnings(
-            problem, loop.mean_stress, loop.separation, loop.patches
-        ),
+        "range_warnings": loop.range_warnings(),
+        "strain_warnings": loop.strain_warnings(),
         "preload_warnings": loop.preload_warnings,
         "fall_warnings": loop.fall_warnings(),
         "loss_note": loop.loss_note,

@@ -12,23 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.path_record import Record, integral, states_before_jumps
+from adhesis.solver.loading.ledger import Ledger, estimated_error, states_before_jumps
+from adhesis.solver.loading.path_record import Record
 from adhesis.solver.loading.zero_range import (
     TOUCH_SHARE,
     InteriorTension,
     interior_tension,
     least_range,
     narrowest_length,
+    opening_warnings,
+    range_warnings,
     stress_text,
     touch_stress,
     turn_range,
 )
-from adhesis.solver.method import ContactState, Method, MethodReport
+from adhesis.solver.method import ContactState, Method, MethodReport, PathError
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue, finite
 from adhesis.solver.views import ResultViews
+
+LARGE_STRAIN = 0.3
+"""Largest tension over Young's modulus, and longest neck over the period, above which small strain
+is doubtful."""
 
 PathOrLoop = TypeVar("PathOrLoop", bound="EquilibriumPath")
 
@@ -36,6 +43,9 @@ PathOrLoop = TypeVar("PathOrLoop", bound="EquilibriumPath")
 _FALL_SHARE = 0.01
 # Largest A/A0 from which on harder pressing can add a hundredth of the area at most.
 _NEARLY_FULL = 0.99
+_ROUNDING = 1e-9  # of h_max: a separation that is less below it is at first touch
+_COLUMNS = ("mean_stress", "contact_fraction", "elastic_energy", "adhesion_energy")
+_ENTERED = (*_COLUMNS, "branch", "separation", "tangent", "receded")  # in the ledger
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
 
@@ -137,15 +147,17 @@ class EquilibriumPath(ByValue, ResultViews):
         return self.elastic_energy + self.adhesion_energy
 
     @property
+    def ledger(self) -> Ledger:
+        """Energies of all intervals between the states, made of the states and jumps."""
+        return Ledger.of(self.problem, self.jumps, **{n: getattr(self, n) for n in _ENTERED})
+
+    @property
     def friction(self) -> float:
         """Energy that edges dissipate as they recede, in J/m² of nominal area.
 
         By so much do the two works of adhesion differ, within jumps and between them; 0 for one.
         """
-        if self.receded is None:
-            return 0.0
-        pinning, period = self.problem.pinning, self.problem.profile.period
-        return float(pinning / period * (self.receded[-1] - self.receded[0]))
+        return math.fsum(self.ledger.friction)
 
     @property
     def largest_contact_fraction(self) -> float:
@@ -231,25 +243,6 @@ class EquilibriumPath(ByValue, ResultViews):
         """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
 
-    def work_of_displacement(self, states: slice) -> float:
-        """Compute ∫ p̄ du_tot over some states, in J/m² of nominal area; Δ is u_tot for a load."""
-        return self.problem.control.work_of_displacement(
-            self.work_along(states),
-            self.separation[states],
-            self.mean_stress[states],
-            self.problem.profile.h_max,
-        )
-
-    def work_along(self, states: slice) -> float:
-        """Compute -∫ Y dx over some states anew, in J/m² of nominal area."""
-        control, h_max = self.problem.control, self.problem.profile.h_max
-        separation, mean_stress = self.separation[states], self.mean_stress[states]
-        return -integral(
-            control.prescribed(separation, mean_stress),
-            control.conjugate(separation, mean_stress, h_max),
-            self.tangent[states],
-        )
-
     @property
     def loss_note(self) -> str:
         """Return where the loss of a path under a load is closed; empty for all other paths."""
@@ -282,6 +275,15 @@ class EquilibriumPath(ByValue, ResultViews):
         """
         found = sum(jump.energy_drop for jump in self.jumps if jump.small_scale is small_scale)
         return float(found if small_scale else found - self.closing_drop)
+
+    def range_warnings(self) -> list[str]:
+        """Return sentences where the loss is that of the zero-range limit alone, or of barriers."""
+        given = self.problem, self.valid_range, self.lost, self.contact_fraction
+        return range_warnings(*given, *self.outer_ranges) + opening_warnings(self.jumps, self.lost)
+
+    def strain_warnings(self) -> list[str]:
+        """Return sentences where strains are not small."""
+        return strain_warnings(self.problem, self.mean_stress, self.separation, self.patches)
 
     def fall_warnings(self) -> list[str]:
         """Return a sentence where the closing drop takes more than a hundredth off the loss."""
@@ -405,25 +407,67 @@ def sticking_text(
     )
 
 
-def path_fields(method: Method, record: Record, started: float) -> dict[str, Any]:
-    """Return the fields of every path from its record; ``started`` is its first CPU time, in s."""
-    problem = method.problem
+def strain_warnings(
+    problem: Problem, mean_stress: Array, separation: Array, patches: NDArray[np.int64]
+) -> list[str]:
+    """Return the sentences of doubt where strains of a path are not small."""
+    out: list[str] = []
+    young, period = problem.half_space.young, problem.profile.period
+    question = "small strain does not hold; is γ in J/m², E in Pa and the profile in m?"
+    tension = float(-mean_stress.min(initial=0.0))
+    if tension > LARGE_STRAIN * young:
+        out.append(
+            f"the largest mean tension, {tension:.3g} Pa, is {tension / young:.3g} of Young's "
+            f"modulus: {question}"
+        )
+    neck = float(separation[patches > 0].max(initial=0.0))
+    if neck > LARGE_STRAIN * period:
+        out.append(
+            f"necks are up to {neck:.3g} m long, {neck / period:.2g} of the period: {question}"
+        )
+    return out
+
+
+def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]:
+    """Return the fields of every path from its record, and its ledger.
+
+    ``started`` is its first CPU time, in s.
+
+    Raises
+    ------
+    PathError
+        If a state without contact lies below s = h_max, where surfaces overlap. Not raised
+        without adhesion, where methods may leave out patches that they do not resolve.
+    """
+    method, problem = record.method, record.problem
     report = method.report()  # of the path alone
     interior = interior_tension(method, record)
-    separation = record.column("separation")
-    arrays = ("mean_stress", "contact_fraction", "elastic_energy", "adhesion_energy")
-    return {
-        "problem": problem,
+    separation, h_max = record.column("separation"), problem.profile.h_max
+    patches = record.column("patches").astype(np.int64)
+    lowest = float(separation[patches == 0].min(initial=math.inf))
+    must_touch = not problem.control.is_load and problem.work_of_adhesion > 0
+    if must_touch and lowest < h_max * (1 - _ROUNDING):
+        raise PathError(
+            f"the path is without contact at s = {lowest / h_max:.9g} h_max ({lowest:.9g} m), "
+            "where surfaces overlap: there is no such state"
+        )
+    jumps = tuple(record.jumps)
+    columns: dict[str, Any] = {name: record.column(name) for name in _COLUMNS}
+    columns |= {
         "branch": np.array(record.branches),
-        "load_step": np.array(record.on_axis),
-        "penetration": problem.penetration(separation),
         "separation": separation,
         "tangent": record.column("stiffness"),
-        **{name: record.column(name) for name in arrays},
-        "patches": record.column("patches").astype(np.int64),
-        "jumps": tuple(record.jumps),
-        "loss_from_drops": record.dissipated(problem),
         "receded": record.column("receded") if problem.pinning else None,
+    }
+    ledger = Ledger.of(problem, jumps, **columns)
+    fields = columns | {
+        "problem": problem,
+        "load_step": np.array(record.on_axis),
+        "penetration": problem.penetration(separation),
+        "patches": patches,
+        "jumps": jumps,
+        "loss_from_drops": ledger.loss,
+        "loss_error": estimated_error(record.error, jumps, ledger.residual, problem),
         "seconds": process_time() - started,
         "method": report,
         "contact_states": tuple(record.states),
@@ -431,24 +475,15 @@ def path_fields(method: Method, record: Record, started: float) -> dict[str, Any
         "interior": interior,
         "narrowest_length": narrowest_length(problem, record),
     }
+    return fields, ledger
 
 
-def with_turn_range(
-    result: PathOrLoop, method: Method, record: Record, step: float, started: float
-) -> PathOrLoop:
+def with_turn_range(result: PathOrLoop, record: Record, started: float) -> PathOrLoop:
     """Return a result with its ``turn_range``, which is sought as far as the other ranges reach.
 
-    Parameters
-    ----------
-    result : LoopResult or PathResult
-    method : Method
-    record : Record
-    step : float
-        Load step, in the unit of the turning points.
-    started : float
-        First CPU time of the path, in s.
+    ``started`` is the first CPU time of the path, in s.
     """
     problem = result.problem
-    step = problem.prescribed(0.0) - problem.prescribed(step)
-    found = turn_range(method, record, step, result.lost, result.least_range)
+    step = problem.prescribed(0.0) - problem.prescribed(record.axis.step)
+    found = turn_range(record.method, record, step, result.lost, result.least_range)
     return replace(result, turn_range=found, seconds=process_time() - started)

@@ -22,19 +22,14 @@ from adhesis.solver.loading.equilibrium_path import (
 from adhesis.solver.loading.loop_state import LoopState, state_at_stress
 from adhesis.solver.loading.mean_stress_event import has_reached
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.loading.zero_range import opening_warnings, range_warnings, stress_text
-from adhesis.solver.method import Method, PathError
+from adhesis.solver.loading.zero_range import stress_text
+from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch
-from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 
 STEEP = 0.3
 """Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
-
-LARGE_STRAIN = 0.3
-"""Largest tension over Young's modulus, and longest neck over the period, above which small strain
-is doubtful."""
 
 # Share of the loss above which an audit residual or an error of the loss is reported, for methods
 # without an accuracy.
@@ -60,7 +55,7 @@ class LoopResult(EquilibriumPath):
         Mean stress in Pa at which the path was to turn.
     loss : float
         ∮ p̄ dΔ in J/m² of nominal area, over all states
-        (:func:`adhesis.solver.loading.path_record.integral`).
+        (:class:`adhesis.solver.loading.ledger.Ledger`).
     loss_dimensionless : float
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
     work_gained, work_spent : float
@@ -201,7 +196,7 @@ class LoopResult(EquilibriumPath):
             )
         if self.problem.work_of_adhesion == 0:
             return tuple(found)  # there is no loss to doubt
-        found += strain_warnings(self.problem, self.mean_stress, self.separation, self.patches)
+        found += self.strain_warnings()
         most = getattr(self.method, "accuracy", _LARGE)
         if abs(self.audit_residual) > most:
             found.append(
@@ -213,11 +208,7 @@ class LoopResult(EquilibriumPath):
                 f"the numerical error of the loss, {self.loss_error:.2g} J/m² of {self.loss:.3g} "
                 f"J/m², is larger than {most:g} of it, the relative error allowed"
             )
-        found += range_warnings(
-            *(self.problem, self.valid_range, self.loss, self.contact_fraction),
-            *self.outer_ranges,
-        )
-        found += opening_warnings(self.jumps, self.loss)
+        found += self.range_warnings()
         profile = self.problem.profile
         alike = profile.equal_parts > 1 or profile.mirror_axes.size > 0
         if self.problem.pinning > 0 and alike and self.patches.max() > 1:
@@ -390,14 +381,7 @@ class LoopResult(EquilibriumPath):
                 "this loop holds no contact states: it was loaded from a file; run it again, or "
                 "ask before it is saved"
             )
-        return state_at_stress(
-            self.new_method(),
-            branch,
-            self.contact_states,
-            self.states_before_jumps(),
-            chosen,
-            stress,
-        )
+        return state_at_stress(self, self.new_method(), branch, chosen, stress)
 
     def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
         """Return the indices of one branch's states, optionally only those on the load-step axis.
@@ -423,27 +407,22 @@ class LoopResult(EquilibriumPath):
 
 
 def result_of(
-    method: Method,
     record: Record,
     turning_point: float,
     load_steps: int,
     started: float,
-    step: float,
     preload: float | None = None,
 ) -> LoopResult:
     """Make the result from the record of a loop; ``started`` is its first CPU time, in s.
-
-    ``step`` is the load step, in the unit of the turning point.
 
     Raises
     ------
     PathError
         If the error of the loss is as large as the loss, or surfaces overlap where nothing touches.
     """
-    problem = method.problem
-    fields = path_fields(method, record, started)
-    loss = record.work(problem)
-    error = estimated_error(record, loss - fields["loss_from_drops"], problem)
+    problem = record.problem
+    fields, ledger = path_fields(record, started)
+    loss, error = ledger.work, fields["loss_error"]
     if problem.work_of_adhesion > 0 and not error < abs(loss):
         raise PathError(
             f"the loss is not resolved: {loss:.3g} J/m² with a numerical error of {error:.2g} "
@@ -451,14 +430,10 @@ def result_of(
             "resolve it"
         )
     turn = record.branches.index("unloading")  # the turning point's state stands in both branches
-    loading = slice(turn)
-    gained = -problem.control.work_of_displacement(
-        record.slice(0, turn).work(problem),
-        *(fields["separation"][loading], fields["mean_stress"][loading], problem.profile.h_max),
-    )
     max_penetration = turning_point
     if not problem.control.is_fixed:
         max_penetration = float(fields["penetration"][turn])
+    gained = -ledger.part(0, turn).displacement_work
     result = LoopResult(
         turning_point=turning_point,
         max_penetration=max_penetration,
@@ -466,53 +441,8 @@ def result_of(
         load_steps=load_steps,
         loss=loss,
         loss_dimensionless=loss / problem.loss_scale,
-        loss_error=error,
         work_gained=gained,
         work_spent=loss + gained,
         **fields,
     )
-    return with_turn_range(result, method, record, step, started)
-
-
-def strain_warnings(
-    problem: Problem, mean_stress: Array, separation: Array, patches: NDArray[np.int64]
-) -> list[str]:
-    """Return the sentences of doubt where strains of a path are not small."""
-    out: list[str] = []
-    young, period = problem.half_space.young, problem.profile.period
-    question = "small strain does not hold; is γ in J/m², E in Pa and the profile in m?"
-    tension = float(-mean_stress.min(initial=0.0))
-    if tension > LARGE_STRAIN * young:
-        out.append(
-            f"the largest mean tension, {tension:.3g} Pa, is {tension / young:.3g} of Young's "
-            f"modulus: {question}"
-        )
-    neck = float(separation[patches > 0].max(initial=0.0))
-    if neck > LARGE_STRAIN * period:
-        out.append(
-            f"necks are up to {neck:.3g} m long, {neck / period:.2g} of the period: {question}"
-        )
-    return out
-
-
-def estimated_error(record: Record, audited: float, problem: Problem) -> float:
-    """Estimate the error of a path's loss in J/m².
-
-    It is the sum of the method's own estimate (if there is none, a hundredth of the drops), the
-    difference found by the audit, and the sizes of negative drops, which are errors: energy falls
-    in every jump, after the barrier of an opening.
-
-    Parameters
-    ----------
-    record : Record
-    audited : float
-        Difference of the work and the sum of the drops, in J/m².
-    problem : Problem
-    """
-    # Under a load the last drop is U, and may be negative (adhesis.solver.model.control).
-    counted = [j for j in record.jumps if not (problem.control.is_load and j.kind == "pull-off")]
-    own = record.error
-    if not np.isfinite(own):
-        own = 0.01 * abs(sum(jump.energy_drop for jump in record.jumps))
-    negative = sum(max(0.0, -jump.energy_drop - jump.barrier) for jump in counted)
-    return float(own + abs(audited) + negative)
+    return with_turn_range(result, record, started)

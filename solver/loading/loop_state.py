@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver.loading.equilibrium_path import EquilibriumPath
 from adhesis.solver.loading.mean_stress_event import REACHED, locate
 from adhesis.solver.method import ContactState, Fields, Method, Opening
 from adhesis.solver.model.jump import Branch
@@ -88,12 +88,7 @@ def field_nodes(method: Method) -> int:
 
 
 def state_at_stress(
-    method: Method,
-    branch: Branch,
-    states: Sequence[ContactState],
-    before_jumps: Sequence[int],
-    chosen: NDArray[np.intp],
-    stress: float,
+    path: EquilibriumPath, method: Method, branch: Branch, chosen: NDArray[np.intp], stress: float
 ) -> LoopState:
     """Find the first state in contact of a branch that has a mean stress.
 
@@ -101,12 +96,10 @@ def state_at_stress(
 
     Parameters
     ----------
+    path : EquilibriumPath
     method : Method
+        Of the path.
     branch : {"loading", "unloading"}
-    states : sequence of ContactState
-        Of the whole loop.
-    before_jumps : sequence of int
-        Indices of the states before its jumps.
     chosen : array of int
         Indices of the states of the branch.
     stress : float
@@ -117,6 +110,7 @@ def state_at_stress(
     ValueError
         If no state of the branch has it.
     """
+    states = path.contact_states
     found = {i: states[i].mean_stress - stress for i in chosen.tolist() if states[i].patches}
     near = REACHED * abs(stress)
     found = {i: 0.0 if abs(difference) <= near else difference for i, difference in found.items()}
@@ -128,7 +122,7 @@ def state_at_stress(
         )
     at = [i for i, difference in found.items() if difference == 0]
     passing = [i for i in found if i - 1 in found and found[i - 1] * found[i] < 0]
-    jumps = set(before_jumps)
+    jumps = set(path.states_before_jumps())
     smooth = [i for i in passing if i - 1 not in jumps]
     after_jump = not (at or smooth)
     first = min(passing if after_jump else at + smooth)
@@ -136,7 +130,7 @@ def state_at_stress(
     if first in smooth:
         sign = float(np.sign(found[first])) / max(-least, most)
         start = states[first - 1]
-        path = locate(method, start, state, lambda passed: sign * (passed.mean_stress - stress))
-        state = path.states[-1]
+        way = locate(method, start, state, lambda passed: sign * (passed.mean_stress - stress))
+        state = way.states[-1]
     penetration = float(method.problem.penetration(state.separation))
     return LoopState(branch, after_jump, penetration, state, method)

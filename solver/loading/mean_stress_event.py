@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.solver.loading.path_record import states_before_jumps
+from adhesis.solver.loading.ledger import states_before_jumps
 from adhesis.solver.method import ContactState, Method, Path, PathError
 from adhesis.solver.model.jump import Jump
 

@@ -13,7 +13,7 @@ with ΔW the change of the potential from its start to its end (:mod:`adhesis.so
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import process_time
 from typing import Any
@@ -22,19 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
+from adhesis.solver.loading.cycle import DEFAULT_LOAD_STEPS, check_cycle
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields, with_turn_range
-from adhesis.solver.loading.loop import (
-    DEFAULT_LOAD_STEPS,
+from adhesis.solver.loading.ledger import Ledger
+from adhesis.solver.loading.path_record import (
     HOW_METHOD,
+    Axis,
+    OnState,
     Progress,
-    check_cycle,
+    Record,
     progress_of,
-    unload,
 )
-from adhesis.solver.loading.loop_result import estimated_error, strain_warnings
-from adhesis.solver.loading.path_record import Axis, Record
-from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
-from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
@@ -148,13 +147,7 @@ class PathResult(EquilibriumPath):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons to doubt the work, one sentence each; none for most paths."""
-        lost = self.loss_from_drops
-        found = range_warnings(
-            *(self.problem, self.valid_range, lost, self.contact_fraction),
-            *self.outer_ranges,
-        )
-        found += strain_warnings(self.problem, self.mean_stress, self.separation, self.patches)
-        return (*found, *opening_warnings(self.jumps, lost))
+        return (*self.range_warnings(), *self.strain_warnings())
 
     @property
     def loss(self) -> float:
@@ -200,7 +193,7 @@ def check_path(
     ValueError
         Unless it starts with loading and turns at every point (at the last one too, if it ends out
         of contact), and the largest turning point could be that of a loop
-        (:func:`adhesis.solver.loading.loop.check_cycle`).
+        (:func:`adhesis.solver.loading.cycle.check_cycle`).
     TypeError
         If one of them, or load_steps, is not a number.
     """
@@ -235,7 +228,7 @@ def run_path(
     load_steps: int = DEFAULT_LOAD_STEPS,
     out: bool = True,
     progress: Progress | bool | None = None,
-    on_state: Callable[[Branch, ContactState], None] | None = None,
+    on_state: OnState | None = None,
 ) -> PathResult:
     """Follow a path from first touch through the turning points, and unload until detached.
 
@@ -272,50 +265,43 @@ def run_path(
     function("on_state", on_state)
     started = process_time()
     with progress_of(progress, max(points), method.problem.control) as report:
-        runner = _PathRunner(method, Axis(max(points), load_steps), Record(on_state), report)
+        record = _PathRecord(method, Axis(max(points), load_steps), on_state, report)
         for point in points:
-            runner.follow_leg(point)
+            record.follow_leg(point)
         if out:
-            runner.unload()
-    return runner.result(points, load_steps, started)
+            record.unload([turn.drive for turn in record.open_turns])
+    return record.result(points, load_steps, started)
 
 
 @dataclass
-class _OpenTurn:
-    """A turning point that a later leg may come back to, with the index of its state.
-
-    ``jumps`` is the number of jumps before it.
-    """
+class _Turn:
+    """A turning point that a later leg may come back to, with the index of its state."""
 
     drive: float
     state: int
-    jumps: int
 
 
-class _PathRunner:
-    """State of a path while it is followed."""
+class _PathRecord(Record):
+    """Record of a path that notes the minor loops as they close."""
 
-    def __init__(
-        self, method: Method, axis: Axis, record: Record, progress: Progress | None
-    ) -> None:
-        self.method, self.problem = method, method.problem
-        self.axis, self.record, self.progress = axis, record, progress
-        self.legs: list[int] = []  # of the states
-        self.jump_legs: list[int] = []
-        self.minor: list[MinorLoop] = []
-        self.open_turns: list[_OpenTurn] = []
-        self.leg = -1
-        self.drive = 0.0
-        self.state = method.detached(method.problem.profile.h_max)
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.open_turns: list[_Turn] = []
+        self.closed: list[tuple[_Turn, _Turn, int]] = []  # start, turn, number of states at the end
+
+    def begin(self, branch: Branch) -> None:
+        """Begin a leg at a turning point, which a later leg may come back to."""
+        if self.states:
+            self.open_turns.append(_Turn(self.drive, len(self.states)))
+        super().begin(branch)
 
     def follow_leg(self, point: float) -> None:
         """Follow one leg, to the turning point ``point``."""
-        branch: Branch = "loading" if point > self.drive or self.leg < 0 else "unloading"
-        self._begin(branch)
         marks = [turn.drive for turn in self.open_turns]
         drives = self.axis.between(self.drive, point, marks)
+        self.begin("loading" if point > self.drive or not self.states else "unloading")
         for drive in drives[1:] if self.leg else drives:  # the first leg begins with first touch
-            self._step(branch, drive)
+            self.step(drive)
             if not self.state.patches and self.leg > 0:
                 unit = "Pa" if self.problem.control.is_load else "h_max"
                 where = self.problem.describe_prescribed(self.problem.prescribed(drive))
@@ -324,87 +310,51 @@ class _PathRunner:
                     "has ended: choose a turning point at which contact lasts, or end the path "
                     "with out"
                 )
-        self.drive = point
 
-    def unload(self) -> None:
-        """Unload until contact is lost, as a loop does."""
-        self._begin("unloading")
-        marks = [turn.drive for turn in self.open_turns[:-1]]
-        unload(
-            self.problem,
-            self.axis,
-            self.drive,
-            self.state,
-            lambda drive: self._step("unloading", drive),
-            marks,
-        )
-
-    def _begin(self, branch: Branch) -> None:
-        """Start a leg with the state at the turning point, which belongs to both legs."""
-        self.leg += 1
-        if self.record.states:
-            self.open_turns.append(
-                _OpenTurn(self.drive, len(self.record.states), len(self.record.jumps))
-            )
-        self.record.visit(branch, self.leg > 0, self.state)
-        self.legs.append(self.leg)
-
-    def _step(self, branch: Branch, drive: float) -> ContactState:
-        """Follow one load step, and record the minor loops that it closes."""
-        path = self.method.follow(self.state, self.problem.prescribed(drive))
-        self.jump_legs += [self.leg] * len(path.jumps)
-        self.state = self.record.extend(branch, path)
-        self.legs += [self.leg] * len(path.states)
-        if self.progress is not None:
-            self.progress(branch, drive, self.state)
+    def step(self, drive: float, preload: float | None = None) -> bool:
+        """Follow one load step, and note the minor loops that it closes."""
+        reached = super().step(drive, preload)
         while len(self.open_turns) > 1 and drive == self.open_turns[-2].drive:
-            self._close(self.open_turns[-2], self.open_turns[-1])
+            self.closed.append((self.open_turns[-2], self.open_turns[-1], len(self.states)))
             del self.open_turns[-2:]
-        return self.state
-
-    def _close(self, start: _OpenTurn, turn: _OpenTurn) -> None:
-        """Record the minor loop from ``start`` over ``turn`` to the last state."""
-        record, period = self.record, self.problem.profile.period
-        part = record.slice(start.state, jumps=record.jumps[start.jumps :])
-        begin, end = part.states[0], part.states[-1]
-        stress, contact = part.column("mean_stress"), part.column("contact_fraction")
-        stress_change = float(stress[-1] - stress[0])
-        contact_change = float(contact[-1] - contact[0])
-        self.minor.append(
-            MinorLoop(
-                start=start.drive,
-                turn=turn.drive,
-                branch="loading" if turn.drive > start.drive else "unloading",
-                loss=part.work(self.problem),
-                loss_from_drops=part.dissipated(self.problem),
-                energy_change=(end.potential - begin.potential) / period,
-                stress_change=stress_change,
-                contact_change=contact_change,
-                closes=bool(
-                    abs(stress_change) <= _SAME * np.ptp(stress)
-                    and abs(contact_change)
-                    <= max(_SAME * np.ptp(contact), _ROUNDING * contact.max())
-                ),
-            )
-        )
+        return reached
 
     def result(self, points: tuple[float, ...], load_steps: int, started: float) -> PathResult:
         """Make the result of the path."""
-        record, problem = self.record, self.problem
-        fields = path_fields(self.method, record, started)
-        work, potential = record.work(problem), record.column("potential")
-        change = float(potential[-1] - potential[0]) / problem.profile.period
-        rest = work - change - fields["loss_from_drops"]
+        fields, ledger = path_fields(self, started)
+        legs = np.array(self.legs)
         result = PathResult(
             turning_points=points,
             load_steps=load_steps,
-            leg=np.array(self.legs),
-            potential=potential,
-            jump_leg=np.array(self.jump_legs, dtype=np.int64),
-            minor_loops=tuple(self.minor),
-            work=work,
-            energy_change=change,
-            loss_error=estimated_error(record, rest, problem),
+            leg=legs,
+            potential=self.column("potential"),
+            jump_leg=legs[self.before_jumps()],
+            minor_loops=tuple(self._minor_loop(ledger, *ends) for ends in self.closed),
+            work=ledger.work,
+            energy_change=ledger.rise,
             **fields,
         )
-        return with_turn_range(result, self.method, record, self.axis.step, started)
+        return with_turn_range(result, self, started)
+
+    def _minor_loop(self, ledger: Ledger, start: _Turn, turn: _Turn, stop: int) -> MinorLoop:
+        """Make the minor loop from ``start`` over ``turn``."""
+        part = ledger.part(start.state, stop)
+        stress, contact = (
+            self.column(name)[start.state : stop] for name in ("mean_stress", "contact_fraction")
+        )
+        stress_change = float(stress[-1] - stress[0])
+        contact_change = float(contact[-1] - contact[0])
+        same_contact = max(_SAME * np.ptp(contact), _ROUNDING * contact.max())
+        return MinorLoop(
+            start=start.drive,
+            turn=turn.drive,
+            branch="loading" if turn.drive > start.drive else "unloading",
+            loss=part.work,
+            loss_from_drops=part.loss,
+            energy_change=part.rise,
+            stress_change=stress_change,
+            contact_change=contact_change,
+            closes=bool(
+                abs(stress_change) <= _SAME * np.ptp(stress) and abs(contact_change) <= same_contact
+            ),
+        )

@@ -1,20 +1,70 @@
-"""Record the states and jumps of a path in order, and compute the work along it."""
+"""Follow a path load step by load step, and record its states and jumps in order."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from adhesis.solver.method import ContactState, Path, PathError
+from adhesis.solver import views
+from adhesis.solver.checks import function
+from adhesis.solver.loading.ledger import states_before_jumps
+from adhesis.solver.loading.mean_stress_event import follow_to_stress
+from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Branch, Jump
-from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 
+HOW_METHOD = "make_method(name, problem)"
+"""Call that makes a method, for error messages."""
+
+Progress = Callable[[Branch, float, ContactState], None]
+"""Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
+
+OnState = Callable[[Branch, ContactState], None]
+"""Called with every state of a path, in order."""
+
 _NEAR = 1e-9  # in load steps: closer values are equal but for rounding
+# Beyond this multiple of the loading range, unloading takes longer steps: of the given share of the
+# control's natural range (h_max at fixed separation) or of the distance from first touch. Loops of
+# ordinary depth detach long before.
+_STROKES_AT_STEP = 20
+_LONG_STEP = 0.02
+# Unloading stops with an error this many natural ranges below first touch. Contact detaches at
+# about sqrt(γ/energy of full contact) ranges, and methods accept γ up to 1e12 of those energies.
+_FARTHEST = 1e7
+
+
+@contextmanager
+def progress_of(
+    progress: Progress | bool | None, top: float, control: Control
+) -> Iterator[Progress | None]:
+    """Return the function to call after each load step: the given one, or for True a bar.
+
+    Parameters
+    ----------
+    progress : callable or bool, optional
+    top : float
+        The largest turning point, at which the bar is full.
+    control : Control
+        Of the path: a load is shown with its unit.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    """
+    if progress is True:
+        with views.maker().progress_bar(top, control.is_load) as bar:
+            yield bar
+    elif progress is False:
+        yield None
+    else:
+        yield function("progress", progress)
 
 
 @dataclass(frozen=True)
@@ -63,40 +113,134 @@ class Axis:
         return values if start <= end else values[::-1]
 
 
-@dataclass
 class Record:
-    """The states of a path in order, each with its branch, and the jumps between them.
+    """A path that is followed: its states in order, each with its branch, and the jumps.
 
     Parameters
     ----------
+    method : Method
+    axis : Axis
+        Load steps of the path.
     on_state : callable, optional
-        Called with every state of the path, in order.
+    progress : callable, optional
+        Called with every load step before it is recorded; if it raises, the record is unchanged.
+
+    Attributes
+    ----------
+    state : ContactState
+        The last one; out of contact at first.
+    drive : float
+        Prescribed value there: Δ/h_max, u_tot/h_max or Pa.
+    branches, on_axis, legs, states : list
+        Of every state its branch, whether it ends a load step, and the number of its leg.
+    jumps : list of Jump
+    error : float
+        Sum of the method's estimates of its error, in J/m²; NaN if it has none.
     """
 
-    on_state: Callable[[Branch, ContactState], None] | None = None
-    branches: list[Branch] = field(default_factory=list)
-    on_axis: list[bool] = field(default_factory=list)
-    states: list[ContactState] = field(default_factory=list)
-    jumps: list[Jump] = field(default_factory=list)
-    error: float = 0.0
-    """Sum of the method's estimates of its error, in J/m²; NaN if it has none."""
+    def __init__(
+        self,
+        method: Method,
+        axis: Axis,
+        on_state: OnState | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self.method, self.problem, self.axis = method, method.problem, axis
+        self.on_state, self.progress = on_state, progress
+        self.branches: list[Branch] = []
+        self.on_axis: list[bool] = []
+        self.legs: list[int] = []
+        self.states: list[ContactState] = []
+        self.jumps: list[Jump] = []
+        self.error = 0.0
+        self.leg, self.drive = -1, 0.0
+        self.state = method.detached(method.problem.profile.h_max)
 
-    def visit(self, branch: Branch, on_axis: bool, state: ContactState) -> None:
+    def begin(self, branch: Branch) -> None:
+        """Begin a leg: the state at the turning point belongs to both."""
+        self.leg += 1
+        self.branch: Branch = branch
+        self.visit(self.leg > 0, self.state)
+
+    def visit(self, on_axis: bool, state: ContactState) -> None:
         """Append one state; ``on_axis`` if it ends a load step."""
-        self.branches.append(branch)
+        self.branches.append(self.branch)
         self.on_axis.append(on_axis)
+        self.legs.append(self.leg)
         self.states.append(state)
         if self.on_state is not None:
-            self.on_state(branch, state)
+            self.on_state(self.branch, state)
 
-    def extend(self, branch: Branch, path: Path) -> ContactState:
-        """Append the states of one load step and return the last one, which lies on the axis."""
-        for between in path.states[:-1]:
-            self.visit(branch, False, between)
-        self.visit(branch, True, path.states[-1])
+    def step(self, drive: float, preload: float | None = None) -> bool:
+        """Follow one load step to ``drive``, or up to the preload in Pa; return whether that is.
+
+        Raises
+        ------
+        PathError
+            If the path cannot be followed.
+        """
+        prescribed, reached = self.problem.prescribed(drive), False
+        if preload is None:
+            path = self.method.follow(self.state, prescribed)
+        else:
+            path, reached = follow_to_stress(self.method, self.state, prescribed, preload)
+        *between, last = path.states
+        if reached:
+            drive = self.problem.penetration(self.problem.prescribed_in(last))
+        if self.progress is not None:
+            self.progress(self.branch, drive, last)
+        for state in between:
+            self.visit(False, state)
+        self.visit(True, last)
         self.jumps += path.jumps
         self.error += path.error
-        return path.states[-1]
+        self.state, self.drive = last, drive
+        return reached
+
+    def unload(self, marks: Sequence[float] = ()) -> None:
+        """Unload by load steps until contact is lost.
+
+        Parameters
+        ----------
+        marks : sequence of float
+            Further values at which a step ends; those above the turning point are ignored. A mark
+            replaces a load step within rounding of it.
+
+        Raises
+        ------
+        PathError
+            If the path cannot be followed, or contact is not lost at any plausible separation.
+        """
+        problem, axis = self.problem, self.axis
+        ahead = sorted(mark for mark in marks if mark < self.drive)
+        self.begin("unloading")
+        first = i = axis.above(self.drive)
+        stride = 1
+        unit = problem.prescribed_range
+        if not problem.control.is_load:
+            unit /= problem.profile.h_max
+        while self.state.patches:
+            i -= stride
+            end = axis(i)
+            if end < -_FARTHEST * unit:
+                where = problem.describe_prescribed(problem.prescribed(end))
+                raise PathError(
+                    f"unloading does not end: surfaces are still in contact at {where}, "
+                    f"{_FARTHEST:g} times the natural range of the profile; check the units of "
+                    "work_of_adhesion, young and the heights, or try the other method"
+                )
+            if first - i >= _STROKES_AT_STEP * axis.load_steps:
+                wanted = _LONG_STEP * max(unit, -end) / axis.step
+                stride = max(1, min(2 * stride, int(wanted)))
+            stops = []
+            while ahead and ahead[-1] > end - axis.near:
+                stops.append(ahead.pop())
+            if not stops or stops[-1] > end + axis.near:
+                stops.append(end)
+            for drive in stops:
+                self.step(drive)
+                if not self.state.patches:
+                    break
 
     def column(self, name: str) -> Array:
         """Return one attribute of every state, shape (states,)."""
@@ -107,112 +251,9 @@ class Record:
         separation, contact = self.column("separation"), self.column("contact_fraction")
         return states_before_jumps(self.jumps, self.branches, separation, contact)
 
-    def slice(self, first: int, stop: int | None = None, jumps: Sequence[Jump] = ()) -> Record:
-        """Return a record of the states from index ``first`` up to ``stop``, and of their jumps."""
-        part = slice(first, stop)
-        return Record(
-            branches=self.branches[part],
-            on_axis=self.on_axis[part],
-            states=self.states[part],
-            jumps=list(jumps),
-        )
-
-    def copy(self) -> Record:
+    def copy(self) -> Self:
         """Return a copy with lists of its own."""
-        copied = replace(self, branches=[*self.branches], on_axis=[*self.on_axis])
-        copied.states, copied.jumps = [*self.states], [*self.jumps]
+        copied = object.__new__(type(self))
+        for name, value in self.__dict__.items():
+            copied.__dict__[name] = [*value] if isinstance(value, list) else value
         return copied
-
-    def dissipated(self, problem: Problem) -> float:
-        """Sum the energy drops at the jumps, and the friction of edges between them, in J/m²."""
-        if problem.pinning == 0:
-            return dissipated(problem, self.jumps, (), None)
-        return dissipated(problem, self.jumps, self.before_jumps(), self.column("receded"))
-
-    def work(self, problem: Problem) -> float:
-        """Compute the work of the driving device, -∫ Y dx over the states, in J/m².
-
-        x and Y are those of :mod:`adhesis.solver.model.control`.
-
-        Raises
-        ------
-        PathError
-            If a state without contact lies below s = h_max, where surfaces overlap. Not raised
-            without adhesion, where methods may leave out patches that they do not resolve.
-        """
-        control, h_max = problem.control, problem.profile.h_max
-        separation, mean_stress = self.column("separation"), self.column("mean_stress")
-        free = separation[self.column("patches") == 0]
-        must_touch = not control.is_load and problem.work_of_adhesion > 0
-        if must_touch and free.min(initial=np.inf) < h_max * (1 - _NEAR):
-            raise PathError(
-                f"the path is without contact at s = {free.min() / h_max:.9g} h_max "
-                f"({free.min():.9g} m), where surfaces overlap: there is no such state"
-            )
-        return -integral(
-            control.prescribed(separation, mean_stress),
-            control.conjugate(separation, mean_stress, h_max),
-            self.column("stiffness"),
-        )
-
-
-def states_before_jumps(
-    jumps: Sequence[Jump],
-    branch: Sequence[str] | NDArray[np.str_],
-    separation: Array,
-    contact: Array,
-) -> list[int]:
-    """Return the index of the state before each jump of a path; the next one is that after it.
-
-    ``contact`` is A/A0; it, the branch and the separation have the shape (states,).
-    """
-    before = (np.asarray(column).tolist() for column in (branch, separation, contact))
-    pairs = list(zip(*before, np.asarray(contact)[1:].tolist(), strict=False))
-    found = [0]
-    for jump in jumps:
-        wanted = (jump.branch, jump.separation, jump.contact_before, jump.contact_after)
-        found.append(
-            next((k for k in range(found[-1], len(pairs)) if pairs[k] == wanted), len(pairs) - 1)
-        )
-    return found[1:]
-
-
-def dissipated(
-    problem: Problem,
-    jumps: Sequence[Jump],
-    before: Sequence[int],
-    receded: Array | None,
-) -> float:
-    """Sum the energy drops at jumps, and the friction of edges between them, in J/m².
-
-    Parameters
-    ----------
-    problem : Problem
-    jumps : sequence of Jump
-    before : sequence of int
-        Index of the state before each jump; not needed with one work of adhesion.
-    receded : array, shape (states,), optional
-        Length in m over which edges have receded; None with one work of adhesion.
-    """
-    drops = float(sum(jump.energy_drop for jump in jumps))
-    if receded is None:
-        return drops
-    in_jumps = sum(receded[i + 1] - receded[i] for i in before)
-    between = float(receded[-1] - receded[0] - in_jumps)
-    return drops + problem.pinning / problem.profile.period * between
-
-
-def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:
-    """Compute ∫ Y dx over the states, in J/m², by the end-corrected trapezoidal rule.
-
-    At fixed separation that is ∫ p̄ ds. The correction h²/12 (Y'_0 - Y'_1) raises the order from two
-    to four on smooth pieces; it is omitted where a stiffness is NaN.
-
-    Parameters
-    ----------
-    prescribed, conjugate, stiffness : array, shape (states,)
-        x, Y and dY/dx (:mod:`adhesis.solver.model.control`; m, Pa and Pa/m, or Pa, m and m/Pa), in
-        the order of the path.
-    """
-    correction = -np.diff(stiffness) * np.diff(prescribed) ** 2 / 12
-    return float(np.trapezoid(conjugate, prescribed)) + float(np.nansum(correction))

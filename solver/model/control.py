@@ -81,31 +81,9 @@ class Control(NotebookDisplay):
         """Compute the conjugate Y from s (m) and p̄ (Pa): in Pa, for a load in m."""
         return separation - h_max if self.is_load else mean_stress
 
-    def work_of_displacement(
-        self, work: float, separation: Array, mean_stress: Array, h_max: float
-    ) -> float:
-        """Return ∫ p̄ du_tot over states, in J/m², from -∫ Y dx over the same states.
-
-        The two are one but under a load: there the latter is -∫ Δ dp̄, which lacks the change of
-        p̄ Δ, and with it the work at jumps. Over a closed loop that change is 0.
-
-        Parameters
-        ----------
-        work : float
-            -∫ Y dx in J/m².
-        separation, mean_stress : array, shape (states,)
-            s in m and p̄ in Pa, in the order of the path.
-        h_max : float
-            In m.
-        """
-        if not self.is_load:
-            return work
-        start, end = (mean_stress * (h_max - separation))[[0, -1]]
-        return work + float(end - start)
-
     def potential(
-        self, energy: float, separation: float, mean_stress: float, h_max: float, period: float
-    ) -> float:
+        self, energy: Value, separation: Value, mean_stress: Value, h_max: float, period: float
+    ) -> Value:
         """Compute W of one period, in J/m, from the energy U in J/m."""
         if self.is_fixed:
             return energy

@@ -19,9 +19,14 @@ from adhesis.solver._kernels import (
     solve_field,
 )
 from adhesis.solver.model.profile import Array, Integers
-from adhesis.solver.sharp.descent.saddle import leaving_step, positions
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point
-from adhesis.solver.sharp.equilibrium.griffith import imbalance, move_edges, step_limits
+from adhesis.solver.sharp.equilibrium.griffith import (
+    imbalance,
+    leaving_step,
+    move_edges,
+    positions,
+    step_limits,
+)
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import (
     FixedEdgeResponse,

@@ -29,11 +29,9 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import on_one_thread, one_at_a_time
-from adhesis.solver.sharp.continuation.branch import Target
+from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
-from adhesis.solver.sharp.continuation.history import History
-from adhesis.solver.sharp.continuation.jump import Jumps
-from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.sharp.continuation.jump import History, Jumps
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField

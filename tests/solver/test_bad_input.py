@@ -47,7 +47,7 @@ from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, plain, real, shown, whole
-from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.loading.cycle import check_cycle
 from adhesis.solver.method import MethodReport
 from adhesis.solver.references.exact_wave import ExactWave
 from tests.support.wrong_values import outside

@@ -16,14 +16,17 @@ import pytest
 
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.across_jump import carry_previous
-from adhesis.solver.sharp.continuation.branch import Branch, Target
-from adhesis.solver.sharp.continuation.events import Accepted, Fold
-from adhesis.solver.sharp.continuation.history import ComputedJump, History
-from adhesis.solver.sharp.continuation.predictor import Predictor
-from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.sharp.continuation.branch import (
+    Accepted,
+    Branch,
+    Fold,
+    Resolution,
+    Target,
+    Trail,
+)
+from adhesis.solver.sharp.continuation.jump import ComputedJump, History
+from adhesis.solver.sharp.continuation.predictor import Predictor, carry_previous
 from adhesis.solver.sharp.continuation.step_size import StepSize
-from adhesis.solver.sharp.continuation.trail import Trail
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.nucleation.location import locate
 

@@ -21,8 +21,7 @@ from adhesis.solver._kernels import (
     model_error,
     next_reach,
 )
-from adhesis.solver.sharp.descent.saddle import leaving_step
-from adhesis.solver.sharp.equilibrium.griffith import imbalance
+from adhesis.solver.sharp.equilibrium.griffith import imbalance, leaving_step
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod

@@ -22,7 +22,7 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from adhesis.solver.loading.loop_result import strain_warnings
+from adhesis.solver.loading.equilibrium_path import strain_warnings
 from adhesis.solver.loading.zero_range import (
     TOUCHES,
     _narrowest_moved,

@@ -7,7 +7,7 @@ import pytest
 
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.sharp.descent.saddle import leaving_step
+from adhesis.solver.sharp.equilibrium.griffith import leaving_step
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.grids import grid_of
 

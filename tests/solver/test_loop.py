@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from adhesis import ContactState, Control, HalfSpace, Path, Problem, run_loop, single_wave
-from adhesis.solver.loading.loop_result import estimated_error
-from adhesis.solver.loading.path_record import Record
+from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Profile
@@ -241,8 +240,8 @@ def test_under_a_load_the_last_drop_may_be_negative_without_an_error(stiffness, 
     problem = replace(exact(0.2).problem, control=Control(stiffness))
     drops = (("snap-in", 2.0), (kind, -0.5))
     jumps = [Jump("unloading", 0.0, drop, name, 1, 0, 0.1, 0.0, 0.0) for name, drop in drops]
-    assert estimated_error(Record(jumps=jumps, error=0.0), 0.0, problem) == error
-    assert estimated_error(Record(jumps=jumps, error=0.25), -0.125, problem) == error + 0.375
+    assert estimated_error(0.0, jumps, 0.0, problem) == error
+    assert estimated_error(0.25, jumps, -0.125, problem) == error + 0.375
 
 
 def test_a_drop_is_the_difference_of_the_energies_whatever_its_sign():

@@ -21,7 +21,7 @@ from adhesis import (
     self_affine_profile,
 )
 from adhesis.solver.crack import Crack, griffith_length, judge_maximum, largest_excess
-from adhesis.solver.loading.loop_result import estimated_error
+from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import (
     beyond_limit,
     interior_tension,
@@ -348,10 +348,9 @@ def test_the_tension_of_every_state_counts_at_which_a_path_stays():
 def test_an_energy_that_rises_by_a_barrier_is_no_error():
     problem = troughs_problem()
     rising = SimpleNamespace(energy_drop=-1.0, barrier=1.5, kind="opening")
-    record = SimpleNamespace(error=0.0, jumps=[rising])
-    assert estimated_error(record, 0.0, problem) == 0.0
-    record.jumps = [SimpleNamespace(energy_drop=-1.0, barrier=0.25, kind="opening")]
-    assert estimated_error(record, 0.0, problem) == 0.75
+    assert estimated_error(0.0, [rising], 0.0, problem) == 0.0
+    beyond = SimpleNamespace(energy_drop=-1.0, barrier=0.25, kind="opening")
+    assert estimated_error(0.0, [beyond], 0.0, problem) == 0.75
 
 
 # ---------------------------------------------------------------------- doubts

@@ -15,8 +15,8 @@ from adhesis import (
     run_path,
     self_affine_profile,
 )
+from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.path_record import Axis
-from adhesis.solver.loading.turning_points import LoadingBranch
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.sharp.method import SharpMethod
 from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of

@@ -18,8 +18,8 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
+from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.mean_stress_event import up_to
-from adhesis.solver.loading.turning_points import LoadingBranch
 from adhesis.solver.method import ContactState, Path
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Profile

@@ -13,7 +13,7 @@ from adhesis.solver._kernels import local_minima
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
+from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation
 from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation, Touch
 from tests.support.scenes import HALF_SPACE
 

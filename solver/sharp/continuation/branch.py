@@ -10,20 +10,19 @@ import numpy as np
 
 from adhesis.solver._kernels import shortest_length
 from adhesis.solver.model.jump import Branch as BranchName
-from adhesis.solver.sharp.continuation.across_jump import carry_previous
-from adhesis.solver.sharp.continuation.corrector import correct
-from adhesis.solver.sharp.continuation.events import Accepted, Fold, TwoFolds
-from adhesis.solver.sharp.continuation.history import ComputedJump
-from adhesis.solver.sharp.continuation.predictor import Predictor
-from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.continuation.jump import ComputedJump
+from adhesis.solver.sharp.continuation.predictor import Predictor, carry_previous
 from adhesis.solver.sharp.continuation.step_size import StepSize
-from adhesis.solver.sharp.continuation.trail import Trail
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
+from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
+    CORRECTED,
     FIRST_MOTION,
+    LONGEST_PREDICTION,
+    ORDER_RESOLVED,
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
@@ -32,6 +31,8 @@ from adhesis.solver.sharp.tolerances import (
     WORK_RESOLVED,
     WORK_STALLED,
 )
+
+Imbalance = Callable[[Point, Point], float]
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,139 @@ class Target:
     branch: BranchName
 
 
-Imbalance = Callable[[Point, Point], float]
+@dataclass(frozen=True)
+class Resolution:
+    """Tolerances with which a path is followed; separations as q0 s.
+
+    Attributes
+    ----------
+    jump : float
+        Separation to which a jump is located.
+    bend : float
+        Largest relative error of the trapezoidal rule over one step.
+    work : float
+        Largest difference in J/m² of the work and the change of energy over one step, where patches
+        open from inside; infinite where they do not.
+    h_max : float
+        q0 h_max.
+    finest : float
+        No jump is located more finely than this.
+    late : float
+        Work that a jump may add to the loss by being found late, in units of its drop.
+    least_drop : float
+        Drop in J/m² below which jumps need not be located more finely.
+    field_share : float
+        Share of every drop that counts as its error by the error of the field.
+    """
+
+    jump: float
+    bend: float
+    work: float
+    h_max: float
+    finest: float
+    late: float
+    least_drop: float
+    field_share: float
+
+    @property
+    def order(self) -> float:
+        """Separation of two events below which either may come first."""
+        return ORDER_RESOLVED * self.jump
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A further point of the branch.
+
+    Attributes
+    ----------
+    point : Point
+    is_output : bool
+        Whether its state belongs to the path: the trapezoidal rule needs it, or the target is
+        reached.
+    may_touch : bool
+        Whether surfaces may have touched inside a gap since the last search.
+    remaining : array, optional
+        Where a gap has closed or a patch vanished: the gaps that are left.
+    """
+
+    point: Point
+    is_output: bool
+    may_touch: bool
+    remaining: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class TwoFolds:
+    """Two folds of a branch that are predicted nearer to each other than jumps are located.
+
+    Attributes
+    ----------
+    edges : tuple of int
+        The edge that leads to each of them.
+    ways : tuple of float
+        The way on which it does: 1 outwards of the contact, -1 inwards. Next to the one fold its
+        edge takes the other one along, so that the rates there do not show it.
+    beyond : float
+        d beyond both.
+    apart : float
+        Their distance in d.
+    """
+
+    edges: tuple[int, ...]
+    ways: tuple[float, ...]
+    beyond: float
+    apart: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """No stable equilibrium is found a smallest step beyond ``point``.
+
+    Attributes
+    ----------
+    point : Point
+        The last point of the branch.
+    at : float
+        d a smallest step beyond it, or the target.
+    with_another : TwoFolds, optional
+        If a second one is near.
+    """
+
+    point: Point
+    at: float
+    with_another: TwoFolds | None = None
+
+
+class Trail:
+    """Accepted points since the last search for touches; at the first of them nothing overlaps.
+
+    Parameters
+    ----------
+    point : Point
+
+    Attributes
+    ----------
+    points : list of Point
+    clearance : float
+        Least clearance of a gap at the first point.
+    closed : float
+        Bound on how far a gap may have closed since.
+    """
+
+    def __init__(self, point: Point) -> None:
+        self.points = [point]
+        self.clearance, self.closed = point.clearance, 0.0
+
+    def add(self, point: Point, closed: float) -> None:
+        """Append a point; a gap has closed by at most ``closed`` since the last."""
+        self.points.append(point)
+        self.closed += closed
+
+    def restart(self, clearance: float) -> None:
+        """Begin anew after a search, at the last point."""
+        self.points = [self.points[-1]]
+        self.clearance, self.closed = clearance, 0.0
 
 
 class Branch:
@@ -263,3 +396,15 @@ class Branch:
         self._work_before = span, error
         stalled = span < longer and error > WORK_STALLED * larger
         return min(error, TRAPEZOID_FAR) if stalled else error
+
+
+def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | None:
+    """Return the stable equilibrium of all edges at d = ``at`` near the predicted one, or None.
+
+    None, too, where an edge is predicted to move far: what is found there may be another branch.
+    """
+    gaps = predictor.gaps(at)
+    # not written as > : a prediction that is no number is none
+    if not np.abs(gaps - predictor.point.gaps).max() <= LONGEST_PREDICTION * edges.wave:
+        return None
+    return edges.equilibrium(gaps, at, CORRECTED * edges.wave, memory=predictor.point.gaps)

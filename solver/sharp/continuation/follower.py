@@ -12,19 +12,14 @@ from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.branch import Branch, Target
-from adhesis.solver.sharp.continuation.events import Accepted, Fold
-from adhesis.solver.sharp.continuation.history import ComputedJump, History
-from adhesis.solver.sharp.continuation.jump import Jumps, Orders
-from adhesis.solver.sharp.continuation.resolution import Resolution
-from adhesis.solver.sharp.descent.saddle import positions
+from adhesis.solver.sharp.continuation.branch import Accepted, Branch, Fold, Resolution, Target
+from adhesis.solver.sharp.continuation.jump import ComputedJump, History, Jumps, Orders
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import step_limits
+from adhesis.solver.sharp.equilibrium.griffith import positions, step_limits
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
-from adhesis.solver.sharp.nucleation.location import Located, locate
+from adhesis.solver.sharp.nucleation.location import ClosingBound, Located, locate
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States

@@ -1,17 +1,15 @@
-"""A jump: descent in energy at a prescribed value, and nucleation afterwards."""
+"""Jumps: descent in energy at a prescribed value, and nucleation afterwards."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from adhesis.solver.method import ContactState
-from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.history import ComputedJump
-from adhesis.solver.sharp.continuation.mirror import MirrorCheck
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -22,6 +20,57 @@ from adhesis.solver.sharp.tolerances import (
     MOST_NUCLEATIONS,
     OTHER_MINIMUM,
 )
+
+
+@dataclass(frozen=True, eq=False)
+class ComputedJump:
+    """A jump that has been computed, before it belongs to a path.
+
+    Attributes
+    ----------
+    at : float
+        d of the jump.
+    states : tuple of ContactState
+        States before it that the path does not hold yet, and the one after it.
+    jump : Jump
+    point : Point or None
+        The stable point after it; None if no contact is left.
+    before : Point or None
+        The last point of the branch that it ends; None if there was none.
+    misplaced : float
+        Work in J/m² of nominal area by which it may be wrong, not being at its exact place.
+    """
+
+    at: float
+    states: tuple[ContactState, ...]
+    jump: Jump
+    point: Point | None
+    before: Point | None
+    misplaced: float = 0.0
+
+
+@dataclass
+class History:
+    """States and jumps of a path.
+
+    Attributes
+    ----------
+    states : list of ContactState
+    jumps : list of Jump
+    misplaced : float
+        Work in J/m² of nominal area by which the loss may be wrong because jumps were not found at
+        their exact places.
+    """
+
+    states: list[ContactState] = field(default_factory=list)
+    jumps: list[Jump] = field(default_factory=list)
+    misplaced: float = 0.0
+
+    def commit(self, computed: ComputedJump) -> None:
+        """Append a jump and its states."""
+        self.states += computed.states
+        self.jumps.append(computed.jump)
+        self.misplaced += computed.misplaced
 
 
 @dataclass(frozen=True)
@@ -234,3 +283,44 @@ class Jumps:
                 return found, races
             gaps = found
         return None, races
+
+
+class MirrorCheck:
+    """Finds jumps by which a mirror-symmetric state loses its symmetry.
+
+    The mirror image of their end is another end with the same energy: which of the two is reached
+    is a convention (docs/methods.md, rule 7).
+
+    Parameters
+    ----------
+    edges : EdgeMechanics
+    axes : array, shape (axes,)
+        About which the profile is its own mirror image, in θ.
+    """
+
+    def __init__(self, edges: EdgeMechanics, axes: Array) -> None:
+        self._near, self._axes = OTHER_MINIMUM * edges.wave, axes
+
+    def is_symmetric(self, gaps: Array) -> bool:
+        """Whether these gaps are their own mirror image."""
+        return self.are_images(gaps, gaps)
+
+    def are_images(self, one: Array, other: Array) -> bool:
+        """Whether two states are mirror images of each other."""
+        return one.shape == other.shape and any(
+            self._is_image(one, other, axis) for axis in self._axes
+        )
+
+    def is_broken(self, before: Array, after: Array) -> bool:
+        """Whether a symmetry of the gaps ``before`` is not one of those ``after``."""
+        return any(
+            self._is_image(before, before, axis) and not self._is_image(after, after, axis)
+            for axis in self._axes
+        )
+
+    def _is_image(self, one: Array, other: Array, axis: float) -> bool:
+        """Whether the image of some gaps about this axis are others."""
+        image = 2 * axis - one[:, ::-1]
+        apart = np.abs((image[:, None] - other[None] + np.pi) % (2 * np.pi) - np.pi)
+        nearest = apart.max(axis=2).min(axis=1, initial=np.inf)
+        return bool((nearest < self._near).all())

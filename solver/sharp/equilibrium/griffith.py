@@ -1,4 +1,4 @@
-"""Griffith's condition at the edges, C_e = C_c, and motions of the edges."""
+"""Griffith's condition at the edges, C_e = C_c, motions of the edges, and steps off a saddle."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from adhesis.solver._kernels import EdgeLaw, Panels
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import lengths_of, outward
-from adhesis.solver.sharp.tolerances import CLOSING_SHARE
+from adhesis.solver.sharp.tolerances import CLOSING_SHARE, EQUAL_AMPLITUDES, EQUAL_MODES
 
 
 def imbalance(opening: Array, gaps: Array, law: EdgeLaw, panels: Panels) -> Array:
@@ -26,3 +26,25 @@ def step_limits(gaps: Array, longest: float) -> Array:
     beside = np.stack([np.roll(patch, 1), patch], axis=1)
     closing = CLOSING_SHARE * np.minimum(length[:, None], beside)
     return np.minimum(longest, closing).ravel()
+
+
+def positions(gaps: Array, origin: float) -> Array:
+    """Measure the distance of every edge to the right of ``origin``, in [0, 2π)."""
+    return np.asarray((gaps.ravel() - origin) % (2 * np.pi))
+
+
+def leaving_step(hessian: Array, limit: Array, order: Array) -> Array | None:
+    """Step off a saddle, along its softest modes, up to the limit of an edge; None off a minimum.
+
+    One edge leads, outwards; it is the one that moves most freely in these modes, of equal ones the
+    first in ``order`` (positions). Where symmetry makes several modes equally soft, the step is the
+    leading edge's projection on all of them: which of equivalent edges leads does not matter.
+    """
+    values, vectors = np.linalg.eigh(hessian)
+    if not values[0] < 0:
+        return None
+    soft = vectors[:, values <= min(values[0] + EQUAL_MODES * np.abs(values).max(), 0.0)]
+    freedom = (soft**2).sum(axis=1)
+    equal = np.flatnonzero(freedom > EQUAL_AMPLITUDES * freedom.max())
+    step = soft @ soft[equal[np.argmin(order[equal])]]
+    return np.asarray(step / np.abs(step / limit).max())

@@ -7,20 +7,24 @@ the criterion of touches, ``opening.Openings`` that of gaps that open inside pat
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
 from adhesis.solver.sharp.tolerances import (
     BISECTION_EVERY,
     CLEAR_TRIALS,
+    CLOSING_BY_MOTION,
     CORRECTED,
     TOUCH_TRIALS,
+    TRIAL_FROM_END,
 )
 
 Seed = TypeVar("Seed")
@@ -69,6 +73,64 @@ class Criterion(Protocol[Seed]):
     def validate_location(self, value: float, at: float) -> None:
         """Raise if a point located at d = ``at`` with this value cannot be used."""
         ...
+
+
+class ClearanceInterpolation:
+    """Interpolation of the clearances of gaps that overlap at one end of a stretch of a branch.
+
+    Parameters
+    ----------
+    clear, hit : float
+        d where all of them are clear, and where all overlap.
+    before, after : array, shape (gaps,)
+        Their clearances there.
+    clearances_of : callable
+        Computes their clearances in another field.
+    """
+
+    def __init__(
+        self,
+        clear: float,
+        hit: float,
+        before: Array,
+        after: Array,
+        clearances_of: Callable[[GapField], Array],
+    ) -> None:
+        self._at = [clear, hit]
+        self._values = [before, after]
+        self._clearances_of = clearances_of
+
+    def record(self, at: float, field: GapField) -> None:
+        """Record the clearances in a field at d = ``at``."""
+        self._at.append(at)
+        self._values.append(self._clearances_of(field))
+
+    def next_trial(self, clear: float, hit: float, wanted: float) -> float:
+        """Return the share of the way from ``clear`` to ``hit`` at which to try next.
+
+        There a gap first has the clearance ``wanted``, by a parabola through the clearances at both
+        ends and at the nearest third d that was recorded.
+        """
+        low, high = self._at.index(clear), self._at.index(hit)
+        way = hit - clear
+        begin, end = self._values[low], self._values[high]
+        sound = (begin > wanted) & (end < wanted) & (begin < np.inf)
+        if not sound.any():
+            return 0.5
+        begin, end = begin[sound], end[sound]
+        slope = end - begin
+        bend = np.zeros(slope.shape)
+        others = [i for i in range(len(self._at)) if i not in (low, high)]
+        if others:
+            third = min(others, key=lambda i: abs(self._at[i] - 0.5 * (clear + hit)))
+            t = (self._at[third] - clear) / way
+            bend = (self._values[third][sound] - begin - slope * t) / (t * (t - 1))
+        # begin + slope t + bend t (t - 1) = wanted: between 0 and 1 there is one root
+        b, c = slope - bend, begin - wanted
+        root = np.sqrt(np.maximum(b * b - 4 * bend * c, 0.0))
+        share = 2 * c / (root - b)
+        first = float(np.where(np.isfinite(share), share, c / -slope).min())
+        return min(max(first, TRIAL_FROM_END), 1 - TRIAL_FROM_END)
 
 
 def secant_share(clear_value: float, hit_value: float, tolerance: float) -> float:
@@ -147,3 +209,41 @@ def locate(
     if clear_value > hit_value:
         late *= -hit_value / (clear_value - hit_value)
     return Located(hit, criterion.choose_seeds(hit_candidates), late), 0.0
+
+
+class ClosingBound:
+    """Upper estimates of the local closing of gaps, in units of q0 s.
+
+    Parameters
+    ----------
+    edges : EdgeMechanics
+    """
+
+    def __init__(self, edges: EdgeMechanics) -> None:
+        self._edges = edges
+
+    def between(self, point: Point, reached: Point, branch: Branch) -> float:
+        """Bound the closing of a gap from one point of a branch to the next."""
+        if branch == "loading":
+            return abs(reached.at - point.at) * self._rate(reached)
+        # While the mean gap widens only edges that run can close a gap elsewhere.
+        motion = CLOSING_BY_MOTION * np.abs(reached.gaps - point.gaps).sum(axis=1).max()
+        return float(self._edges.largest_opening / np.sqrt(self._edges.wave) * motion)
+
+    def _rate(self, point: Point) -> float:
+        """Bound the closing of a gap along the branch per unit of d."""
+        rate = self.rate_at_fixed_edges(point)
+        if self._edges.is_fixed:
+            return rate
+        # d(q0 s)/dd along the branch, from d = weight q0 s - compliance p and dY/dd
+        device = self._edges.model.device
+        load = device.separation_weight == 0
+        mean = point.slope if load else 1 + device.compliance * point.slope
+        return float(rate * max(1.0, abs(mean)))
+
+    def rate_at_fixed_edges(self, point: Point) -> float:
+        """Bound the closing of a gap per unit of q0 s at fixed edges.
+
+        The mean gap closes by the gaps alone, the faster the less of the period they take.
+        """
+        return 2 * np.pi / float(np.diff(point.gaps).sum())

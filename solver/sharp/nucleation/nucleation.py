@@ -29,8 +29,7 @@ from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
-from adhesis.solver.sharp.nucleation.location import Located, secant_share
+from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation, Located, secant_share
 from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, COMPARABLE, OVERLAP, TOUCH_TRIALS
 
 

@@ -1,4 +1,0 @@
-"""Descent in energy after a loss of stability: the gradient flow of the edges.
-
-Import from its modules.
-"""
