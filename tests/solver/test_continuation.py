@@ -28,7 +28,7 @@ from adhesis.solver.sharp.continuation.jump import ComputedJump, History
 from adhesis.solver.sharp.continuation.predictor import Predictor, carry_previous
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
-from adhesis.solver.sharp.nucleation.location import locate
+from adhesis.solver.sharp.nucleation.location import Solve, equilibrium_between, locate
 
 WAVE, FOLD = 1.0, 0.2
 
@@ -344,10 +344,15 @@ class Clearance:
         """Nothing to check."""
 
 
+def between(curve: Curve) -> Solve:
+    """Solve points of a known curve."""
+    return equilibrium_between(cast(Any, curve))
+
+
 def test_a_touch_is_located_to_the_resolution_and_the_overlap_that_is_allowed():
     curve = Curve(fold=None)
     trail = [curve.point(at) for at in (0.8, 0.5)]
-    found, _ = locate(cast(Any, Clearance(0.0, 0.0)), cast(Any, curve), trail, 1e-4, 0.0)
+    found, _ = locate(cast(Any, Clearance(0.0, 0.0)), between(curve), trail, 1e-4, 0.0)
     assert found is not None
     assert 0 <= 0.6 - found.point.at < 0.5e-6
     assert found.late < 1e-4
@@ -357,7 +362,7 @@ def test_a_touch_where_the_clearance_leaps_is_at_the_last_clear_point():
     """By the error of the field: no smaller step makes the overlap small."""
     curve = Curve(fold=None)
     trail = [curve.point(at) for at in (0.8, 0.5)]
-    found, _ = locate(cast(Any, Clearance(1e-5, 1e-5)), cast(Any, curve), trail, 1e-4, 0.0)
+    found, _ = locate(cast(Any, Clearance(1e-5, 1e-5)), between(curve), trail, 1e-4, 0.0)
     assert found is not None
     assert 0 < found.point.at - 0.6 < 1e-15
     assert (found.seeds, found.late) == ([0.6], 0.0)

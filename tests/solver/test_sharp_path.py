@@ -19,6 +19,7 @@ from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation import branch as stable_branch
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.sharp.nucleation.location import field_at_fixed_edges, locate
 from tests.support.explicit_solution import explicit_openings
 
 SOLID = HalfSpace(young=1e6, poisson=0.5)
@@ -107,8 +108,14 @@ def test_a_touch_on_the_last_step_to_a_fold_is_found_with_edges_held():
     point = method.edges.equilibrium(state.internal.gaps, 0.8 * h_max, 0.01)
     clear, _ = method.nucleation.minimum(point.field)
     assert clear > 1e-2 * h_max
-    assert method.nucleation.locate_touch_at_fixed_edges(point, clear, 0.799 * h_max) is None
-    found = method.nucleation.locate_touch_at_fixed_edges(point, clear, 0.2 * h_max)
+    solve = field_at_fixed_edges(method.edges)
+
+    def touch_before(end):
+        trail = [point, solve(point, point, end)]
+        return locate(method.nucleation, solve, trail, 0.0, clear, method.nucleation.tolerance)[0]
+
+    assert touch_before(0.799 * h_max) is None
+    found = touch_before(0.2 * h_max)
     assert 0.2 * h_max < found.point.at < 0.8 * h_max
     np.testing.assert_array_equal(found.point.gaps, point.gaps)
     _, opening = explicit_openings(profile, point.gaps, found.point.at)

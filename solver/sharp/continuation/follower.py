@@ -19,7 +19,13 @@ from adhesis.solver.sharp.equilibrium.griffith import positions, step_limits
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import ClosingBound, Located, locate
+from adhesis.solver.sharp.nucleation.location import (
+    ClosingBound,
+    Located,
+    equilibrium_between,
+    field_at_fixed_edges,
+    locate,
+)
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
@@ -61,6 +67,7 @@ class Follower:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
+        self._between = equilibrium_between(edges)
         self._came_on: BranchName | None = None
         self._output: tuple[Point, ContactState] | None = None
 
@@ -197,11 +204,11 @@ class Follower:
             return None
         points = trail.points
         touched, clearance = locate(
-            self.nucleation, self.edges, points, self.resolution.jump, trail.clearance
+            self.nucleation, self._between, points, self.resolution.jump, trail.clearance
         )
         trail.restart(clearance)
         if self.openings.is_possible:
-            opened, _ = locate(self.openings, self.edges, points, self.resolution.finest, 0.0)
+            opened, _ = locate(self.openings, self._between, points, self.resolution.finest, 0.0)
             start = points[0].at
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
@@ -289,7 +296,10 @@ class Follower:
             way *= max(1.0, abs(response.separation))
         if low > self.closing.rate_at_fixed_edges(point) * way:
             return None
-        return self.nucleation.locate_touch_at_fixed_edges(point, low, fold.at)
+        solve = field_at_fixed_edges(self.edges)
+        trail = [point, solve(point, point, fold.at)]
+        found, _ = locate(self.nucleation, solve, trail, 0.0, low, self.nucleation.tolerance)
+        return None if found is None else replace(found, late=abs(fold.at - point.at))
 
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float

@@ -29,6 +29,9 @@ from adhesis.solver.sharp.tolerances import (
 
 Seed = TypeVar("Seed")
 
+Solve = Callable[[Point, Point, float], Point | None]
+"""Solves the point at a d between a clear point and a hit; None if there is none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Located(Generic[Seed]):
@@ -141,21 +144,48 @@ def secant_share(clear_value: float, hit_value: float, tolerance: float) -> floa
     return min(max((clear_value + 0.2 * tolerance) / (clear_value - hit_value), 0.02), 0.98)
 
 
+def equilibrium_between(edges: EdgeMechanics) -> Solve:
+    """Return a function that solves the equilibrium between two points of a branch."""
+    reach = CORRECTED * edges.wave
+
+    def solve(clear: Point, hit: Point, at: float) -> Point | None:
+        gaps = clear.interpolate(hit, at)
+        point = edges.equilibrium(gaps, at, reach, memory=clear.gaps)
+        near = abs(at - clear.at) < abs(hit.at - at)
+        for start in (clear, hit) if near else (hit, clear):
+            if point is None:
+                point = edges.equilibrium(start.extrapolate(at), at, reach, memory=clear.gaps)
+        return point
+
+    return solve
+
+
+def field_at_fixed_edges(edges: EdgeMechanics) -> Solve:
+    """Return a function that solves the field between two points that have the same edges."""
+
+    def solve(clear: Point, hit: Point, at: float) -> Point:
+        return Point(at, edges.field(clear.gaps, at), clear.rate, float("nan"))
+
+    return solve
+
+
 def locate(
     criterion: Criterion[Seed],
-    edges: EdgeMechanics,
+    solve: Solve,
     trail: list[Point],
     resolution: float,
     clearance: float,
+    ignored: float = 0.0,
 ) -> tuple[Located[Seed] | None, float]:
     """Locate the first point of a trail at which a criterion is met, with its seeds.
 
     Else None and the least value at the end of the trail. The trail starts at a point known to be
-    clear, by ``clearance`` at least; between its points the search ends at ``resolution`` (q0 s).
+    clear, by ``clearance`` at least; between its points the search ends at ``resolution`` (d). A
+    value at its end that is less than ``ignored`` below zero is none.
     """
     hit = trail[-1]
     hit_value, hit_candidates = criterion.minimum(hit.field)
-    if hit_value > 0:
+    if hit_value > -ignored:
         return None, hit_value
     clear_value = np.nan
     # over the points of the trail, then within one step of it
@@ -167,32 +197,25 @@ def locate(
             low, clear_value = middle, value
         else:
             high, hit, hit_candidates, hit_value = middle, trail[middle], candidates, value
-    last = trail[low]
-    clear = last.at
+    clear = trail[low]
     # Each trial is expensive: the values at both ends show where to begin.
     if low == 0 and clearance > 0:
         clear_value = clearance
-    tracked = criterion.track_between(last, hit)
+    tracked = criterion.track_between(clear, hit)
     cleared = 0  # trials one after the other that were clear
     for trials in range(1, TOUCH_TRIALS + 1):
-        if criterion.is_located(hit_value, abs(clear - hit.at) <= resolution):
+        if criterion.is_located(hit_value, abs(clear.at - hit.at) <= resolution):
             break
         share = 0.5
         if tracked is not None and trials % BISECTION_EVERY:
-            share = tracked.next_trial(clear, hit.at, -0.2 * criterion.tolerance)
+            share = tracked.next_trial(clear.at, hit.at, -0.2 * criterion.tolerance)
         # The least value may be that of another candidate than the hit: then a secant creeps.
         elif tracked is None and np.isfinite(clear_value) and cleared < CLEAR_TRIALS:
             share = secant_share(clear_value, hit_value, criterion.tolerance)
-        trial = clear + (hit.at - clear) * share
-        if trial in (clear, hit.at):  # there its value differs by the error of the field
-            return Located(last, criterion.choose_seeds(hit_candidates), 0.0), 0.0
-        reach = CORRECTED * edges.wave
-        gaps = last.interpolate(hit, trial)
-        point = edges.equilibrium(gaps, trial, reach, memory=last.gaps)
-        for start in (last, hit) if share < 0.5 else (hit, last):
-            if point is None:
-                gaps = start.extrapolate(trial)
-                point = edges.equilibrium(gaps, trial, reach, memory=last.gaps)
+        trial = clear.at + (hit.at - clear.at) * share
+        if trial in (clear.at, hit.at):  # there its value differs by the error of the field
+            return Located(clear, criterion.choose_seeds(hit_candidates), 0.0), 0.0
+        point = solve(clear, hit, trial)
         if point is None:
             break
         value, candidates = criterion.minimum(point.field)
@@ -200,12 +223,12 @@ def locate(
             tracked.record(trial, point.field)
         cleared = cleared + 1 if value > 0 else 0
         if value > 0:
-            last, clear, clear_value = point, trial, value
+            clear, clear_value = point, value
         else:
             hit, hit_candidates, hit_value = point, candidates, value
     criterion.validate_location(hit_value, hit.at)
     # estimate the distance from the exact location by a secant
-    late = abs(clear - hit.at)
+    late = abs(clear.at - hit.at)
     if clear_value > hit_value:
         late *= -hit_value / (clear_value - hit_value)
     return Located(hit, criterion.choose_seeds(hit_candidates), late), 0.0

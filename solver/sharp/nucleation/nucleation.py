@@ -29,8 +29,8 @@ from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation, Located, secant_share
-from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, COMPARABLE, OVERLAP, TOUCH_TRIALS
+from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation
+from adhesis.solver.sharp.tolerances import COMPARABLE, OVERLAP
 
 
 @dataclass(frozen=True)
@@ -151,32 +151,6 @@ class Nucleation:
         return ClearanceInterpolation(
             clear.at, hit.at, before, after, lambda field: self._clearance_of(field, closed)
         )
-
-    def locate_touch_at_fixed_edges(
-        self, point: Point, clearance: float, end: float
-    ) -> Located[Touch] | None:
-        """Locate a touch between a point with this clearance and d = ``end``, at fixed edges."""
-        clear, low, hit = point.at, clearance, end
-        cleared = 0
-        field = self.edges.field(point.gaps, hit)
-        high, minima = self.minimum(field)
-        if high > -self.tolerance:
-            return None
-        for _ in range(TOUCH_TRIALS):
-            if high >= -0.5 * self.tolerance:
-                break
-            # openings are linear in d at fixed edges
-            share = secant_share(low, high, self.tolerance) if cleared < CLEAR_TRIALS else 0.5
-            trial = clear + (hit - clear) * share
-            tried = self.edges.field(point.gaps, trial)
-            value, there = self.minimum(tried)
-            cleared = cleared + 1 if value > 0 else 0
-            if value > 0:
-                clear, low = trial, value
-            else:
-                hit, high, field, minima = trial, value, tried, there
-        touching = Point(hit, field, point.rate, float("nan"))
-        return Located(touching, self.choose_seeds(minima), abs(end - point.at))
 
     def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:
         """Return the gaps with a seed patch at each touch."""
