@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
+from adhesis import Control, HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
+from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.equilibrium.griffith import leaving_step
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.grids import grid_of
@@ -70,6 +73,31 @@ def test_a_race_is_flagged_with_what_is_at_stake():
     assert 0.01 * result.loss < first.at_stake < result.loss
     assert result.races >= 1
     assert result.energy_at_stake == pytest.approx(sum(j.at_stake for j in result.jumps))
+
+
+def test_under_a_load_the_speeds_of_the_edges_decide_nothing():
+    """There the advance of one edge helps all others (docs/paths.md)."""
+    problem = replace(race(), work_of_adhesion=0.01, control=Control(0.0))
+    methods = [SharpMethod(problem) for _ in range(2)]
+    relax = methods[1].edges.relax
+    methods[1].edges.relax = lambda *where, equal_speeds=False: relax(*where, equal_speeds=True)
+    one, other = (run_loop(method, max_stress=2e3, load_steps=6) for method in methods)
+    assert len(one.jumps) == len(other.jumps) > 2
+    assert other.loss == pytest.approx(one.loss, rel=1e-7)
+
+
+def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
+    """Two folds lie so near to each other here that at a fixed separation both orders are."""
+    asked = []
+    monkeypatch.setattr(Jumps, "_end_beyond", lambda *where: asked.append(where))
+    profile = self_affine_profile(
+        0.5, period=2e-3, n0=4, ratio=2, seed=453976, h_rms=1e-6, amplitudes="rayleigh"
+    )
+    problem = Problem(profile, SOLID, 0.0034070872, Control(0.0))
+    loop = run_loop(SharpMethod(problem), max_stress=1243.6, load_steps=3)
+    assert len(loop.jumps) == 7
+    assert loop.races == 0
+    assert asked == []
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,7 @@ class Orders:
 
 
 Rival = Point | None | FullContact
-"""End of a descent with equal speeds: a minimum, no contact, or full contact (under a load)."""
+"""End of a descent with equal speeds: a minimum, no contact, or full contact (with a stiffness)."""
 
 
 class Jumps:
@@ -107,6 +107,8 @@ class Jumps:
         self.edges, self.nucleation, self.states = edges, nucleation, states
         profile = states.problem.profile
         self.mirror = MirrorCheck(edges, profile.q0 * profile.mirror_axes)
+        # Under a load edges help each other: in which order they run decides nothing.
+        self._may_race = edges.critical > 0 and not edges.is_load
 
     def compute(
         self,
@@ -125,7 +127,7 @@ class Jumps:
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
         to a fold it may not be found again from its own edges. The jump raced, too, if another of
         two events that may come in either of ``orders`` leads elsewhere in the end, or if it ends
-        on one of two sides that are mirror images.
+        on one of two sides that are mirror images. Under a load neither is sought.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals)
@@ -140,7 +142,7 @@ class Jumps:
             if rivals:
                 rival = self._end_of_rival(rivals[0], at)
                 at_stake = self._at_stake(before, point, rival, at)
-            elif orders is not None:
+            elif orders is not None and self._may_race:
                 at_stake = self._at_stake_beyond(before, point, orders)
         except FullContact:  # elsewhere, but with no energy that could be compared
             at_stake = 0.0
@@ -258,7 +260,7 @@ class Jumps:
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
         point, raced = self._relax(gaps, at)
-        if not rivals and self.edges.critical > 0 and raced:
+        if not rivals and self._may_race and raced:
             try:
                 rival, _ = self._relax(gaps, at, equal_speeds=True)
                 # next to a fold the field's error may show a minimum where the edges are
