@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import cells_of_rows, row_blocks
+from adhesis.ensemble.results.blocks import row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
 from adhesis.solver.model.profile import Array
@@ -50,28 +50,24 @@ class JumpStatistics:
 
 def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpStatistics:
     """Count the jumps of the given rows, one array of rows for each cell."""
-    tasks, slots = len(results), results.campaign.output.jumps
-    cell_of = cells_of_rows(rows, tasks)
+    slots = results.campaign.output.jumps
     bins = BIN_EDGES.size - 1
     shape = (len(rows), len(JUMP_KINDS))
     number = np.zeros(shape, dtype=np.int64)
     energy = np.zeros(shape)
     histogram = np.zeros((*shape, bins), dtype=np.int64)
-    for block in row_blocks(tasks, slots):
-        cells = cell_of[block]
-        if not np.any(cells >= 0):
-            continue
-        flags = results.column("jump_kind", block)
-        drops = results.column("jump_energy_drop", block)
-        used = (flags >= 0) & (cells >= 0)[:, None]
-        if results.campaign.cycle.under_load:
-            used &= results.column("jump_patches_after", block) > 0
-        cell = np.broadcast_to(cells[:, None], flags.shape)[used]
-        kind, drop = flags[used].astype(np.intp), drops[used]
-        bin_of_drop = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)
-        np.add.at(number, (cell, kind), 1)
-        np.add.at(energy, (cell, kind), drop)
-        np.add.at(histogram, (cell, kind, bin_of_drop), 1)
+    for k, mine in enumerate(rows):
+        for block in row_blocks(mine, slots):
+            flags = results.column("jump_kind", block)
+            used = flags >= 0
+            if results.campaign.cycle.under_load:
+                used &= results.column("jump_patches_after", block) > 0
+            kind = flags[used].astype(np.intp)
+            drop = results.column("jump_energy_drop", block)[used]
+            bin_of_drop = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)
+            np.add.at(number[k], kind, 1)
+            np.add.at(energy[k], kind, drop)
+            np.add.at(histogram[k], (kind, bin_of_drop), 1)
     count = results.column("jump_count")
     return JumpStatistics(
         kinds=tuple(JUMP_KINDS),

@@ -39,13 +39,10 @@ def average_curves(
     row.
     """
     points = results.column(f"{branch}_penetration").size
-    done = np.sort(np.concatenate(rows))
     out = {curve: [_empty(points) for _ in rows] for curve in scales}
-    for columns, table in column_blocks(results, f"{branch}_{name}", done, points):
-        for k, mine in enumerate(rows):
-            if not mine.size:
-                continue
-            raw = table[np.searchsorted(done, mine)]
+    for k, mine in enumerate(rows):
+        for columns in column_blocks(mine.size, points) if mine.size else ():
+            raw = results.column(f"{branch}_{name}", mine, columns).astype(float)
             if name == "patches":  # -1 beyond the turning point of a load: not known
                 raw[raw < 0] = np.nan
             for curve, factors in scales.items():

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import cells_of_rows, row_blocks
+from adhesis.ensemble.results.blocks import row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import FieldPlan
@@ -102,16 +102,12 @@ def _average(
     shape = results.column(name, slice(0, 1)).shape[1:]
     total = np.zeros((len(rows), *shape))
     count = np.zeros((len(rows), *shape[:-1]), dtype=np.int64)
-    cell_of = cells_of_rows(rows, len(results))
-    for block in row_blocks(len(results), int(np.prod(shape))):
-        chosen = np.flatnonzero(cell_of[block] >= 0)
-        if not chosen.size:
-            continue
-        cells = cell_of[block][chosen]
-        values = results.column(name, block)[chosen].astype(float)
-        held = np.isfinite(values).all(axis=-1)
-        np.add.at(total, cells, np.where(held[..., None], values, 0.0))
-        np.add.at(count, cells, held)
+    for k, mine in enumerate(rows):
+        for block in row_blocks(mine, int(np.prod(shape))):
+            values = results.column(name, block).astype(float)
+            held = np.isfinite(values).all(axis=-1)
+            total[k] += np.where(held[..., None], values, 0.0).sum(axis=0)
+            count[k] += held.sum(axis=0)
     with np.errstate(invalid="ignore"):
         return total / count[..., None], count
 

@@ -34,7 +34,7 @@ from adhesis.ensemble.report.figures import (
     selection,
     shapes_and_spectra,
 )
-from adhesis.ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
+from adhesis.ensemble.report.figures.catalogue import FIELDS, LOOPS, LOSSES, MECHANISMS
 from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
@@ -113,7 +113,7 @@ def undrawn(monkeypatch, drawn) -> list[str]:
 
         return replace(item, draw=draw)
 
-    for name in ("LOOPS", "LOSSES", "MECHANISMS", "SHAPES", "HEIGHTS"):
+    for name in ("LOOPS", "LOSSES", "MECHANISMS", "FIELDS"):
         items = tuple(map(unless_wanted, getattr(catalogue, name)))
         monkeypatch.setattr(catalogue, name, items)
     return wanted
@@ -462,7 +462,7 @@ def test_densities_are_drawn_as_they_are(data):
 
 def test_every_figure_is_legible_at_column_width_in_colour_and_grey(data, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)  # laid out, but not written
-    for item in (*LOOPS, *LOSSES, *MECHANISMS, *SHAPES, *HEIGHTS):
+    for item in (*LOOPS, *LOSSES, *MECHANISMS, *FIELDS):
         with style():
             figure = item.draw(data)
         save(figure, Path(item.name))

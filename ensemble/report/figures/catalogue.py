@@ -95,7 +95,7 @@ LOSSES = (
         is_worth=_several("hurst"),
     ),
 )
-SHAPES = (
+FIELDS = (
     Illustration(
         "fig3_shapes",
         "Deformed shapes",
@@ -110,7 +110,9 @@ SHAPES = (
             " Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
             "h_rms = 1 µm, so the states here are those that the campaign kept.",
         ),
-        is_worth=lambda data: any(shape is not None for shape in data.fields.shapes),
+        is_worth=lambda data: bool(
+            data.fields.penetration.size and any(shape is not None for shape in data.fields.shapes)
+        ),
     ),
     Illustration(
         "fig4_spectra_of_branches",
@@ -155,8 +157,6 @@ SHAPES = (
         _compared_with(paper.FIGURE_8),
         is_worth=_with_fields,
     ),
-)
-HEIGHTS = (
     Illustration(
         "fig9_height_density",
         "Probability density of the heights",
@@ -200,15 +200,28 @@ PENETRATIONS = (
         "intervals over the realisations that all of them have finished. The curves are moved "
         "apart a little.",
         loss_figures.loss_against_penetration,
+        is_worth=lambda data: bool(loss_figures.of_penetration(data)),
     ),
 )
 
-ALL = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
+ALL = (*LOOPS, *LOSSES, *FIELDS, *MECHANISMS, *PENETRATIONS)
 
 
-def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
-    """One figure for each further axis of the campaign, unless it goes with H or γ."""
-    return tuple(_along_axis(data, axis) for axis in with_figure(data))
+def sections(data: Aggregate) -> dict[str, list[Illustration]]:
+    """Return the figures that are worth drawing, by section of the report."""
+    found = {
+        "loops": LOOPS,
+        "losses": LOSSES,
+        # One for each further axis of the campaign, unless it goes with H or γ
+        "axes": tuple(_along_axis(data, axis) for axis in with_figure(data)),
+        "mechanisms": MECHANISMS,
+        "fields": FIELDS,
+        "companions": PENETRATIONS,
+    }
+    return {
+        name: [item for item in items if item.is_worth(data if item.whole else data.shown)]
+        for name, items in found.items()
+    }
 
 
 def _along_axis(data: Aggregate, axis: Axis) -> Illustration:

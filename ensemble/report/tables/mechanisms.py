@@ -11,7 +11,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.quantities import percent
-from adhesis.ensemble.report.tables.key import estimate, key_columns
+from adhesis.ensemble.report.tables.key import estimate, estimated, key_columns
 from adhesis.ensemble.report.tables.table import (
     Table,
     TableColumn,
@@ -105,14 +105,8 @@ def mechanisms(data: Aggregate) -> Table:
     """
     columns = (
         *key_columns(data),
-        TableColumn(
-            "small_scale_share", estimate("small_scale_share"), "small-scale share", percent
-        ),
-        TableColumn(
-            "small_scale_share_ci_low", estimate("small_scale_share", "low"), "95 % from", percent
-        ),
-        TableColumn(
-            "small_scale_share_ci_high", estimate("small_scale_share", "high"), "to", percent
+        *estimated(
+            *("small_scale_share", "value ci_low ci_high", "small-scale share", percent),
         ),
         TableColumn("jumps_per_loop", estimate("jump_count"), "jumps a loop", number(3)),
         TableColumn(
@@ -125,10 +119,8 @@ def mechanisms(data: Aggregate) -> Table:
             estimate("pull_off_stress", "sem"),
             *("s.e. (kPa)", number(2, unit=1e3)),
         ),
-        TableColumn(
-            "pull_off_penetration",
-            estimate("pull_off_penetration"),
-            *("last contact lost at Δ/h_max", number(3)),
+        *estimated(
+            *("pull_off_penetration", "value", "last contact lost at Δ/h_max", number(3)),
         ),
         TableColumn(
             "wall_time [s]",
