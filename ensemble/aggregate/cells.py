@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.mean_curves import Curve
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.errors import InputError
@@ -84,10 +83,6 @@ class Cell:
     # Means of these, but not of ranges of adhesion, the largest interior tension and its place, and
     # ``opening_strength``. Only losses, pull-off and largest contact have an interval.
     estimates: dict[str, Estimate]
-    # ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
-    # (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``, ``energy``
-    # (J/m)
-    curves: dict[str, Curve]
 
     @property
     def point(self) -> tuple[float, ...]:
@@ -168,7 +163,6 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
                 seed=seed[rows],
                 values=values,
                 estimates=_estimates(values),
-                curves={},
             )
         )
     return cells

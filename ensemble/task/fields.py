@@ -36,6 +36,9 @@ _BINS_PER_DECADE = 12
 # Gap in units of h_max: from far below the roughness to far above any gap before detachment.
 GAP_EDGES: Array = np.logspace(-4, 2, 6 * 16 + 1)
 HEIGHT_EDGES: Array = np.linspace(-5, 5, 81)
+# Middles of their bins
+GAP_BINS: Array = np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:])
+HEIGHT_BINS: Array = 0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:])
 
 
 @dataclass(frozen=True)
@@ -131,18 +134,8 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
         depth = "mean stress/preload"
     return (
         waves,
-        Scale(
-            "gap_bin",
-            np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:]),
-            "1",
-            "gap/h_max, geometric middle of its bin",
-        ),
-        Scale(
-            "height_bin",
-            0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:]),
-            "1",
-            "height/h_rms, middle of its bin",
-        ),
+        Scale("gap_bin", GAP_BINS, "1", "gap/h_max, geometric middle of its bin"),
+        Scale("height_bin", HEIGHT_BINS, "1", "height/h_rms, middle of its bin"),
         Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
         Scale("field_penetration", plan.penetration, "1", f"{depth} of a field"),
         positions,

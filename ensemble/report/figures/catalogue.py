@@ -13,6 +13,10 @@ from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spec
 from adhesis.ensemble.report.figures.along import along, with_figure
 from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.selection import beside_paper, has_fields
+from adhesis.ensemble.report.figures.shapes_and_spectra import (
+    cells_with_shape,
+    shown_penetrations,
+)
 from adhesis.ensemble.report.figures.style import PublishedFigure
 from adhesis.ensemble.report.further_axes import together
 from adhesis.ensemble.report.paper import PaperFigure
@@ -42,7 +46,7 @@ def _several(name: str) -> Callable[[Aggregate], bool]:
 
 
 def _with_fields(data: Aggregate) -> bool:
-    return any(has_fields(data, cell) for cell in data.cells)
+    return any(map(has_fields, data.cells))
 
 
 def _compared_with(figure: PaperFigure, addition: str = "") -> Callable[[Aggregate], str]:
@@ -110,9 +114,7 @@ FIELDS = (
             " Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
             "h_rms = 1 µm, so the states here are those that the campaign kept.",
         ),
-        is_worth=lambda data: bool(
-            data.fields.penetration.size and any(shape is not None for shape in data.fields.shapes)
-        ),
+        is_worth=lambda data: bool(shown_penetrations(data, 1) and cells_with_shape(data)),
     ),
     Illustration(
         "fig4_spectra_of_branches",
