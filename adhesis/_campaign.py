@@ -6,7 +6,6 @@ import io
 import json
 import os
 import re
-import tempfile
 import warnings
 from collections.abc import Mapping
 from html import escape
@@ -154,8 +153,8 @@ class Campaign:
         out : path
             The results file. One of this campaign is resumed, one of a smaller campaign extended.
         ranks : int
-            1 computes in this process. More start so many ranks on this machine, by MPI where it is
-            installed, else as processes: one more than cores is right, as the first only hands out.
+            1 computes in this process. More start processes beside it, which compute, while this
+            one hands out: one more than cores is right.
         progress : bool
             Whether lines on stderr, or in the notebook, show how far the campaign is.
 
@@ -184,33 +183,15 @@ class Campaign:
         from adhesis.ensemble.results.layout import check_results_file
 
         check_results_file("out", path)
-        from adhesis.ensemble.errors import InputError
-        from adhesis.ensemble.run import launch
-
-        most = launch.largest_number_of_ranks()
-        if ranks > most:
-            raise InputError(
-                f"ranks is {ranks}: at most {most} are started here, on "
-                f"{checks.counted(launch.cores(), 'core')}"
-            )
-        mpirun = None if ranks == 1 else launch.mpi_launcher()
-        if mpirun is None:
-            self._run_here(path, ranks - 1, progress)
-        else:
-            self._run_ranks(mpirun, path, ranks, progress)
         from adhesis._open import open as open_results
-
-        results = open_results(path)
-        _warn_of_failures(path)
-        return results
-
-    def _run_here(self, path: Path, processes: int, progress: bool) -> None:
         from adhesis.ensemble.reporter import log
+        from adhesis.ensemble.run.launch import check_ranks
         from adhesis.ensemble.run.session import Options, run_campaign
 
+        check_ranks("ranks", ranks)
         say = log if progress else lambda text: None
         stream = None if progress else io.StringIO()  # stderr is that of all threads
-        options = Options(processes=processes)
+        options = Options(processes=ranks - 1)
         summary = run_campaign(self.tables, path, options=options, say=say, stream=stream)
         say(f"{path}: {summary}")
         if summary.stopped:
@@ -218,30 +199,9 @@ class Campaign:
                 f"the campaign stopped early: {summary.stopped}; {summary.pending} of "
                 f"{summary.total} tasks are left in {path}, and the same call goes on"
             )
-
-    def _run_ranks(self, mpirun: str, path: Path, ranks: int, progress: bool) -> None:
-        from adhesis.ensemble.errors import InputError
-        from adhesis.ensemble.exit_codes import BAD_INPUT, DONE, SOME_FAILED
-        from adhesis.ensemble.reporter import log
-        from adhesis.ensemble.run import launch
-
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder, "campaign.toml")
-            file.write_text(self.text, encoding="utf-8")
-            end = launch.run_ranks(
-                mpirun,
-                ranks,
-                ["run", str(file), "--out", str(path.absolute())],
-                output=log if progress else lambda line: None,
-            )
-        sentence = "\n".join((*end.words, end.sentence.removeprefix("adhesis run: ")))
-        if end.code == BAD_INPUT:
-            raise InputError(sentence or "the ranks refused the run")
-        if end.code not in (DONE, SOME_FAILED):
-            raise RuntimeError(
-                sentence
-                or f"the ranks ended with exit code {end.code}; what was done is kept in {path}"
-            )
+        results = open_results(path)
+        _warn_of_failures(path)
+        return results
 
 
 def _warn_of_failures(path: Path) -> None:

@@ -16,6 +16,4 @@ RESUME = 75  # EX_TEMPFAIL
 """A run stopped early: the same command goes on."""
 INTERRUPTED = 128 + signal.SIGINT
 """Of a run, by a second Ctrl-C: the first one stops it in order."""
-KILLED = 128 + signal.SIGKILL
-"""As a shell reports a process that signal 9 has ended."""
 TERMINATED = 128 + signal.SIGTERM

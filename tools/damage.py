@@ -188,7 +188,7 @@ def _status(path: Path) -> str:
 def _averages(path: Path) -> str:
     """Return every number that a report is made of, or why there is none."""
     data = aggregate(path)
-    return _plain([data.cells, data.paired, data.jumps, data.fields, data.failures])
+    return _plain([data.cells, data.paired, data.failures])
 
 
 def _plain(value: Any) -> str:

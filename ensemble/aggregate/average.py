@@ -16,19 +16,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.cells import Cell, read_cells, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion, read_companion
-from adhesis.ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
-from adhesis.ensemble.aggregate.mean_curves import average_curves
-from adhesis.ensemble.aggregate.mean_fields import FieldStatistics, aggregate_fields
+from adhesis.ensemble.aggregate.jumps import JumpStatistics, count_jumps
+from adhesis.ensemble.aggregate.mean_curves import Curve, average_curves
+from adhesis.ensemble.aggregate.mean_fields import FieldStatistics, average_fields
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
+from adhesis.ensemble.task.dataset import KEPT
 from adhesis.solver.method import BRANCHES
-from adhesis.solver.model.profile import Array
 
 _MAX_FAILURES = 20
 
@@ -50,16 +51,26 @@ class PairedDifference:
 
 
 @dataclass(frozen=True, eq=False)
+class AveragedCell(Cell):
+    """A cell with what is averaged over its rows a block at a time."""
+
+    # ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
+    # (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``, ``energy``
+    # (J/m)
+    curves: dict[str, Curve]
+    jumps: JumpStatistics
+    fields: FieldStatistics
+
+
+@dataclass(frozen=True, eq=False)
 class Aggregate:
     """Averages and metadata of a results file that a report needs."""
 
     path: Path
     campaign: Campaign
     attributes: dict[str, Any]  # root attributes of the file
-    cells: tuple[Cell, ...]  # by H, then γ, then further axes, ascending
+    cells: tuple[AveragedCell, ...]  # by H, then γ, then further axes, ascending
     paired: tuple[PairedDifference, ...]
-    jumps: JumpStatistics  # in the order of the cells
-    fields: FieldStatistics  # in the order of the cells
     failures: tuple[tuple[int, str], ...]  # row and error text of the first failed tasks
     companions: tuple[Companion, ...] = ()  # other campaigns that the report compares with this one
     # One sentence for each file, this one or a companion, that has damaged rows (left out), or no
@@ -105,25 +116,16 @@ class Aggregate:
         """
         if not self.further:
             return self
-        stacks: dict[tuple[float, float], list[int]] = {}
-        for k, cell in enumerate(self.cells):
-            stacks.setdefault((cell.hurst, cell.work_of_adhesion), []).append(k)
+        stacks: dict[tuple[float, float], list[AveragedCell]] = {}
+        for cell in self.cells:
+            stacks.setdefault((cell.hurst, cell.work_of_adhesion), []).append(cell)
         layers = list(zip(*stacks.values(), strict=False))
-        layer = next(m for m in reversed(layers) if any(self.cells[k].done for k in m))
-        return self._part(list(layer))
+        layer = next(m for m in reversed(layers) if any(cell.done for cell in m))
+        keys = {(cell.hurst, cell.others) for cell in layer}
+        paired = tuple(pair for pair in self.paired if (pair.hurst, pair.others) in keys)
+        return replace(self, cells=layer, paired=paired)
 
-    def _part(self, indices: list[int]) -> Aggregate:
-        cells = tuple(self.cells[k] for k in indices)
-        keys = {(cell.hurst, cell.others) for cell in cells}
-        return replace(
-            self,
-            cells=cells,
-            paired=tuple(pair for pair in self.paired if (pair.hurst, pair.others) in keys),
-            jumps=self.jumps.part(indices),
-            fields=self.fields.part(indices),
-        )
-
-    def cell(self, hurst: float, work_of_adhesion: float) -> Cell | None:
+    def cell(self, hurst: float, work_of_adhesion: float) -> AveragedCell | None:
         """Return the first cell of (H, γ), None if the campaign lacks it; see :attr:`shown`."""
         for cell in self.cells:
             if (cell.hurst, cell.work_of_adhesion) == (hurst, work_of_adhesion):
@@ -137,24 +139,16 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     InputError if a file cannot be read, is no results file, or holds no finished task.
     """
     with Results(path) as results:
-        status = results.status()
-        cells = read_cells(results, status)
-        rows = [cell.rows for cell in cells]
-        for name, scales in _curve_scales(cells).items():
-            for branch in BRANCHES:
-                for curve, averages in average_curves(results, branch, name, rows, scales).items():
-                    for cell, average in zip(cells, averages, strict=True):
-                        cell.curves[f"{branch}_{curve}"] = average
+        status, kept = results.status(), results.column(KEPT)
+        cells = tuple(_averaged(results, cell, kept) for cell in read_cells(results, status))
         failed = np.flatnonzero(status == FAILED)[:_MAX_FAILURES]
         companions = tuple(read_companion(other, results.campaign) for other in beside)
         return Aggregate(
             path=results.path,
             campaign=results.campaign,
             attributes=results.attributes,
-            cells=tuple(cells),
+            cells=cells,
             paired=tuple(_paired(cells)),
-            jumps=aggregate_jumps(results, rows),
-            fields=aggregate_fields(results, rows),
             failures=tuple(zip(failed.tolist(), results.errors(failed), strict=True)),
             companions=companions,
             doubts=(*results.doubts(), *(d for other in companions for d in other.doubts)),
@@ -162,21 +156,28 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
         )
 
 
-def _curve_scales(cells: Sequence[Cell]) -> dict[str, dict[str, list[Array]]]:
-    """Return, by dataset, the curves to average: curve -> factor of each row, cell by cell."""
-    ones = [np.ones(cell.done) for cell in cells]
-    stress = [1 / stress_scale(cell.campaign, cell.values["h_max"]) for cell in cells]
-    slope = [s / np.sqrt(cell.values["m2"]) for s, cell in zip(stress, cells, strict=True)]
-    return {
-        "mean_stress": {
-            "mean_stress": ones,
-            "mean_stress_dimensionless": stress,
-            "mean_stress_over_slope": slope,
-        },
-        "contact_fraction": {"contact_fraction": ones},
-        "patches": {"patches": ones},
-        "energy": {"energy": ones},
+def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedCell:
+    """Read curves, jumps and fields of a cell."""
+    ones = np.ones(cell.done)
+    stress = 1 / stress_scale(cell.campaign, cell.values["h_max"])
+    # by dataset, the curves to make of it, with the factor of each row
+    scales = {name: {name: ones} for name in ("contact_fraction", "patches", "energy")}
+    scales["mean_stress"] = {
+        "mean_stress": ones,
+        "mean_stress_dimensionless": stress,
+        "mean_stress_over_slope": stress / np.sqrt(cell.values["m2"]),
     }
+    curves: dict[str, Curve] = {}
+    for branch in BRANCHES:
+        for name, factors in scales.items():
+            found = average_curves(results, f"{branch}_{name}", cell.rows, factors)
+            curves |= {f"{branch}_{curve}": average for curve, average in found.items()}
+    return AveragedCell(
+        **vars(cell),
+        curves=curves,
+        jumps=count_jumps(results, cell.rows),
+        fields=average_fields(results, cell.rows, kept),
+    )
 
 
 def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.mean_curves import Curve
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
+from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
 from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
 from adhesis.ensemble.task.fields import FieldPlan, field_plan
 from adhesis.ensemble.task.row import JUMP_COUNT, NUMBERS, TIMES
@@ -85,10 +83,6 @@ class Cell:
     # Means of these, but not of ranges of adhesion, the largest interior tension and its place, and
     # ``opening_strength``. Only losses, pull-off and largest contact have an interval.
     estimates: dict[str, Estimate]
-    # ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
-    # (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``, ``energy``
-    # (J/m)
-    curves: dict[str, Curve]
 
     @property
     def point(self) -> tuple[float, ...]:
@@ -130,21 +124,13 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
             + f", of {status.size}): there is nothing to report"
         )
     campaign = results.campaign
-    hurst, gamma = results.column("hurst"), results.column("work_of_adhesion")
-    realisation, seed = results.column("realisation"), results.column("seed")
+    tasks = results.tasks()
+    realisation, seed = tasks.column("realisation"), tasks.column("seed")
     columns = {name: results.column(name) for name in _PER_TASK}
     cells = []
-    names = [axis.name for axis in campaign.axes[2:]]
-    axes = [hurst, gamma, *(results.column(d.name) for d in axis_datasets(campaign))]
-    written = [{value: value for value in axis.values} for axis in campaign.axes]
-    for point in sorted(set(zip(*(axis.tolist() for axis in axes), strict=True))):
-        h, g, *others = (known.get(v, v) for known, v in zip(written, point, strict=True))
-        here = [axis == value for axis, value in zip(axes, point, strict=True)]
-        rows_of_cell = np.flatnonzero(np.all(here, axis=0))
-        task = Task(h, g, 0, 0, tuple(zip(names, others, strict=True)))
+    for task, rows_of_cell in tasks.by_cell():
         of_cell, unit = campaign.at(task), campaign.penetration_unit(task)
         rows = rows_of_cell[status[rows_of_cell] == DONE]
-        rows = rows[np.argsort(realisation[rows], kind="stable")]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
         drops = values["loss_from_drops"]
         if campaign.cycle.under_load:  # without the drop that closes the loop
@@ -160,8 +146,8 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         failed = int(np.sum(status[rows_of_cell] == FAILED))
         cells.append(
             Cell(
-                hurst=h,
-                work_of_adhesion=g,
+                hurst=task.hurst,
+                work_of_adhesion=task.work_of_adhesion,
                 others=task.others,
                 campaign=of_cell,
                 penetration={
@@ -173,11 +159,10 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
                 failed=failed,
                 pending=int(np.sum(status[rows_of_cell] == PENDING)),
                 rows=rows,
-                realisation=realisation[rows].astype(np.int64),
+                realisation=realisation[rows],
                 seed=seed[rows],
                 values=values,
                 estimates=_estimates(values),
-                curves={},
             )
         )
     return cells

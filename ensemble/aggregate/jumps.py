@@ -7,13 +7,12 @@ weight falls off is not counted: its drop depends on where the loop is closed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import cells_of_rows, row_blocks
+from adhesis.ensemble.results.blocks import row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
 from adhesis.solver.model.profile import Array
@@ -28,56 +27,36 @@ BIN_EDGES: Array = np.logspace(
 )
 
 
+SMALL = np.array([kind in SMALL_SCALE for kind in JUMP_KINDS])
+"""Whether jumps of a kind only move edges inside existing patches, shape (kinds,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class JumpStatistics:
-    """Jumps of every cell (in the order of the cells given), by kind."""
+    """Jumps of all tasks of a cell together, by kind."""
 
-    kinds: tuple[str, ...]
-    # Shape (kinds,); whether jumps of a kind only move edges inside existing patches
-    small_scale: NDArray[np.bool_]
-    number: NDArray[np.int64]  # shape (cells, kinds); number of jumps in all tasks together
-    energy: Array  # shape (cells, kinds); their drops, J/m² of nominal area, in all tasks together
-    # Shape (cells, kinds, bins); number of jumps by energy drop, between :data:`BIN_EDGES`
+    number: NDArray[np.int64]  # shape (kinds,)
+    energy: Array  # shape (kinds,); their drops, J/m² of nominal area
+    # Shape (kinds, bins); number of jumps by energy drop, between :data:`BIN_EDGES`
     histogram: NDArray[np.int64]
-    # Shape (cells,); number of tasks that made more jumps than the catalogue holds
-    truncated: NDArray[np.int64]
-
-    def part(self, cells: Sequence[int]) -> JumpStatistics:
-        """Return the statistics of some of the cells."""
-        names, chosen = ("number", "energy", "histogram", "truncated"), list(cells)
-        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+    truncated: int  # number of tasks that made more jumps than the catalogue holds
 
 
-def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpStatistics:
-    """Count the jumps of the given rows, one array of rows for each cell."""
-    tasks, slots = len(results), results.campaign.output.jumps
-    cell_of = cells_of_rows(rows, tasks)
-    bins = BIN_EDGES.size - 1
-    shape = (len(rows), len(JUMP_KINDS))
-    number = np.zeros(shape, dtype=np.int64)
-    energy = np.zeros(shape)
-    histogram = np.zeros((*shape, bins), dtype=np.int64)
-    for block in row_blocks(tasks, slots):
-        cells = cell_of[block]
-        if not np.any(cells >= 0):
-            continue
+def count_jumps(results: Results, rows: NDArray[np.intp]) -> JumpStatistics:
+    """Count the jumps of the rows of a cell."""
+    slots, bins = results.campaign.output.jumps, BIN_EDGES.size - 1
+    number, energy = np.zeros(len(JUMP_KINDS), dtype=np.int64), np.zeros(len(JUMP_KINDS))
+    histogram = np.zeros((len(JUMP_KINDS), bins), dtype=np.int64)
+    for block in row_blocks(rows, slots):
         flags = results.column("jump_kind", block)
-        drops = results.column("jump_energy_drop", block)
-        used = (flags >= 0) & (cells >= 0)[:, None]
+        used = flags >= 0
         if results.campaign.cycle.under_load:
             used &= results.column("jump_patches_after", block) > 0
-        cell = np.broadcast_to(cells[:, None], flags.shape)[used]
-        kind, drop = flags[used].astype(np.intp), drops[used]
+        kind = flags[used].astype(np.intp)
+        drop = results.column("jump_energy_drop", block)[used]
         bin_of_drop = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)
-        np.add.at(number, (cell, kind), 1)
-        np.add.at(energy, (cell, kind), drop)
-        np.add.at(histogram, (cell, kind, bin_of_drop), 1)
-    count = results.column("jump_count")
-    return JumpStatistics(
-        kinds=tuple(JUMP_KINDS),
-        small_scale=np.array([kind in SMALL_SCALE for kind in JUMP_KINDS]),
-        number=number,
-        energy=energy,
-        histogram=histogram,
-        truncated=np.array([int(np.sum(count[mine] > slots)) for mine in rows], dtype=np.int64),
-    )
+        np.add.at(number, kind, 1)
+        np.add.at(energy, kind, drop)
+        np.add.at(histogram, (kind, bin_of_drop), 1)
+    truncated = int(np.sum(results.column("jump_count", rows) > slots))
+    return JumpStatistics(number, energy, histogram, truncated)

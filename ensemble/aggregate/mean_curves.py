@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,39 +27,25 @@ class Curve:
 
 
 def average_curves(
-    results: Results,
-    branch: str,
-    name: str,
-    rows: Sequence[NDArray[np.intp]],
-    scales: Mapping[str, Sequence[Array]],
-) -> dict[str, list[Curve]]:
-    """Average the dataset ``branch_name`` over the rows of every cell; NaN for a cell without rows.
+    results: Results, name: str, rows: NDArray[np.intp], scales: Mapping[str, Array]
+) -> dict[str, Curve]:
+    """Average a dataset over the rows of a cell; NaN for a cell without rows.
 
-    ``scales`` holds, by curve to make of the dataset, one array for each cell: the factor of each
-    row.
+    ``scales`` holds the factor of each row, by curve to make of the dataset.
     """
-    points = results.column(f"{branch}_penetration").size
-    done = np.sort(np.concatenate(rows))
-    out = {curve: [_empty(points) for _ in rows] for curve in scales}
-    for columns, table in column_blocks(results, f"{branch}_{name}", done, points):
-        for k, mine in enumerate(rows):
-            if not mine.size:
-                continue
-            raw = table[np.searchsorted(done, mine)]
-            if name == "patches":  # -1 beyond the turning point of a load: not known
-                raw[raw < 0] = np.nan
-            for curve, factors in scales.items():
-                values = raw * factors[k][:, None]
-                average = out[curve][k]
-                average.mean[columns] = values.mean(axis=0)
-                if mine.size > 1:
-                    average.std[columns] = values.std(axis=0, ddof=1)
-                average.quantiles[:, columns] = np.quantile(
-                    values, QUANTILES, axis=0, overwrite_input=True
-                )
-    return out
-
-
-def _empty(points: int) -> Curve:
+    points = results.column(name, slice(0, 1)).shape[1]
     shapes = (points, points, (len(QUANTILES), points))
-    return Curve(*(np.full(shape, np.nan) for shape in shapes))
+    out = {curve: Curve(*(np.full(shape, np.nan) for shape in shapes)) for curve in scales}
+    for columns in column_blocks(rows.size, points) if rows.size else ():
+        raw = results.column(name, rows, columns).astype(float)
+        if name.endswith("patches"):  # -1 beyond the turning point of a load: not known
+            raw[raw < 0] = np.nan
+        for curve, factors in scales.items():
+            values = raw * factors[:, None]
+            out[curve].mean[columns] = values.mean(axis=0)
+            if rows.size > 1:
+                out[curve].std[columns] = values.std(axis=0, ddof=1)
+            out[curve].quantiles[:, columns] = np.quantile(
+                values, QUANTILES, axis=0, overwrite_input=True
+            )
+    return out

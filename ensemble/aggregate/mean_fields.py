@@ -6,20 +6,18 @@ realisations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import cells_of_rows, row_blocks
+from adhesis.ensemble.results.blocks import row_blocks
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.solver.model.profile import Array
 
 _AVERAGED = ("psd_height", "height_density", "psd_displacement", "gap_density")
+_OF_SHAPE = ("field_height", "field_displacement")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,41 +32,32 @@ class DeformedShape:
 
 @dataclass(frozen=True, eq=False)
 class FieldStatistics:
-    """Averages of every cell, in the order of the cells."""
+    """Averages of one cell; NaN without finished tasks.
 
-    # Shape (penetrations,); Δ/h_max of the states, or Δ over the largest one if the campaign has
-    # several of these
-    penetration: Array
-    # gap_bin, height_bin: middles of the bins: gap/h_max, height/h_rms. Wave numbers, and positions
-    # of the nodes of shapes, are in the plan of each cell.
-    gap_bin: Array
-    height_bin: Array
-    psd_height: Array  # shape (cells, wave numbers), in m³; NaN for a cell without finished tasks
-    height_density: Array  # shape (cells, height bins)
-    # Shape (cells, 2, penetrations, wave numbers), in m³, second axis loading and unloading
+    Penetrations, wave numbers, and positions of the nodes of shapes are in the plan of the cell.
+    """
+
+    psd_height: Array  # shape (wave numbers,), in m³
+    height_density: Array  # shape (height bins,)
+    # Shape (2, penetrations, wave numbers), in m³, first axis loading and unloading
     psd_displacement: Array
-    gap_density: Array  # shape (cells, 2, penetrations, gap bins)
-    # Shape (cells, 2, penetrations); number of realisations averaged in the last two
+    gap_density: Array  # shape (2, penetrations, gap bins)
+    # Shape (2, penetrations); number of realisations averaged in the last two
     in_contact: NDArray[np.int64]
-    # Shapes of the first finished realisation whose fields are stored
-    shapes: tuple[DeformedShape | None, ...]
-
-    def part(self, cells: Sequence[int]) -> FieldStatistics:
-        """Return the averages of some of the cells."""
-        names = (*_AVERAGED, "in_contact")
-        arrays: dict[str, Any] = {name: getattr(self, name)[list(cells)] for name in names}
-        return replace(self, shapes=tuple(self.shapes[k] for k in cells), **arrays)
+    # Of the first finished realisation whose fields are stored
+    shape: DeformedShape | None
 
 
-def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> FieldStatistics:
-    """Average the given rows, one array of rows for each cell."""
+def average_fields(
+    results: Results, rows: NDArray[np.intp], kept: NDArray[np.intp]
+) -> FieldStatistics:
+    """Average the rows of a cell; ``kept`` are the rows of the file that keep their fields."""
     averages = {name: _average(results, name, rows) for name in _AVERAGED}
+    slots = np.flatnonzero(np.isin(kept, rows))[:1]
+    shape = [results.column(name, slots).astype(float) for name in _OF_SHAPE]
     return FieldStatistics(
-        penetration=results.column("field_penetration"),
-        gap_bin=results.column("gap_bin"),
-        height_bin=results.column("height_bin"),
         in_contact=averages["psd_displacement"][1],
-        shapes=_shapes(results, rows),
+        shape=DeformedShape(*(values[0] for values in shape)) if slots.size else None,
         **{name: mean for name, (mean, _) in averages.items()},
     )
 
@@ -93,42 +82,18 @@ def fitted_slope(plan: FieldPlan, density: Array) -> tuple[float, float]:
 
 
 def _average(
-    results: Results, name: str, rows: Sequence[NDArray[np.intp]]
+    results: Results, name: str, rows: NDArray[np.intp]
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Average the rows of each cell that hold finite numbers; return means and counts.
+    """Average the rows that hold finite numbers; return mean and count.
 
     The count has the shape of the mean without its last axis.
     """
     shape = results.column(name, slice(0, 1)).shape[1:]
-    total = np.zeros((len(rows), *shape))
-    count = np.zeros((len(rows), *shape[:-1]), dtype=np.int64)
-    cell_of = cells_of_rows(rows, len(results))
-    for block in row_blocks(len(results), int(np.prod(shape))):
-        chosen = np.flatnonzero(cell_of[block] >= 0)
-        if not chosen.size:
-            continue
-        cells = cell_of[block][chosen]
-        values = results.column(name, block)[chosen].astype(float)
+    total, count = np.zeros(shape), np.zeros(shape[:-1], dtype=np.int64)
+    for block in row_blocks(rows, int(np.prod(shape))):
+        values = results.column(name, block).astype(float)
         held = np.isfinite(values).all(axis=-1)
-        np.add.at(total, cells, np.where(held[..., None], values, 0.0))
-        np.add.at(count, cells, held)
+        total += np.where(held[..., None], values, 0.0).sum(axis=0)
+        count += held.sum(axis=0)
     with np.errstate(invalid="ignore"):
         return total / count[..., None], count
-
-
-def _shapes(results: Results, rows: Sequence[NDArray[np.intp]]) -> tuple[DeformedShape | None, ...]:
-    kept = results.column(KEPT)
-    out: list[DeformedShape | None] = []
-    for mine in rows:
-        slots = np.flatnonzero(np.isin(kept, mine))
-        if not slots.size:
-            out.append(None)
-            continue
-        slot = slice(int(slots[0]), int(slots[0]) + 1)
-        out.append(
-            DeformedShape(
-                height=results.column("field_height", slot)[0].astype(float),
-                displacement=results.column("field_displacement", slot)[0].astype(float),
-            )
-        )
-    return tuple(out)

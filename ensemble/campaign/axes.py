@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 Value = float
@@ -34,23 +34,17 @@ def aligned(axes: Sequence[Axis], zipped: Sequence[Sequence[str]]) -> list[list[
     The order of the values in a file does not matter, except that those of keys which vary together
     belong to one another.
     """
-    by_name = {axis.name: axis for axis in axes}
     member = {name: tuple(names) for names in zipped for name in names}
-    groups: list[list[Axis]] = []
-    seen: set[str] = set()
+    groups: dict[tuple[str, ...], list[Axis]] = {}
     for axis in axes:
-        if axis.name in seen:
-            continue
-        together = [a for a in axes if a.name in member.get(axis.name, (axis.name,))]
-        seen |= {a.name for a in together}
-        rows = sorted(zip(*(by_name[a.name].values for a in together), strict=True))
-        groups.append(
-            [
-                Axis(a.table, a.name, tuple(row[i] for row in rows), a.unit, a.meaning)
-                for i, a in enumerate(together)
-            ]
-        )
-    return groups
+        groups.setdefault(member.get(axis.name, (axis.name,)), []).append(axis)
+    return [_sorted_together(group) for group in groups.values()]
+
+
+def _sorted_together(group: Sequence[Axis]) -> list[Axis]:
+    rows = sorted(zip(*(axis.values for axis in group), strict=True))
+    columns = zip(*rows, strict=True)
+    return [replace(axis, values=values) for axis, values in zip(group, columns, strict=True)]
 
 
 def points(axes: Sequence[Axis], groups: Sequence[Sequence[Axis]]) -> list[tuple[Value, ...]]:

@@ -411,11 +411,6 @@ class Campaign:
         rest = tuple(other for other in task.others if other[0] != self._turning.name)
         return (task.hurst, task.work_of_adhesion, task.realisation, rest)
 
-    @property
-    def branch_loops(self) -> int:
-        """Number of loops that share a loading branch."""
-        return 1 if self._turning is None else len(self._turning.values)
-
     def sharing(self, task: Task) -> list[Task]:
         """Return the tasks that share a task's loading branch, by turning point, and it itself."""
         if self._turning is None:
@@ -427,10 +422,10 @@ class Campaign:
         ]
 
     def identity(self, task: Task) -> tuple[Any, ...]:
-        """Return what identifies a task, also in a campaign that grew new axes."""
+        """Return what identifies the cell of a task, also in a campaign that grew new axes."""
         here = self.at(task)
-        rest = tuple(here.value(k) for k, e in KEYS.items() if e.metadata["axis"] is not None)
-        return (task.hurst, task.work_of_adhesion, task.realisation, task.seed, rest)
+        rest = (here.value(key) for key, e in KEYS.items() if e.metadata["axis"] is not None)
+        return (task.hurst, task.work_of_adhesion, *rest)
 
     def tasks(self, part: Part = WHOLE) -> Tasks:
         """Return every task, or those of a part: by H, γ, what else is an axis, and realisation.

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from operator import itemgetter
 from typing import Any, Self, overload
 
 import numpy as np
@@ -118,6 +119,12 @@ class Tasks(Sequence[Task]):
             return np.array([task_seed(self.seed, r) for r in found.tolist()], np.int64)[place]
         axis = ("hurst", "work_of_adhesion", *self.names).index(name)
         return np.array([cell[axis] for cell in self.cells])[self.cell_of()]
+
+    def by_cell(self) -> list[tuple[Task, NDArray[np.intp]]]:
+        """Return the first task of each cell, ascending, and the places of all its tasks."""
+        changes = np.flatnonzero(np.diff(self.cell_of())) + 1
+        places = np.split(np.arange(len(self)), changes)
+        return sorted(((self[int(of_cell[0])], of_cell) for of_cell in places), key=itemgetter(0))
 
     def of_cells(self) -> Tasks:
         """Return the first task of each cell."""

@@ -21,7 +21,7 @@ from adhesis.ensemble import errors, exit_codes
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
 from adhesis.ensemble.run.interrupt import in_main_thread
-from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
+from adhesis.ensemble.run.launch import ONE_THREAD
 from adhesis.ensemble.run.ranks import launched
 
 COMMANDS: dict[str, str] = {
@@ -83,7 +83,7 @@ def main(argv: list[str] | None = None) -> int:
         if sentence:
             program = f"adhesis {name}" if name in COMMANDS else "adhesis"
             write_line(f"{program}: {sentence}")
-    return 0 if code and hand_over(code) else code
+    return code
 
 
 def module_of(name: str) -> str:
@@ -143,7 +143,6 @@ def _execute(name: str, words: Sequence[str]) -> int:
         args = parser_of(name).parse(words[1:])
     except SystemExit:  # --help
         return 0
-    args.words = list(words)
     if name not in _WITHOUT_NUMERICS:
         errors.check_memory()
     with errors.naming_options():

@@ -9,30 +9,12 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from adhesis.ensemble.run.launch import is_started, marked
-
 
 class OutputError(Exception):
     """stdout could not be written; the text gives the reason of the system."""
 
 
-class _Descriptor(io.FileIO):
-    """A descriptor of this process; of a rank that adhesis has started, its lines are marked."""
-
-    _within_line = False
-
-    def _put(self, data: Any) -> int:
-        if not is_started():
-            return super().write(data) or 0
-        text = bytes(data)
-        rest = marked(text, self._within_line)
-        while rest:
-            rest = rest[super().write(rest) or 0 :]
-        self._within_line = not text.endswith(b"\n")
-        return len(text)
-
-
-class _Stdout(_Descriptor):
+class _Stdout(io.FileIO):
     """File descriptor of stdout: the first failure raises, what follows is dropped.
 
     Otherwise the interpreter would try to write the rest when it ends, and report that failure,
@@ -45,7 +27,7 @@ class _Stdout(_Descriptor):
         if self._failed:
             return memoryview(data).nbytes
         try:
-            return self._put(data)
+            return super().write(data) or 0
         except BrokenPipeError:
             self._failed = True
             raise
@@ -54,12 +36,12 @@ class _Stdout(_Descriptor):
             raise OutputError(error.strerror or str(error)) from None
 
 
-class _Stderr(_Descriptor):
+class _Stderr(io.FileIO):
     """File descriptor of stderr: a message that cannot be written is lost, and nothing else."""
 
     def write(self, data: Any, /) -> int:
         try:
-            return self._put(data)
+            return super().write(data) or 0
         except OSError:
             return memoryview(data).nbytes
 

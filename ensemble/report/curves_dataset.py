@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
@@ -29,52 +27,36 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
 
     Further axes of the campaign follow γ; NaN where a cell is not there, as keys vary together.
     """
-    axes: dict[str, list[Any]] = {
-        "hurst": list(data.hursts),
-        "work_of_adhesion": list(data.works_of_adhesion),
-        **{axis.name: sorted(set(axis.values)) for axis in data.further},
-    }
-    place = [
-        tuple(values.index(value) for values, value in zip(axes.values(), cell.point, strict=True))
-        for cell in data.cells
-    ]
-    key_dims, shape = tuple(axes), tuple(map(len, axes.values()))
     campaign = data.campaign
-    several = campaign.has_axis("max_penetration")
-    depth = f"penetration/{'max_penetration' if several else 'h_max'}"
-    coordinates: list[tuple[str, Any, str, str]] = [
-        ("hurst", axes["hurst"], "1", "Hurst exponent"),
-        ("work_of_adhesion", axes["work_of_adhesion"], "J m-2", "work of adhesion"),
-        *((axis.name, axes[axis.name], axis.unit, axis.meaning) for axis in data.further),
-        ("quantile", list(QUANTILES), "1", "quantile over realisations"),
-        *(
-            (f"{b}_penetration", getattr(campaign, f"{b}_penetration"), "1", f"{depth} on {b}")
-            for b in BRANCHES
-        ),
-    ]
+    depth = f"penetration/{'max_penetration' if campaign.has_axis('max_penetration') else 'h_max'}"
+    names = [axis.name for axis in campaign.axes]
+    places = zip(*(cell.point for cell in data.cells), strict=True)
     out = xr.Dataset(
-        coords={name: (name, values, _about(*about)) for name, values, *about in coordinates},
+        coords={name: ("cell", list(values)) for name, values in zip(names, places, strict=True)},
         attrs={
             "title": "Loading-unloading curves averaged over realisations",
             "source": data.path.name,
             "Conventions": "CF-1.11",
         },
     )
-    count = np.zeros(shape, dtype=np.int32)
-    for where, cell in zip(place, data.cells, strict=True):
-        count[where] = cell.done
-    out["realisations"] = (key_dims, count, _about("1", "realisations that were averaged"))
+    text = "quantile over realisations"
+    out["quantile"] = ("quantile", list(QUANTILES), _about("1", text))
+    done = np.array([cell.done for cell in data.cells], np.int32)
+    out["realisations"] = ("cell", done, _about("1", "realisations that were averaged"))
     for branch in BRANCHES:
+        along = f"{branch}_penetration"
+        out[along] = (along, getattr(campaign, along), _about("1", f"{depth} on {branch}"))
         for name, (unit, text) in QUANTITIES.items():
             base = f"{branch}_{name}"
             for part, (what, *further) in _PARTS.items():
-                dims = (*further, f"{branch}_penetration")
-                values = np.full((*shape, *(out.sizes[dim] for dim in dims)), np.nan)
-                for where, cell in zip(place, data.cells, strict=True):
-                    values[where] = getattr(cell.curves[base], part)
+                values = np.array([getattr(cell.curves[base], part) for cell in data.cells])
                 about = _about(unit, f"{text}, {what} on {branch}")
-                out[f"{base}_{part}"] = ((*key_dims, *dims), values, about)
-    return out
+                out[f"{base}_{part}"] = (("cell", *further, along), values, about)
+    out = out.set_index(cell=names).unstack("cell", fill_value={"realisations": 0})
+    meanings = ("Hurst exponent", "work of adhesion", *(axis.meaning for axis in data.further))
+    for axis, meaning in zip(campaign.axes, meanings, strict=True):
+        out[axis.name].attrs = _about(axis.unit, meaning)
+    return out.transpose(*names, ...)
 
 
 def _about(unit: str, text: str) -> dict[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
@@ -239,7 +239,7 @@ def quality(data: Aggregate) -> list[str]:
             f"WARNING: the root mean square slope exceeds {STEEP:g} for {_listed(steep)}: linear "
             "elasticity of small slopes, on which everything here rests, is doubtful there."
         )
-    if truncated := int(data.jumps.truncated.sum()):
+    if truncated := sum(cell.jumps.truncated for cell in data.cells):
         out.append(
             f"{truncated} loops made more jumps than the catalogue holds: their smallest drops are "
             "missing from the distribution and from the table of kinds, not from the losses."
@@ -463,14 +463,12 @@ def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:
 
 def _spectrum(data: Aggregate) -> list[str]:
     """Fitted slope of the loading spectrum at the deepest penetration, against -(2+H)."""
-    fields = data.fields
     parts = []
     for hurst in data.hursts:
         cell = typical_cell(data, hurst)
-        if cell is None or not fields.penetration.size:
+        if cell is None or not cell.plan.penetration.size:
             continue
-        density = fields.psd_displacement[data.cells.index(cell), 0, -1]
-        slope, error = fitted_slope(cell.plan, density)
+        slope, error = fitted_slope(cell.plan, cell.fields.psd_displacement[0, -1])
         if not np.isnan(slope):
             fit = f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f}"
             parts.append(f"{fit} at {cell_name(cell)}")
@@ -485,7 +483,7 @@ def _spectrum(data: Aggregate) -> list[str]:
     ]
 
 
-def typical_cell(data: Aggregate, hurst: float | None = None) -> Cell | None:
+def typical_cell(data: Aggregate, hurst: float | None = None) -> AveragedCell | None:
     """The cell that stands for all: middle H (unless given) and middle γ that have results."""
     hursts = [hurst] if hurst is not None else _from_middle(data.hursts)
     for h in hursts:
@@ -501,7 +499,7 @@ def _from_middle(values: tuple[float, ...]) -> list[float]:
     return [values[k] for k in sorted(range(len(values)), key=lambda k: abs(k - middle))]
 
 
-def area_ratio(cell: Cell) -> float | None:
+def area_ratio(cell: AveragedCell) -> float | None:
     """Least ratio of A/A0 on unloading to loading at equal mean stress, on the mean curves.
 
     Unloading up to its largest tension only: afterwards patches are lost while the tension falls.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -21,9 +21,8 @@ from adhesis.ensemble.report.tables.works import works
 from adhesis.solver.loading.zero_range import ANY_RANGE
 
 
-def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustration]]]) -> str:
-    """Return the text of the page, with the figures that were drawn, by heading."""
-    figures = dict(sections)
+def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -> str:
+    """Return the text of the page, with the figures that were drawn, by section."""
     of_paper = paper.are_its_cells(data.shown.cells)
 
     numbered = [i for name in ("losses", "loops") for i in figures.get(name, ()) if i.of_paper]

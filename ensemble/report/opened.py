@@ -7,7 +7,7 @@ run may go on writing to it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Self
@@ -209,41 +209,31 @@ class CampaignResults:
         """Names of the axes of the cells."""
         return self.axes[:-1]
 
-    def _arranged(self, datasets: Iterable[Dataset]) -> xr.Dataset:
-        """Datasets with the task dimension spread over the axes of the campaign."""
+    def _arranged(self, datasets: Sequence[Dataset]) -> xr.Dataset:
+        """Datasets of one first dimension, which is spread over the axes of the campaign."""
         with Results(self.path) as results:
-            axes = list(_axes(results).values())
             rows = np.arange(len(results))
-            kept = results.column(KEPT)
+            if datasets[0].dims[0] == KEPT:
+                rows = results.column(KEPT)
             status = results.status()
             status[status == schema.DAMAGED] = schema.PENDING
-            has_result = np.isin(status, (schema.DONE, schema.FAILED))
+            empty = ~np.isin(status[rows], (schema.DONE, schema.FAILED))
             known = {scale.name: scale for scale in schema.scales(results.campaign, results.part)}
-            coordinates: dict[str, Any] = {}
-            variables: dict[str, Any] = {}
+            found = xr.Dataset(coords={k: ("task", v[rows]) for k, v in _axes(results).items()})
             for d in datasets:
-                mine = kept if d.dims[0] == KEPT else rows
-                labels = [np.unique(axis[mine]) for axis in axes]
-                place = tuple(
-                    np.searchsorted(label, axis[mine])
-                    for label, axis in zip(labels, axes, strict=True)
-                )
                 values = status if d is schema.STATUS else results.column(d.name)
                 if d not in schema.TASK_DATASETS and d is not schema.STATUS:
-                    values[~has_result[mine]] = d.fill
-                shape = (*(label.size for label in labels), *values.shape[1:])
-                array = np.full(shape, d.fill, values.dtype)
-                array[place] = values
-                dims = tuple(_RENAMED.get(dim, dim) for dim in d.dims[1:])
+                    values[empty] = d.fill
+                dims = [_RENAMED.get(dim, dim) for dim in d.dims[1:]]
                 about = {"units": d.unit, "long_name": d.meaning, **d.attributes}
-                variables[d.name] = ((*self.axes, *dims), array, about)
-                coordinates |= dict(zip(self.axes, labels, strict=True))
+                found[d.name] = (("task", *dims), values, about)
                 for dim, name in zip(d.dims[1:], dims, strict=True):
                     scale = known[dim]
-                    text = {"units": scale.unit, "long_name": scale.meaning}
                     label = list(BRANCHES) if name == "branch" else scale.values
-                    coordinates[name] = (name, label, text)
-        return xr.Dataset(variables, coordinates, {"source": self.path.name})
+                    found[name] = (name, label, {"units": scale.unit, "long_name": scale.meaning})
+        fills = {d.name: d.fill for d in datasets}
+        spread = found.set_index(task=list(self.axes)).unstack("task", fill_value=fills)
+        return spread.transpose(*self.axes, ...).assign_attrs(source=self.path.name)
 
 
 def _axes(results: Results) -> dict[str, NDArray[Any]]:

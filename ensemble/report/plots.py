@@ -14,6 +14,31 @@ if TYPE_CHECKING:
     from adhesis.ensemble.report.figures.style import PublishedFigure
 
 
+def _function(name: str) -> Callable[[Aggregate], PublishedFigure]:
+    """Return the function that draws a figure; matplotlib is loaded with it."""
+    from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
+
+    modules = (loops, loss_figures, shapes_and_spectra)
+    found: Callable[[Aggregate], PublishedFigure] = next(
+        getattr(module, name) for module in modules if hasattr(module, name)
+    )
+    return found
+
+
+class _Drawing:
+    """Method that draws the figure of its name, and is described by the function that does."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, plots: Plots, owner: type | None = None) -> Callable[..., Figure]:
+        def draw(ax: object = None) -> Figure:
+            return plots._draw(self._name, ax)
+
+        draw.__name__, draw.__doc__ = self._name, _function(self._name).__doc__
+        return draw
+
+
 class Plots:
     """One method for each figure of the report; docs/theory.md says what each shows.
 
@@ -34,19 +59,15 @@ class Plots:
 
         Each method calls this alone, so that a warning is of the line that calls the method.
         """
-        from adhesis.ensemble.report.figures import along, loops, loss_figures, shapes_and_spectra
+        from adhesis.ensemble.report.figures.along import along
         from adhesis.ensemble.report.figures.style import drawn_into
         from adhesis.ensemble.report.further_axes import below, common
 
-        modules = (loops, loss_figures, shapes_and_spectra)
         with drawn_into(ax):
             if axis is not None:
-                return along.along(axis)(self._averages()).finish()
-            draw: Callable[[Aggregate], PublishedFigure] = next(
-                getattr(module, name) for module in modules if hasattr(module, name)
-            )
+                return along(axis)(self._averages()).finish()
             shown = self._averages().shown
-            figure = draw(shown)
+            figure = _function(name)(shown)
             figure.say_below(below(shown.cells, common(shown)))
             return figure.finish()
 
@@ -66,58 +87,17 @@ class Plots:
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
         return self._draw("loss_along", ax, axes[name])
 
-    def contact_against_stress(self, ax: object = None) -> Figure:
-        """Contact fraction against mean stress, a panel for each H."""
-        return self._draw("contact_against_stress", ax)
-
-    def loop_against_penetration(self, ax: object = None) -> Figure:
-        """Mean stress and contact fraction against penetration, a row for each H."""
-        return self._draw("loop_against_penetration", ax)
-
-    def loss_against_hurst(self, ax: object = None) -> Figure:
-        """Loss against the Hurst exponent, a panel for each work of adhesion, with intervals."""
-        return self._draw("loss_against_hurst", ax)
-
-    def loss_against_slope(self, ax: object = None) -> Figure:
-        """Loss against mean square slope, a panel for each work of adhesion, with intervals."""
-        return self._draw("loss_against_slope", ax)
-
-    def loss_against_penetration(self, ax: object = None) -> Figure:
-        """Loss against the largest penetration, of this campaign and those beside it."""
-        return self._draw("loss_against_penetration", ax)
-
-    def loss_by_mechanism(self, ax: object = None) -> Figure:
-        """Energy drops at small-scale and at large-scale jumps."""
-        return self._draw("loss_by_mechanism", ax)
-
-    def jump_energies(self, ax: object = None) -> Figure:
-        """Jumps a loop and decade of energy drop."""
-        return self._draw("jump_energies", ax)
-
-    def pull_off(self, ax: object = None) -> Figure:
-        """Pull-off stress against work of adhesion, with intervals."""
-        return self._draw("pull_off", ax)
-
-    def shapes(self, ax: object = None) -> Figure:
-        """Rigid profile and deformed surface of one realisation."""
-        return self._draw("shapes", ax)
-
-    def spectra_of_branches(self, ax: object = None) -> Figure:
-        """Spectral density of profile and deformed surface on both branches at one state."""
-        return self._draw("spectra_of_branches", ax)
-
-    def spectra_on_loading(self, ax: object = None) -> Figure:
-        """Spectral density of profile and deformed surface on loading."""
-        return self._draw("spectra_on_loading", ax)
-
-    def spectra_on_unloading(self, ax: object = None) -> Figure:
-        """Spectral density of profile and deformed surface on unloading."""
-        return self._draw("spectra_on_unloading", ax)
-
-    def gap_density(self, ax: object = None) -> Figure:
-        """Probability density of the gap."""
-        return self._draw("gap_density", ax)
-
-    def height_density(self, ax: object = None) -> Figure:
-        """Probability density of the heights."""
-        return self._draw("height_density", ax)
+    contact_against_stress = _Drawing()
+    loop_against_penetration = _Drawing()
+    loss_against_hurst = _Drawing()
+    loss_against_slope = _Drawing()
+    loss_against_penetration = _Drawing()
+    loss_by_mechanism = _Drawing()
+    jump_energies = _Drawing()
+    pull_off = _Drawing()
+    shapes = _Drawing()
+    spectra_of_branches = _Drawing()
+    spectra_on_loading = _Drawing()
+    spectra_on_unloading = _Drawing()
+    gap_density = _Drawing()
+    height_density = _Drawing()

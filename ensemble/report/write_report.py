@@ -56,17 +56,7 @@ def _write_files(
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
     from adhesis.ensemble.report.curves_dataset import curves_dataset
-    from adhesis.ensemble.report.figures.catalogue import (
-        HEIGHTS,
-        LOOPS,
-        LOSSES,
-        MECHANISMS,
-        PENETRATIONS,
-        SHAPES,
-        Illustration,
-        along_axes,
-    )
-    from adhesis.ensemble.report.figures.loss_figures import of_penetration
+    from adhesis.ensemble.report.figures.catalogue import sections
     from adhesis.ensemble.report.figures.style import save, style
     from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
@@ -83,20 +73,8 @@ def _write_files(
     if data.companions:
         loss_tables.companions(data).write_csv(directory / "beside.csv")
     mechanisms.slopes(data).write_csv(directory / "slopes.csv")
-    with_shapes = (*SHAPES, *HEIGHTS) if data.fields.penetration.size else HEIGHTS
-    found: tuple[tuple[str, Sequence[Illustration]], ...] = (
-        ("loops", LOOPS),
-        ("losses", LOSSES),
-        ("axes", along_axes(data)),
-        ("mechanisms", MECHANISMS),
-        ("fields", with_shapes),
-        ("companions", PENETRATIONS if of_penetration(data) else ()),
-    )
-    sections = tuple(
-        (name, [i for i in items if i.is_worth(data if i.whole else data.shown)])
-        for name, items in found
-    )
-    items = [item for _, illustrations in sections for item in illustrations]
+    figures = sections(data)
+    items = [item for illustrations in figures.values() for item in illustrations]
     for number, item in enumerate(items, 1):
         progress(f"figure {number} of {len(items)}, {item.name}")
         with style():
@@ -105,7 +83,7 @@ def _write_files(
                 figure.say_below(below(data.shown.cells, common(data.shown)))
         save(figure, directory / item.name)
     progress("pages")
-    page = write_page(data, sections)
+    page = write_page(data, figures)
     (directory / "report.md").write_text(page, encoding="utf-8")
     (directory / "report.html").write_text(html_page(page, directory), encoding="utf-8")
     return [item.name for item in items]

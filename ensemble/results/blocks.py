@@ -1,13 +1,11 @@
-"""Streaming a results file that is larger than memory: blocks of rows, blocks of columns."""
+"""Streaming a results file that is larger than memory: some rows, or some columns, at once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-
-from adhesis.ensemble.results.read import Results
 
 # Numbers read at once (8 bytes each): large enough for the disk, small enough for any machine.
 READ_AT_ONCE = 2_000_000
@@ -15,36 +13,15 @@ READ_AT_ONCE = 2_000_000
 HELD_AT_ONCE = 8_000_000
 
 
-def row_blocks(rows: int, width: int) -> Iterator[slice]:
-    """Slices that cover ``rows`` rows of ``width`` numbers, a bounded number of bytes each."""
+def row_blocks(rows: NDArray[np.intp], width: int) -> Iterator[NDArray[np.intp]]:
+    """Split rows of ``width`` numbers, a bounded number of bytes each."""
     step = max(1, READ_AT_ONCE // max(1, width))
-    for start in range(0, rows, step):
-        yield slice(start, min(rows, start + step))
+    for start in range(0, rows.size, step):
+        yield rows[start : start + step]
 
 
-def cells_of_rows(rows: Sequence[NDArray[np.intp]], count: int) -> NDArray[np.int64]:
-    """Return the cell of each of ``count`` rows, from the rows of each cell; -1 for none."""
-    out = np.full(count, -1)
-    for k, mine in enumerate(rows):
-        out[mine] = k
-    return out
-
-
-def column_blocks(
-    results: Results, name: str, rows: NDArray[np.intp], points: int
-) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-    """Yield the values of ascending ``rows`` of a dataset (task × points), a few columns at a time.
-
-    At most :data:`HELD_AT_ONCE` numbers, at least one column.
-    """
-    width = max(1, min(points, HELD_AT_ONCE // max(1, rows.size)))
+def column_blocks(rows: int, points: int) -> Iterator[slice]:
+    """Split the columns of so many rows: at most :data:`HELD_AT_ONCE` numbers, or one column."""
+    width = max(1, HELD_AT_ONCE // max(1, rows))
     for start in range(0, points, width):
-        columns = slice(start, min(points, start + width))
-        values = np.empty((rows.size, columns.stop - start))
-        for block in row_blocks(len(results), points):
-            low, high = np.searchsorted(rows, (block.start, block.stop))
-            if low < high:
-                values[low:high] = results.column(name, block)[
-                    rows[low:high] - block.start, columns
-                ]
-        yield columns, values
+        yield slice(start, min(points, start + width))

@@ -18,9 +18,14 @@ _BLOCK_BYTES = 16 * 2**20
 
 
 def rows_in(campaign: Campaign, file: Results) -> Rows:
-    """Return the row in a whole campaign of each task of a file."""
-    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks())}
-    return np.array([place[file.campaign.identity(task)] for task in file.tasks()], np.intp)
+    """Return the row in a whole campaign, from which the file's has grown, of each of its tasks."""
+    cells = campaign.tasks().of_cells()
+    place = {campaign.identity(task): number for number, task in enumerate(cells)}
+    tasks, here = file.tasks(), file.tasks().of_cells()
+    there = np.zeros(len(tasks.cells), np.intp)
+    there[here.cell_of()] = [place[file.campaign.identity(task)] for task in here]
+    rows: Rows = there[tasks.cell_of()] * campaign.realisations + tasks.column("realisation")
+    return rows
 
 
 @dataclass(frozen=True)

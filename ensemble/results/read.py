@@ -218,16 +218,16 @@ class Results:
         """Number of tasks."""
         return int(self._file["task"].shape[0])
 
-    def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
-        """Return a dataset, or some rows of it: a slice, or ascending numbers."""
+    def column(
+        self, name: str, rows: slice | NDArray[np.intp] = slice(None), *columns: slice
+    ) -> NDArray[Any]:
+        """Return a dataset, or some rows of it: a slice, or ascending numbers; and some columns."""
         with _damage(self.path):
             dataset = self._file[name]
-            if rows is None or isinstance(rows, slice):
-                return np.asarray(dataset[rows if rows is not None else ()])
-            out = np.empty((len(rows), *dataset.shape[1:]), dataset.dtype)
-            for place, (first, stop) in stretches(rows):
-                out[place : place + stop - first] = dataset[first:stop]
-            return out
+            if isinstance(rows, slice):
+                return np.asarray(dataset[(rows, *columns)])
+            pieces = [dataset[(stretch, *columns)] for stretch in stretches(rows)]
+            return np.concatenate(pieces) if len(pieces) != 1 else np.asarray(pieces[0])
 
     def status(self) -> NDArray[np.uint8]:
         """Return the status of every task: PENDING, DONE, … (adhesis.ensemble.results.schema).
@@ -317,13 +317,10 @@ def named_rows(rows: Sequence[int]) -> str:
     return f"rows {', '.join(shown[:-1])} and {shown[-1]}"
 
 
-def stretches(rows: NDArray[np.intp]) -> Iterator[tuple[int, tuple[int, int]]]:
-    """Split row numbers into runs of successive ones: (place in ``rows``, (first, stop))."""
-    if len(rows) == 0:
-        return
-    breaks = np.flatnonzero(np.diff(rows) != 1) + 1
-    for i, j in zip([0, *breaks], [*breaks, len(rows)], strict=True):
-        yield int(i), (int(rows[i]), int(rows[j - 1]) + 1)
+def stretches(rows: NDArray[np.intp]) -> list[slice]:
+    """Split ascending row numbers into runs of successive ones; one that is empty for none."""
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) != 1) + 1)
+    return [slice(int(run[0]), int(run[-1]) + 1) if run.size else slice(0, 0) for run in runs]
 
 
 @contextmanager

@@ -55,8 +55,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         axes += [dataset.name for dataset in further]
         units = dict(zip(axes, ["1", "J m-2", *(dataset.unit for dataset in further)], strict=True))
         state = results.status()
+        cells = results.tasks().by_cell()
         names = (
-            *dict.fromkeys((*_TASK, *axes, *_AVERAGED, *OF_DOUBT)),
+            *dict.fromkeys((*_TASK, *_AVERAGED, *OF_DOUBT)),
             *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
@@ -95,7 +96,10 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
         "axis_units": units,
-        "groups": _groups(state, column, axes, stop),
+        "groups": [
+            _group(dict(zip(axes, task.cell, strict=True)), rows, state, column, stop)
+            for task, rows in cells
+        ],
         "failures": failures,
     }
 
@@ -135,49 +139,40 @@ def _times(times: NDArray[np.float64]) -> dict[str, float]:
     }
 
 
-def _groups(
+def _group(
+    point: dict[str, float],
+    rows: NDArray[np.intp],
     state: NDArray[np.uint8],
     column: dict[str, NDArray[Any]],
-    axes: Sequence[str],
     stop: StopTable,
-) -> list[dict[str, Any]]:
-    points, group_of = np.unique(
-        np.stack([column[name] for name in axes]), axis=1, return_inverse=True
-    )
-    group_of = group_of.ravel()
-    count = {
-        name: np.bincount(group_of[state == code], minlength=points.shape[1])
-        for name, code in _CODES.items()
+) -> dict[str, Any]:
+    """Return the entry of one cell, from its rows."""
+    done = rows[state[rows] == DONE]
+    counts = {name: int(np.sum(state[rows] == code)) for name, code in _CODES.items()}
+    values = np.array([column[name][done] for name in _AVERAGED])
+    seconds, loss, scaled = estimates(values, with_interval=False)
+    group: dict[str, Any] = {
+        **{name: float(value) for name, value in point.items()},
+        **counts,
+        "mean_seconds": finite(seconds.mean),
+        "loss": finite(loss.mean),
+        "loss_standard_error": finite(loss.sem),
+        "loss_dimensionless": finite(scaled.mean),
+        "loss_dimensionless_standard_error": finite(scaled.sem),
     }
-    rows = np.flatnonzero(state == DONE)
-    rows = rows[np.argsort(group_of[rows], kind="stable")]
-    groups = []
-    for i, rows_of in enumerate(np.split(rows, np.cumsum(count["done"])[:-1])):
-        values = np.array([column[name][rows_of] for name in _AVERAGED])
-        seconds, loss, scaled = estimates(values, with_interval=False)
-        group: dict[str, Any] = {
-            **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
-            **{name: int(cells[i]) for name, cells in count.items()},
-            "mean_seconds": finite(seconds.mean),
-            "loss": finite(loss.mean),
-            "loss_standard_error": finite(loss.sem),
-            "loss_dimensionless": finite(scaled.mean),
-            "loss_dimensionless_standard_error": finite(scaled.sem),
+    if stop.relative_error is not None:
+        steered, finished = column[stop.quantity][done], not counts["pending"]
+        now = precision(steered, stop.relative_error, stop.quantity, finished=finished)
+        group |= {
+            "quantity": now.quantity,
+            "relative_error": finite(now.relative_error),
+            "interval_low": finite(now.estimate.low),
+            "interval_high": finite(now.estimate.high),
+            "wanted_relative_error": now.wanted,
+            "met": now.met,
+            "precision": str(now),
         }
-        if stop.relative_error is not None:
-            steered, finished = column[stop.quantity][rows_of], not count["pending"][i]
-            now = precision(steered, stop.relative_error, stop.quantity, finished=finished)
-            group |= {
-                "quantity": now.quantity,
-                "relative_error": finite(now.relative_error),
-                "interval_low": finite(now.estimate.low),
-                "interval_high": finite(now.estimate.high),
-                "wanted_relative_error": now.wanted,
-                "met": now.met,
-                "precision": str(now),
-            }
-        groups.append(group)
-    return groups
+    return group
 
 
 def as_text(status: dict[str, Any], pace: str = "") -> str:

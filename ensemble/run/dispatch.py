@@ -41,12 +41,11 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from adhesis.ensemble.run.attempt import Compute, GivenUp, Outcome, attempt
 from adhesis.ensemble.run.schedule import Schedule
-from adhesis.ensemble.run.units import Units
 
 Deliver = Callable[[Outcome], Outcome]
 Collect = Callable[[Outcome], None]
@@ -64,7 +63,7 @@ SILENCE, REPORT_INTERVAL = 120.0, 10.0
 _LONGEST_LOOK = 1.0
 
 
-class Unresponsive(Exception):
+class Unresponsive(RuntimeError):
     """Error for workers that did not answer in time: what was delivered is kept."""
 
 
@@ -109,8 +108,6 @@ class Master:
     # clock, sleep: replaced when the run is simulated
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
-    # Tasks that go to one worker together; the schedule knows the first one of each
-    units: Units = field(default_factory=Units)
 
     def __post_init__(self) -> None:
         # Last note of each task that is handed out and not answered; None before the first.
@@ -195,7 +192,6 @@ class Master:
         elif kind == "stop":
             self._halt(content[0])
         elif kind == "given up":
-            self.units.answered(content[0], None)
             self._answered(rank, content[0])
             self._hand_out()
         elif kind == "ended":
@@ -206,9 +202,8 @@ class Master:
 
     def _finish(self, rank: int, outcome: Outcome) -> None:
         self._answered(rank, outcome.task)
-        seconds = outcome.seconds if outcome.error is None else None
-        if done := self.units.answered(outcome.task, seconds):
-            self.schedule.measured(self.group_of[done[0]], done[1])
+        if outcome.error is None:
+            self.schedule.measured(self.group_of[outcome.task], outcome.seconds)
         self._hand_out()
         self.collect(outcome)
         self._hand_out()  # what was collected may have brought further tasks
@@ -228,13 +223,12 @@ class Master:
             if len(sent) != load or not self._has_room(sent):
                 heapq.heappop(self._room)
                 continue
-            first = self.schedule.take(self.limits.time_left())
-            if first is None:
+            tasks = self.schedule.take(self.limits.time_left())
+            if not tasks:
                 return
-            seconds = self.schedule.mean(self.group_of[first])
-            tasks = self.units.tasks(first)
+            seconds = self.schedule.mean(self.group_of[tasks[0]])
             for task in tasks:
-                sent[task] = math.inf if seconds is None else seconds / len(tasks)
+                sent[task] = math.inf if seconds is None else seconds
                 self.notes[task] = None
                 self.channel.send(rank, ("task", task))
             heapq.heapreplace(self._room, (len(sent), rank))

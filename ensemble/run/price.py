@@ -19,6 +19,7 @@ from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import duration, percent
+from adhesis.ensemble.results.copy_rows import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.plan import group_of, prior
@@ -197,40 +198,19 @@ def price(
 
 def _left(campaign: Campaign, path: Path, tasks: Tasks, known: _Known) -> tuple[Tasks, int]:
     """Tasks that a run would compute, and the number of those with a result."""
-    first = tasks.of_cells()
-    cells = {
-        _cell_in(campaign, task): (number, task.cell)
-        for number, task in zip(first.cell_of().tolist(), first, strict=True)
-    }
     left = np.zeros(campaign.task_count, bool)
     left[tasks.rows] = True
     with Results(path) as results:
         growth(path, results.campaign, campaign)
-        rows = zip(
-            results.tasks(),
-            results.status().tolist(),
-            results.column("cpu_time").tolist(),
-            results.column(campaign.stop.quantity).tolist(),
-            strict=True,
-        )
-        done = 0
-        for theirs, status, took, value in rows:
-            number, cell = cells.get(_cell_in(results.campaign, theirs), (0, None))
-            row = number * campaign.realisations + theirs.realisation
-            if cell is None or theirs.realisation >= campaign.realisations or not left[row]:
-                continue
-            if status == DONE:
-                known.add(cell, took, value)
-                done += 1
-            more = campaign.stop != results.campaign.stop and status == NOT_NEEDED
-            left[row] = status in (PENDING, DAMAGED) or more
-    return tasks.chosen(np.flatnonzero(left)), done
-
-
-def _cell_in(campaign: Campaign, task: Task) -> Hashable:
-    """Return what identifies the cell of a task, also in a campaign that grew new axes."""
-    hurst, gamma, _, _, rest = campaign.identity(task)
-    return (hurst, gamma, rest)
+        rows, status = rows_in(campaign, results), results.status()
+        done = (status == DONE) & left[rows]
+        quantities = ("cpu_time", campaign.stop.quantity)
+        seconds, values = (results.column(name)[done].tolist() for name in quantities)
+        more = (NOT_NEEDED,) if campaign.stop != results.campaign.stop else ()
+        left[rows[~np.isin(status, (PENDING, DAMAGED, *more))]] = False
+    for task, took, value in zip(tasks.chosen(rows[done]), seconds, values, strict=True):
+        known.add(task.cell, took, value)
+    return tasks.chosen(np.flatnonzero(left)), int(done.sum())
 
 
 def _to_try(left: Tasks, known: _Known) -> Tasks:

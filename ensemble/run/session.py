@@ -31,14 +31,12 @@ from adhesis.ensemble.run.dispatch import (
     Worker,
 )
 from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
-from adhesis.ensemble.run.launch import described_signal
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
-from adhesis.ensemble.run.units import Units
 from adhesis.ensemble.task.compute import Runner, check_task
 from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful
 from adhesis.ensemble.task.row import Row
@@ -197,7 +195,6 @@ class _Session:
         self._groups: Mapping[int, Group] = {
             row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
         }
-        self._units = Units({row: campaign.branch_of(t) for row, t in enumerate(plan.tasks)})
         self._compute = _Computing(campaign, plan.tasks, engine.compute)
         self._limits = Limits(
             stop=self._stop,
@@ -239,15 +236,10 @@ class _Session:
 
         progress = self._progress = ProgressLine(
             self._counts,
-            lambda: self._estimate(
-                *(schedule, master.in_flight / self.campaign.branch_loops, len(channel.workers))
-            ),
+            lambda: self._estimate(schedule, master.in_flight, len(channel.workers)),
             self.stream,
         )
-        master = Master(
-            *(channel, schedule, self._groups, collect, self._limits, progress.tick),
-            units=self._units,
-        )
+        master = Master(channel, schedule, self._groups, collect, self._limits, progress.tick)
         try:
             return master.run()
         finally:
@@ -308,7 +300,7 @@ class _Session:
             assert self.writer is not None
             self.writer.mark(spare, needed=False)
             self._counts.total += len(further)
-            schedule.add(self._units.form(further))
+            schedule.add(further)
         progress.tick()
 
     def _schedule(self) -> Schedule:
@@ -317,16 +309,16 @@ class _Session:
             self._groups[row]: prior(task) for row, task in enumerate(tasks)
         }
         rounds = {row: task.realisation for row, task in enumerate(tasks)}
-        first = self._units.form(self.plan.rows)
-        schedule = Schedule(first, self._groups, priors, rounds)
+        branches = {row: self.campaign.branch_of(task) for row, task in enumerate(tasks)}
+        schedule = Schedule(self.plan.rows, self._groups, priors, rounds, branches)
         for group, (seconds, count) in self.plan.times.items():
-            # of loops that share a loading branch the time is that of all of them
-            schedule.measured(group, seconds, max(1, round(count / self.campaign.branch_loops)))
+            schedule.measured(group, seconds, count)
         return schedule
 
     def _stop(self) -> str | None:
         if self.signals.received is not None:
-            return f"{described_signal(self.signals.received)} received"
+            name = self.signals.received
+            return f"{'Ctrl-C (SIGINT)' if name == 'SIGINT' else name} received"
         left = self._time_left()
         if left is not None and left <= 0:
             return "the walltime ends"
@@ -339,7 +331,7 @@ class _Session:
         return None if self._ends is None else self._ends - time.monotonic()
 
     @staticmethod
-    def _estimate(schedule: Schedule, in_flight: float, workers: int) -> float | None:
+    def _estimate(schedule: Schedule, in_flight: int, workers: int) -> float | None:
         waiting, mean = schedule.seconds_waiting, schedule.mean_estimate
         if waiting is None or mean is None:
             return None

@@ -11,10 +11,9 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.dataset import sizes_of
-from adhesis.ensemble.task.fields import FieldPlan, FieldRecorder, field_plan
+from adhesis.ensemble.task.fields import FieldPlan, field_plan, field_row
 from adhesis.ensemble.task.row import Row, row_of, row_scales
-from adhesis.solver.loading.cycle import turn_arguments
-from adhesis.solver.loading.loop import LoadingBranch, run_loop
+from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, Method
 from adhesis.solver.model.control import Control
@@ -93,50 +92,32 @@ class Runner:
         once, in the first loop that needs it.
         """
         wall, cpu = time.perf_counter(), time.process_time()
-        here = campaign.at(task)
-        plan = field_plan(campaign, task)
-        keep = task.realisation < plan.realisations
-        sizes = sizes_of(row_scales(campaign))
-        turn = here.cycle.turning_point
-        preload = here.cycle.preload
-        unit = campaign.penetration_unit(task)
-        # for loops whose load steps differ from the axes of the curves
-        axes: dict[Branch, Array] = {
-            "loading": unit * campaign.loading_penetration,
-            "unloading": unit * campaign.unloading_penetration,
-        }
-        key = campaign.branch_of(task)
-        if key is None:
-            method = _make_method(campaign, task)
-            recorder = FieldRecorder(plan, method, keep=keep)
-            at_preload = preload is not None
-            loop = run_loop(
-                method,
-                **turn_arguments(method.problem.control, turn, at_preload, here.cycle.deepest),
-                load_steps=campaign.cycle.load_steps,
-                progress=progress,
-                on_state=recorder.on_state,
-            )
-            row = row_of(loop, sizes, axes if here.cycle.turns_at_stress else None)
-        else:
-            branch = self._branch(campaign, task, key, turn)
-            self._shared = None  # an interrupted branch is not continued
-            recorder = FieldRecorder(plan, branch.method, keep=keep)
-            try:
-                marks, on_state = _marks(plan), recorder.on_state
-                loop = branch.loop(turn, marks=marks, progress=progress, on_state=on_state)
-            except Exception:
-                self._shared = _Shared(campaign, key, turn, branch)
-                raise
-            self._shared = _Shared(campaign, key, turn, branch)
-            row = row_of(loop, sizes, axes)
-        if preload is not None:
-            recorder.record_at_stresses(loop)
-        row |= recorder.row()
+        here, plan = campaign.at(task), field_plan(campaign, task)
+        turn, key = here.cycle.turning_point, campaign.branch_of(task)
+        branch = self._branch(campaign, task, key, turn)
+        shared = None if key is None else _Shared(campaign, key, turn, branch)
+        self._shared = None  # an interrupted branch is not continued
+        try:
+            loop = branch.loop(turn, marks=_marks(plan), progress=progress)
+        except Exception:
+            self._shared = shared
+            raise
+        self._shared = shared
+        axes: dict[Branch, Array] | None = None
+        if key is not None or here.cycle.turns_at_stress:  # its load steps are not the curves' axes
+            unit = campaign.penetration_unit(task)
+            axes = {
+                "loading": unit * campaign.loading_penetration,
+                "unloading": unit * campaign.unloading_penetration,
+            }
+        row = row_of(loop, sizes_of(row_scales(campaign)), axes)
+        row |= field_row(plan, branch.method, loop, keep=task.realisation < plan.realisations)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         return {"wall_time": wall, "cpu_time": cpu, **row}
 
-    def _branch(self, campaign: Campaign, task: Task, key: Hashable, turn: float) -> LoadingBranch:
+    def _branch(
+        self, campaign: Campaign, task: Task, key: Hashable | None, turn: float
+    ) -> LoadingBranch:
         """Return the loading branch of a task: that of the last task, if they share one."""
         last = self._shared
         same = last is not None and last.campaign is campaign and last.key == key

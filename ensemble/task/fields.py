@@ -14,6 +14,7 @@ gap, so that the density of the gap integrates to the fraction out of contact.
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,7 +25,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
 from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
+from adhesis.solver.method import BRANCHES, ContactState, Method
 from adhesis.solver.model.profile import Array
 from adhesis.solver.observables import gap_shares, spectral_density
 
@@ -35,6 +36,9 @@ _BINS_PER_DECADE = 12
 # Gap in units of h_max: from far below the roughness to far above any gap before detachment.
 GAP_EDGES: Array = np.logspace(-4, 2, 6 * 16 + 1)
 HEIGHT_EDGES: Array = np.linspace(-5, 5, 81)
+# Middles of their bins
+GAP_BINS: Array = np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:])
+HEIGHT_BINS: Array = 0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:])
 
 
 @dataclass(frozen=True)
@@ -130,18 +134,8 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
         depth = "mean stress/preload"
     return (
         waves,
-        Scale(
-            "gap_bin",
-            np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:]),
-            "1",
-            "gap/h_max, geometric middle of its bin",
-        ),
-        Scale(
-            "height_bin",
-            0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:]),
-            "1",
-            "height/h_rms, middle of its bin",
-        ),
+        Scale("gap_bin", GAP_BINS, "1", "gap/h_max, geometric middle of its bin"),
+        Scale("height_bin", HEIGHT_BINS, "1", "height/h_rms, middle of its bin"),
         Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
         Scale("field_penetration", plan.penetration, "1", f"{depth} of a field"),
         positions,
@@ -209,73 +203,71 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
     )
 
 
-class FieldRecorder:
-    """Recorder of the fields of one loop; :meth:`on_state` is passed to ``run_loop``.
+def field_row(
+    plan: FieldPlan, method: Method, loop: LoopResult, *, keep: bool
+) -> dict[str, NDArray[np.float32]]:
+    """Return the values of a loop by dataset; NaN where a state had no contact.
 
-    ``keep`` is whether the fields themselves are stored.
+    ``keep`` is whether they include the fields themselves.
     """
+    sizes, profile = sizes_of(field_scales(plan)), method.problem.profile
+    row = {
+        dataset.name: np.full(row_shape(dataset, sizes), np.nan, np.float32)
+        for dataset in FIELD_DATASETS
+        if keep or dataset.dims[0] != KEPT
+    }
+    height, pick = profile.heights(plan.nodes), slice(None, None, plan.stride)
+    row["psd_height"][:] = plan.spectral_density(height)
+    row["height_density"][:] = _density(height / profile.h_rms, HEIGHT_EDGES)
+    if keep:
+        row["field_height"][:] = height[pick]
+    found = _at_penetrations(plan, loop) if plan.preload is None else _at_stresses(plan, loop)
+    for place, state in found.items():
+        fields = method.fields(state, plan.nodes)
+        row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
+        shares = gap_shares(method.openings(state), profile.period, GAP_EDGES * profile.h_max)
+        row["gap_density"][place] = shares / np.diff(GAP_EDGES)
+        if keep:
+            row["field_displacement"][place] = fields.displacement[pick]
+            row["field_stress"][place] = fields.stress[pick]
+            row["field_gap"][place] = fields.gap[pick]
+    return row
 
-    def __init__(self, plan: FieldPlan, method: Method, keep: bool) -> None:
-        self._plan, self._method, self._keep = plan, method, keep
-        sizes = sizes_of(field_scales(plan))
-        self._row, self._kept = (
-            {
-                dataset.name: np.full(row_shape(dataset, sizes), np.nan, np.float32)
-                for dataset in FIELD_DATASETS
-                if (dataset.dims[0] == KEPT) is kept
-            }
-            for kept in (False, True)
-        )
-        profile = method.problem.profile
-        height = profile.heights(plan.nodes)
-        self._row["psd_height"][:] = plan.spectral_density(height)
-        self._row["height_density"][:] = _density(height / profile.h_rms, HEIGHT_EDGES)
-        self._kept["field_height"][:] = height[:: plan.stride]
 
-    def on_state(self, branch: Branch, state: ContactState) -> None:
-        """Keep the state if its penetration is one of the chosen ones and it has contact."""
-        if not state.patches or not self._plan.penetration.size or self._plan.preload is not None:
-            return
-        problem = self._method.problem
+_Found = dict[tuple[int, int], ContactState]
+"""States by the number of their branch and of their penetration."""
+
+
+def _at_penetrations(plan: FieldPlan, loop: LoopResult) -> _Found:
+    """Find the states in contact at the chosen penetrations, or parts of a load."""
+    found: _Found = {}
+    problem = loop.problem
+    for branch, state in zip(loop.branch.tolist(), loop.contact_states, strict=True):
+        if not state.patches or not plan.penetration.size:
+            continue
         # with a stiffness, the penetration of the far side
-        if self._plan.max_stress is None:
+        if plan.max_stress is None:
             penetration = problem.penetration(problem.prescribed_in(state))
         else:
-            penetration = state.mean_stress / self._plan.max_stress
-        distance = np.abs(self._plan.penetration - penetration)
+            penetration = state.mean_stress / plan.max_stress
+        distance = np.abs(plan.penetration - penetration)
         nearest = int(np.argmin(distance))
         # States between load steps differ from the axis by far more than rounding.
-        if distance[nearest] > 1e-9:
-            return
-        self._record((BRANCHES.index(branch), nearest), state)
+        if distance[nearest] <= 1e-9:
+            found[BRANCHES.index(branch), nearest] = state
+    return found
 
-    def record_at_stresses(self, loop: LoopResult) -> None:
-        """Keep the states of a loop that turned at a preload, at its parts; none that it lacks."""
-        assert self._plan.preload is not None
-        for number, part in enumerate(self._plan.penetration.tolist()):
-            for branch in BRANCHES:
-                try:
-                    found = loop.at_stress(part * self._plan.preload, branch)
-                except ValueError:  # the preload was not reached
-                    continue
-                self._record((BRANCHES.index(branch), number), found.state)
 
-    def _record(self, index: tuple[int, int], state: ContactState) -> None:
-        plan, profile = self._plan, self._method.problem.profile
-        fields = self._method.fields(state, plan.nodes)
-        self._row["psd_displacement"][index] = plan.spectral_density(fields.displacement)
-        openings = self._method.openings(state)
-        shares = gap_shares(openings, profile.period, GAP_EDGES * profile.h_max)
-        self._row["gap_density"][index] = shares / np.diff(GAP_EDGES)
-        if self._keep:
-            pick = slice(None, None, plan.stride)
-            self._kept["field_displacement"][index] = fields.displacement[pick]
-            self._kept["field_stress"][index] = fields.stress[pick]
-            self._kept["field_gap"][index] = fields.gap[pick]
-
-    def row(self) -> dict[str, NDArray[np.float32]]:
-        """Return the values by dataset; NaN where a state had no contact."""
-        return self._row | self._kept if self._keep else self._row
+def _at_stresses(plan: FieldPlan, loop: LoopResult) -> _Found:
+    """Find the states at the parts of the preload; none that the loop lacks."""
+    assert plan.preload is not None
+    found: _Found = {}
+    for number, part in enumerate(plan.penetration.tolist()):
+        for branch in BRANCHES:
+            with suppress(ValueError):  # the preload was not reached
+                state = loop.at_stress(part * plan.preload, branch).state
+                found[BRANCHES.index(branch), number] = state
+    return found
 
 
 def _density(values: Array, edges: Array) -> Array:

@@ -444,7 +444,6 @@ def test_a_path_turns_where_its_control_lets_it_turn():
     load = parse_campaign(under('control = "load"\nmax_stress = [300, 100]'))
     assert load.cycle.under_load
     assert load.cycle.turning_point == 100
-    assert load.branch_loops == 2
     first = load.tasks()[0]
     assert [load.at(task).cycle.turning_point for task in load.sharing(first)] == [100, 300]
     assert load.unloading_penetration[0] == 1.0

@@ -20,7 +20,6 @@ from adhesis.ensemble.command.main import COMMANDS, main, module_of, parser_of
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.errors import RankError
 from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.run import launch
 from adhesis.solver import checks
 from adhesis.solver.registry import METHOD_NAMES
 from tests.support.campaign_support import environment, write_campaign
@@ -351,12 +350,6 @@ def test_an_error_of_one_rank_is_reported_when_rank_0_had_its_time(rank_one, cap
     assert main(["run", "c.toml"]) == 2
     assert len(rank_one) == 2
     assert capsys.readouterr().err == "adhesis run: no mpi4py here\n"
-
-
-def test_ranks_are_bounded_by_cores_and_nodes():
-    most = launch.largest_number_of_ranks({})
-    assert most == 16 * launch.cores()
-    assert launch.largest_number_of_ranks({"SLURM_JOB_NUM_NODES": "100"}) == 100 * most
 
 
 # ---------------------------------------------------------------------- abbreviations

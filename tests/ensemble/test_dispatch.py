@@ -25,7 +25,6 @@ from adhesis.ensemble.run.dispatch import (
 )
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
-from adhesis.ensemble.run.units import Units
 from adhesis.solver._kernels import sum_pull
 from tools.interrupted import Interrupt
 
@@ -105,10 +104,22 @@ class SimulatedRanks:
         return None
 
 
+def schedule_of(tasks, group_of, key_of=None):
+    """Return a schedule in which every group has one task, or unit, a round."""
+    met: dict[object, list[object]] = {}
+    rounds = {}
+    for task in tasks:
+        key, keys = (key_of or {}).get(task, task), met.setdefault(group_of[task], [])
+        if key not in keys[-1:]:
+            keys.append(key)
+        rounds[task] = len(keys)
+    return Schedule(tasks, group_of, dict.fromkeys(met, 1.0), rounds, key_of)
+
+
 def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **ranks):
     tasks = list(range(len(seconds)))
     group_of = groups or dict.fromkeys(tasks, 0)
-    schedule = Schedule(tasks, group_of, dict.fromkeys(set(group_of.values()), 1.0))
+    schedule = schedule_of(tasks, group_of)
     channel = kind(workers, seconds, **ranks)
     collected: list[Outcome] = []
     master = Master(
@@ -191,7 +202,7 @@ def test_a_worker_has_its_next_task_before_its_result_is_collected():
     """Collecting writes to a disk that may be slow: no worker waits for it."""
     seconds, group_of = [1.0] * 20, dict.fromkeys(range(20), 0)
     channel = SimulatedRanks(2, seconds)
-    schedule = Schedule(range(20), group_of, {0: 1.0})
+    schedule = schedule_of(range(20), group_of)
     in_flight: list[int] = []
 
     def collect(outcome):
@@ -208,16 +219,17 @@ def test_a_worker_has_its_next_task_before_its_result_is_collected():
 
 def test_the_longest_tasks_go_first_once_they_are_known():
     group_of = {0: "short", 1: "short", 2: "long", 3: "long", 4: "new"}
-    schedule = Schedule(range(5), group_of, {"short": 3.0, "long": 2.0, "new": 1.0})
-    assert schedule.take() == 0  # the priors say so
+    round_of = {0: 0, 1: 1, 2: 0, 3: 1, 4: 0}
+    schedule = Schedule(range(5), group_of, {"short": 3.0, "long": 2.0, "new": 1.0}, round_of)
+    assert schedule.take() == (0,)  # the priors say so
     schedule.measured("short", 1.0)
     schedule.measured("long", 9.0)
-    assert schedule.take() == 2
+    assert schedule.take() == (2,)
     assert schedule.estimate("new") == pytest.approx(10 / 5)
-    assert schedule.take(time_left=5.0) == 4
-    assert schedule.take(time_left=0.5) is None
+    assert schedule.take(time_left=5.0) == (4,)
+    assert schedule.take(time_left=0.5) == ()
     assert schedule.seconds_waiting == pytest.approx(10.0)
-    assert [schedule.take(), schedule.take(), schedule.take()] == [3, 1, None]
+    assert [schedule.take(), schedule.take(), schedule.take()] == [(3,), (1,), ()]
 
 
 def test_rounds_go_one_after_the_other_and_the_longest_first_within():
@@ -225,18 +237,19 @@ def test_rounds_go_one_after_the_other_and_the_longest_first_within():
     group_of = {i: "short" if i < 10 else "long" for i in range(20)}
     round_of = {i: i % 10 for i in range(20)}
     schedule = Schedule(range(20), group_of, {"short": 1.0, "long": 5.0}, round_of)
-    assert [schedule.take() for _ in range(4)] == [10, 0, 11, 1]
+    assert [schedule.take() for _ in range(4)] == [(10,), (0,), (11,), (1,)]
     schedule.measured("short", 9.0)
     schedule.measured("long", 2.0)
-    assert [schedule.take() for _ in range(4)] == [2, 12, 3, 13]
-    assert schedule.take(time_left=5.0) == 14  # the first round that has one that fits
+    assert [schedule.take() for _ in range(4)] == [(2,), (12,), (3,), (13,)]
+    assert schedule.take(time_left=5.0) == (14,)  # the first round that has one that fits
     schedule.add([0, 10])  # tasks that come later stand where their round stands
-    assert [schedule.take() for _ in range(4)] == [0, 10, 4, 5]
+    assert [schedule.take() for _ in range(4)] == [(0,), (10,), (4,), (5,)]
 
 
 def test_times_of_an_earlier_run_count_as_often_as_they_were_measured():
     """From them the time of a group of which nothing is known is estimated, by its prior."""
-    schedule = Schedule([0, 1], {0: "short", 1: "long"}, {"short": 1.0, "long": 3.0})
+    groups = {0: "short", 1: "long"}
+    schedule = Schedule([0, 1], groups, {"short": 1.0, "long": 3.0}, {0: 0, 1: 0})
     assert schedule.seconds_waiting is None
     schedule.measured("short", 40.0, 4)
     assert schedule.estimate("long") == 30.0
@@ -322,7 +335,7 @@ class Scripted:
 
 def scripted_master(channel, tasks, collected=None):
     group_of = dict.fromkeys(tasks, 0)
-    schedule = Schedule(tasks, group_of, {0: 1.0}, {task: task for task in tasks})
+    schedule = schedule_of(tasks, group_of)
     collected = [] if collected is None else collected
     limits = Limits(silence=120)
     return Master(
@@ -433,7 +446,7 @@ def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
 def hand_out(channel, tasks, limits=None, tick=lambda: None):
     group_of = dict.fromkeys(range(tasks), 0)
     outcomes: list[Outcome] = []
-    schedule = Schedule(range(tasks), group_of, {0: 1.0})
+    schedule = schedule_of(range(tasks), group_of)
     limits = limits or Limits()
     reason = Master(channel, schedule, group_of, outcomes.append, limits, tick).run()
     return outcomes, reason
@@ -476,7 +489,7 @@ def test_a_process_that_is_killed_fails_its_task_and_is_replaced():
 
         stopping, outcomes = [], []
         limits = Limits(stop=lambda: stopping[0] if stopping else None)
-        schedule = Schedule([0, 1], {0: 0, 1: 0}, {0: 1.0})
+        schedule = schedule_of([0, 1], {0: 0, 1: 0})
         master = Master(channel, schedule, {0: 0, 1: 0}, outcomes.append, limits, tick)
         assert master.run() == "enough"
     assert [(o.task, o.error) for o in outcomes] == [(0, "its process ended with code -9")]
@@ -610,22 +623,18 @@ def test_a_stop_gives_up_the_task_in_progress():
     assert reason == "asked to"
 
 
-def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
+def test_tasks_of_a_unit_go_to_one_worker():
     """Whatever their number, and each of them is answered."""
-    units = Units({task: task // 3 for task in range(30)})
-    first = units.form([t for t in range(30) if t != 4])
-    assert first == list(range(0, 30, 3))
-    assert units.tasks(3) == (3, 5)
     seconds = [0.2 + 0.01 * task for task in range(30)]
     group_of = dict.fromkeys(range(30), 0)
-    schedule = Schedule(first, group_of, {0: 1.0})
+    together = {task: task // 3 for task in range(30)}
+    schedule = schedule_of([t for t in range(30) if t != 4], group_of, together)
     channel = SimulatedRanks(4, seconds)
     collected: list[Outcome] = []
     master = Master(
         *(channel, schedule, group_of, collected.append, Limits()),
         clock=channel.clock,
         sleep=channel.sleep,
-        units=units,
     )
     assert master.run() is None
     done = sorted(outcome.task for outcome in collected)
@@ -633,13 +642,13 @@ def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
     ranks = {(outcome.task // 3, outcome.rank) for outcome in collected}
     assert len(ranks) == 10
     whole = sum(seconds[task] for task in done)
-    assert schedule.mean(0) == pytest.approx(whole / 10)
+    assert schedule.mean(0) == pytest.approx(whole / 29)
 
 
 def test_one_process_does_a_unit_at_once_and_stops_between_its_tasks():
-    units = Units({0: "a", 1: "b", 2: "a", 3: "b"})
     group_of = dict.fromkeys(range(4), 0)
-    schedule = Schedule(units.form(range(4)), group_of, {0: 1.0})
+    together = {0: "a", 1: "b", 2: "a", 3: "b"}
+    schedule = Schedule(range(4), group_of, {0: 1.0}, {0: 0, 1: 1, 2: 0, 3: 1}, together)
     order: list[int] = []
 
     def compute(task, check):
@@ -647,6 +656,6 @@ def test_one_process_does_a_unit_at_once_and_stops_between_its_tasks():
 
     limits = Limits(stop=lambda: "enough" if len(order) == 3 else None)
     channel = OwnWorker(compute, lambda outcome: outcome, limits)
-    master = Master(channel, schedule, group_of, lambda o: None, limits, units=units)
+    master = Master(channel, schedule, group_of, lambda o: None, limits)
     reason = master.run()
     assert (reason, order) == ("enough", [0, 2, 1])

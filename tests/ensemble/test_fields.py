@@ -12,7 +12,7 @@ from adhesis.ensemble.results.schema import DATASETS
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT
-from adhesis.ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan
+from adhesis.ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, field_plan, field_row
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
@@ -60,24 +60,22 @@ def test_reductions_agree_with_the_states_of_the_loop():
     campaign = campaign_with("field_nodes = 16\n", nodes_per_wave="64")
     plan, task = field_plan(campaign), campaign.tasks()[0]
     method = make_method("grid", make_problem(campaign, task), nodes_per_wave=64)
-    recorder = FieldRecorder(plan, method, keep=True)
     wanted = {}
 
     def on_state(branch, state):
-        recorder.on_state(branch, state)
         for k, penetration in enumerate(plan.penetration):
             s = method.problem.separation(penetration)
             if abs(state.separation - s) < 1e-12 * s:
                 wanted[int(branch == "unloading"), k] = state
 
-    run_loop(
+    loop = run_loop(
         method,
         max_penetration=campaign.cycle.max_penetration,
         load_steps=campaign.cycle.load_steps,
         on_state=on_state,
     )
     assert len(wanted) == 6
-    row = recorder.row()
+    row = field_row(plan, method, loop, keep=True)
     profile = method.problem.profile
     assert np.sum(row["height_density"] * np.diff(HEIGHT_EDGES)) == pytest.approx(1, rel=1e-6)
     for place, state in wanted.items():

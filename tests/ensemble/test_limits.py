@@ -147,16 +147,6 @@ def test_every_command_is_run_under_limits() -> None:
     assert list(WORDS) == list(COMMANDS)
 
 
-def test_ranks_are_refused_where_they_cannot_share_memory(finished: Path, tmp_path: Path) -> None:
-    """Open MPI hangs there, or its ranks crash."""
-    words = ["run", finished / "c.toml", "--out", "r.h5", "--ranks", "2"]
-    done = limited("-f 100", list(words), tmp_path, fake="")
-    assert done.returncode == 74, done.stderr
-    (line,) = done.stderr.splitlines()
-    assert "the limit of file sizes (ulimit -f) is 0.1024 MB" in line
-    assert os.listdir(tmp_path) == []
-
-
 def test_a_python_process_survives_a_row_that_the_disk_did_not_take(finished: Path) -> None:
     """HDF5 would end it with a segmentation fault when the process ends."""
     code = (

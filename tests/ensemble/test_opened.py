@@ -12,14 +12,7 @@ from matplotlib.figure import Figure
 
 import adhesis
 from adhesis.ensemble.campaign.tasks import Part
-from adhesis.ensemble.report.figures.catalogue import (
-    HEIGHTS,
-    LOOPS,
-    LOSSES,
-    MECHANISMS,
-    PENETRATIONS,
-    SHAPES,
-)
+from adhesis.ensemble.report.figures.catalogue import ALL
 from adhesis.ensemble.report.plots import Plots
 from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.results.layout import create
@@ -112,9 +105,8 @@ def test_fields_have_branch_penetration_and_position(file, results):
 
 
 def test_every_figure_of_the_report_has_a_method_that_returns_it(results):
-    figures = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
     methods = {method.__name__ for _, method in inspect.getmembers(Plots, inspect.isfunction)}
-    assert {item.draw.__name__ for item in figures} == {
+    assert {item.draw.__name__ for item in ALL} == {
         *(m for m in methods if m[0] != "_" and m != "loss_along")
     }
     for name in ("loop_against_penetration", "height_density"):

@@ -269,7 +269,7 @@ def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
     values = synthetic_results.rows(plan)
     values["status"][70:] = PENDING
     out = synthetic_results.write(tmp_path / "r.h5", plan, values)
-    for figures in ("HEIGHTS", "LOOPS", "LOSSES", "MECHANISMS", "SHAPES"):
+    for figures in ("FIELDS", "LOOPS", "LOSSES", "MECHANISMS"):
         monkeypatch.setattr(f"adhesis.ensemble.report.figures.catalogue.{figures}", ())
     data = write_report(out, tmp_path / "report")
     with (tmp_path / "report" / "precision.csv").open(encoding="utf-8") as stream:

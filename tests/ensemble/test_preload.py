@@ -389,7 +389,7 @@ def test_shares_of_a_campaign_under_a_weight_are_of_the_drops_before_the_fall(tm
     shares = [row[share] for row in table.rows]
     assert min(shares) >= 0
     assert sum(shares) == pytest.approx(1)
-    assert data.jumps.histogram.sum() == (after > 0).sum()
+    assert cell.jumps.histogram.sum() == (after > 0).sum()
 
 
 def test_preloads_of_a_campaign_do_not_become_more():

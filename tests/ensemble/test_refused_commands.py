@@ -48,7 +48,7 @@ run c.toml --out none/r.h5 -> no folder
 run c.toml --out new.txt -> the name of a new results file must end in .h5
 run c.toml --out c.toml -> the campaign file itself
 run c.toml --out text -> text is not a results file of adhesis
-run c.toml --ranks 100000 -> at most {launch.largest_number_of_ranks()} are started here
+run c.toml --ranks 100000 -> at most {16 * launch.cores()} are started here
 run c.toml --ranks {{x,0,-1,nan}} -> --ranks is '{{}}'
 run c.toml --walltime {{x,0,-1,nan}} -> --walltime is '{{}}': it must
 run c.toml --max-failures {{x,-1,nan,1e99,inf}} -> --max-failures is '{{}}'

@@ -34,7 +34,7 @@ from adhesis.ensemble.report.figures import (
     selection,
     shapes_and_spectra,
 )
-from adhesis.ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
+from adhesis.ensemble.report.figures.catalogue import FIELDS, LOOPS, LOSSES, MECHANISMS
 from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
@@ -44,6 +44,7 @@ from adhesis.ensemble.report.tables.works import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
+from adhesis.ensemble.task.fields import GAP_BINS
 from tests.support.browser import needs_browser, seen_by_browser
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
@@ -113,7 +114,7 @@ def undrawn(monkeypatch, drawn) -> list[str]:
 
         return replace(item, draw=draw)
 
-    for name in ("LOOPS", "LOSSES", "MECHANISMS", "SHAPES", "HEIGHTS"):
+    for name in ("LOOPS", "LOSSES", "MECHANISMS", "FIELDS"):
         items = tuple(map(unless_wanted, getattr(catalogue, name)))
         monkeypatch.setattr(catalogue, name, items)
     return wanted
@@ -380,7 +381,7 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp
             cell = data.cell(0.8, gamma)
             state = int(np.argmin(np.abs(cell.plan.penetration - drawn_at)))
             for b, branch in enumerate(("loading", "unloading")):
-                spectrum = data.fields.psd_displacement[data.cells.index(cell), b, state]
+                spectrum = cell.fields.psd_displacement[b, state]
                 np.testing.assert_array_equal(branches[branch][:, 1], spectrum)
         places = {
             "Fig. 4": "H = 0.8, γ = 0.01 and 0.04 J/m²",
@@ -408,7 +409,7 @@ def test_shapes_show_the_surface_above_the_profile(data):
         figure = shapes_and_spectra.shapes(data)
     assert len(figure.axes) == 6
     cell = data.cell(0.8, 0.01)
-    shape = data.fields.shapes[data.cells.index(cell)]
+    shape = cell.fields.shape
     drawn = lines_of(figure.axes[0])
     assert len(drawn["rigid"]) == 4 * 255 + 1  # 256 nodes would be seen as a polygon
     nodes = drawn["rigid"][::4, 1], drawn["unloading"][::4, 1]
@@ -457,12 +458,12 @@ def test_densities_are_drawn_as_they_are(data):
     for gaps in (loading["0.90"], unloading["0.90"]):
         np.testing.assert_allclose(gaps[:, 1], 0.7 * np.exp(-gaps[:, 0]), rtol=1e-4)
         # The outermost bins hold all smaller and larger gaps, too.
-        np.testing.assert_array_equal(gaps[:, 0], data.fields.gap_bin[1:-1])
+        np.testing.assert_array_equal(gaps[:, 0], GAP_BINS[1:-1])
 
 
 def test_every_figure_is_legible_at_column_width_in_colour_and_grey(data, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)  # laid out, but not written
-    for item in (*LOOPS, *LOSSES, *MECHANISMS, *SHAPES, *HEIGHTS):
+    for item in (*LOOPS, *LOSSES, *MECHANISMS, *FIELDS):
         with style():
             figure = item.draw(data)
         save(figure, Path(item.name))

@@ -17,7 +17,7 @@ import xarray
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.run import launch, session
+from adhesis.ensemble.run import session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
@@ -58,14 +58,10 @@ def test_a_run_from_nothing_to_done(tmp_path):
         assert file.attrs["seed"] == 5
 
 
-def test_where_there_is_no_mpi_processes_compute_what_ranks_would(tmp_path, monkeypatch):
-    monkeypatch.setattr(launch, "launcher", lambda: None)
+def test_ranks_compute_what_one_process_does(tmp_path):
     few = {"hurst": "[0.8]"}
     process, out = run(tmp_path, "--ranks", "3", fake=None, **few)
     assert process.returncode == 0, process.stderr
-    assert (
-        "without MPI (mpirun and mpi4py): 2 workers as processes of this machine" in process.stderr
-    )
     (tmp_path / "alone").mkdir()
     alone, expected = run(tmp_path / "alone", fake=None, **few)
     assert alone.returncode == 0, alone.stderr

@@ -19,7 +19,6 @@ from adhesis.ensemble.trace.loops import Loops
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import single_wave
 from tests.support.campaign_support import ROOT, environment, has_ended, wait_until
-from tests.support.launchers import MPIRUN
 
 # A job that the solver refuses: no loop turns below full penetration.
 CYCLE = Cycle(HalfSpace(1.0, 0.5), (1.0,), (2.0,), 4, "grid")
@@ -69,12 +68,6 @@ def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
     assert len(probe.reports) == 1
     (answer,) = Loops([IMPOSSIBLE], 1).run().values()
     assert str(answer).startswith("ValueError")  # from the solver, so that was found
-
-
-@pytest.mark.mpi
-def test_ranks_execute_nothing_of_the_working_directory(study, capfd):
-    assert launch.run_ranks(MPIRUN, 2, ["--version"]) == launch.RanksEnd(0)
-    assert capfd.readouterr().err.count("adhesis ") == 1
 
 
 # --------------------------------------------------------------------- the end of the parent

@@ -42,8 +42,8 @@ def matches(pattern: str | None, task: Task) -> bool:
 
 def fake_result(campaign: Campaign, task: Task) -> Row:
     """Numbers that depend on the task alone."""
-    hurst, gamma, _, seed, values = campaign.identity(task)
-    mixed = [seed, *(round(1e9 * v) for v in (hurst, gamma, *values) if v is not None)]
+    values = campaign.identity(task)
+    mixed = [task.seed, *(round(1e9 * v) for v in values if v is not None)]
     rng = np.random.default_rng(mixed)
     sizes = sizes_of(row_scales(campaign))
     keep = task.realisation < field_plan(campaign).realisations
@@ -57,25 +57,29 @@ def fake_result(campaign: Campaign, task: Task) -> Row:
     return row | {name: 1e-4 * row[name] for name in ("audit_residual", "loss_error")}
 
 
-def fake_engine(behaviour: str) -> Engine:
-    settings = dict(word.split("=", 1) for word in behaviour.split())
-    broken = False
-    begun = 0
+class FakeTask:
+    """Computes a task as a behaviour has it; another process may have a copy."""
 
-    def run_task(campaign, task, progress=None):
-        nonlocal broken, begun
-        begun += 1
+    def __init__(self, behaviour: str) -> None:
+        self.settings = dict(word.split("=", 1) for word in behaviour.split())
+        self.broken = False
+        self.begun = 0
+
+    def __call__(self, campaign, task, progress=None):
+        """Compute as the words of the behaviour have it."""
+        settings = self.settings
+        self.begun += 1
         if "log" in settings:
             with open(settings["log"], "a") as log:
                 log.write(f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}\n")
-        broken = broken or matches(settings.get("crash"), task)
+        self.broken = self.broken or matches(settings.get("crash"), task)
         while matches(settings.get("hang"), task):
             time.sleep(0.01)
         if matches(settings.get("deaf"), task):
             time.sleep(0.3)
             return fake_result(campaign, task)
         free = Path(settings.get("free", "/dev/null/free"))
-        while begun > int(settings.get("hold", begun)) and progress and not free.exists():
+        while self.begun > int(settings.get("hold", self.begun)) and progress and not free.exists():
             time.sleep(0.01)
             progress("loading", 0.0, None)
         for _ in range(campaign.cycle.load_steps):
@@ -91,11 +95,16 @@ def fake_engine(behaviour: str) -> Engine:
         row = fake_result(campaign, task)
         return row | {"audit_residual": 0.19} if matches(settings.get("doubt"), task) else row
 
+
+def fake_engine(behaviour: str) -> Engine:
+    task = FakeTask(behaviour)
+    settings = task.settings
+
     class FakeWriter(Writer):
         """A writer on a disk that fills, or with an error of its own."""
 
         def write_result(self, row, result, rank=0):
-            if broken:
+            if task.broken:
                 raise TypeError("not a task's error")
             if "full" in settings:
                 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -103,7 +112,7 @@ def fake_engine(behaviour: str) -> Engine:
                 resource.setrlimit(resource.RLIMIT_FSIZE, limits)
             super().write_result(row, result, rank)
 
-    engine = Engine(run_task, lambda campaign, task: None, FakeWriter)
+    engine = Engine(task, lambda campaign, task: None, FakeWriter)
     if "silence" in settings:
         engine = replace(engine, silence=float(settings["silence"]))
     return replace(engine, all_write=False) if "serial" in settings else engine
@@ -113,9 +122,9 @@ if __name__ == "__main__":
     from adhesis.ensemble import versions
     from adhesis.ensemble.command.campaigns import run
     from adhesis.ensemble.command.main import main
+    from tests.support import fake_run  # by its name, as other processes know it
 
     # Fake tasks transform nothing: to load FFTW for its version costs half as much as all else.
     versions._fftw = lambda: "not loaded"
-    program = [sys.executable, "-m", "mpi4py", __file__, sys.argv[1]]
-    run.execute = partial(run.execute, engine=fake_engine(sys.argv[1]), program=program)
+    run.execute = partial(run.execute, engine=fake_run.fake_engine(sys.argv[1]))
     sys.exit(main(sys.argv[2:]))

@@ -4,8 +4,7 @@ A results file that exists is resumed, or extended if the campaign grew; one of 
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
 itself, 71 too little memory or too few processes, 74 the results file could not be written, 75
 stopped early (a signal, the walltime, a rank that does not answer): run the same command again to
-resume. Of --ranks, 137: a rank was killed, and the same holds; and 2: the launcher brought no ranks
-together.
+resume.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import argparse
 import os
 import time
 import traceback
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,8 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--ranks",
         type=within(1, _MOST, "a whole number of at least 1", int),
         metavar="N",
-        help="start N ranks here, without MPI as processes (one more than cores is right: rank 0 "
-        "only waits)",
+        help="start N ranks on this machine (one more than cores is right: rank 0 only hands out)",
     )
     parser.add_argument(
         "--dry-run",
@@ -112,34 +109,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def execute(
-    args: argparse.Namespace,
-    engine: Engine | None = None,
-    program: Sequence[str] | None = None,
-) -> int:
+def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
     """Run; returns the exit code, on ranks above 0 that of success.
 
-    Tests pass another engine than loops, and what starts a rank with it.
+    Tests pass another engine than loops.
     """
-    from adhesis.ensemble.run import launch
     from adhesis.ensemble.run.ranks import OneRank, wait_for_all, world
 
     started = time.time()
     comm: Any = OneRank()
     processes = 0
     try:
-        if args.ranks is not None and not args.dry_run and launch.STARTED not in os.environ:
-            ranks, mpirun = _ranks(args), launch.mpi_launcher()
-            if ranks > 1 and mpirun is not None:
-                return _start_ranks(mpirun, ranks, args, program)
-            processes = ranks - 1
+        if args.ranks is not None and not args.dry_run:
+            processes = _checked_ranks(args.ranks) - 1
         comm = world()
         code = _run(args, comm, processes, started, engine)
         return code if comm.rank == 0 else DONE
     except InputError as error:
         if comm.size == 1:
             raise
-        if comm.rank == 0 and not launch.hand_over(BAD_INPUT, f"adhesis run: {error}"):
+        if comm.rank == 0:
             write_line(f"adhesis run: {error}")
         if not wait_for_all(comm, _ALL_ARRIVE):  # the error is of this rank alone
             _end_job(comm, BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
@@ -162,41 +151,20 @@ def execute(
         return OUR_ERROR
 
 
-def _ranks(args: argparse.Namespace) -> int:
-    """Return how many ranks are to be started."""
-    from adhesis.ensemble.run import launch
+def _checked_ranks(ranks: int) -> int:
+    """Return how many ranks are to be started (InputError)."""
+    from adhesis.ensemble.run.launch import check_ranks
     from adhesis.ensemble.run.ranks import launched
-    from adhesis.solver.checks import counted
 
-    ranks: int = args.ranks
-    most = launch.largest_number_of_ranks()
-    if ranks > most:
-        raise InputError(
-            f"--ranks is {ranks}: at most {most} are started here, on "
-            f"{counted(launch.cores(), 'core')}; more ranks than cores compute no faster"
-        )
+    check_ranks("--ranks", ranks)
     if launched()[0] > 1:
         raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
     return ranks
 
 
-def _start_ranks(
-    mpirun: str, ranks: int, args: argparse.Namespace, program: Sequence[str] | None
-) -> int:
-    """Start ranks and wait for them; returns the exit code."""
-    from adhesis.ensemble.run import launch
-
-    end = launch.run_ranks(mpirun, ranks, args.words, program)
-    for line in filter(None, (*end.words, end.sentence)):
-        write_line(line)
-    return end.code
-
-
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     """End every rank: the others know nothing of this one's error and would wait for ever."""
-    from adhesis.ensemble.run.launch import hand_over
-
-    if not hand_over(code, sentence) and sentence:
+    if sentence:
         write_line(sentence)
     comm.Abort(code)
 
@@ -208,15 +176,11 @@ def _run(
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
-    from adhesis.ensemble.run.launch import report_meeting
     from adhesis.ensemble.run.ranks import together
     from adhesis.ensemble.run.session import Options, run_campaign
-    from adhesis.solver.checks import counted
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
-    if comm.rank == 0:
-        report_meeting()
     path = args.out or Path(f"{args.campaign.stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
@@ -231,10 +195,6 @@ def _run(
         patience=args.patience,
         processes=processes,
     )
-
-    if processes:
-        workers = counted(processes, "worker")
-        log(f"without MPI (mpirun and mpi4py): {workers} as processes of this machine")
     try:
         summary = run_campaign(campaign, path, comm, options, log, engine)
     except Unresponsive as error:

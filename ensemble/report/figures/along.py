@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report.figures import style
@@ -112,7 +111,7 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     return figure
 
 
-def _sample(cells: list[Cell]) -> str:
+def _sample(cells: list[AveragedCell]) -> str:
     """Return the number of profiles that means are over, and what their bars are."""
     counts = sorted({cell.done for cell in cells if cell.done})
     many = " to ".join(dict.fromkeys((f"{counts[0]}", f"{counts[-1]}")))
@@ -122,7 +121,7 @@ def _sample(cells: list[Cell]) -> str:
 
 def _lines(
     data: Aggregate, axis: Axis, second: Axis | None
-) -> tuple[list[tuple[str, float]], dict[tuple[str, str], list[Cell]]]:
+) -> tuple[list[tuple[str, float]], dict[tuple[str, str], list[AveragedCell]]]:
     """Return the values that all lines share, and the cells by title of a panel and label.
 
     The cells of a line ascend along the axis, and may have no finished task.
@@ -131,11 +130,11 @@ def _lines(
     moving = together(data, axis)
     names = set() if second is None else together(data, second)
 
-    def at(cell: Cell) -> list[tuple[str, float]]:
+    def at(cell: AveragedCell) -> list[tuple[str, float]]:
         return [other for other in cell.others if other[0] not in moving | names]
 
     wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
-    lines: dict[tuple[str, str], list[Cell]] = {}
+    lines: dict[tuple[str, str], list[AveragedCell]] = {}
     for cell in sorted(data.cells, key=lambda cell: dict(cell.others)[axis.name]):
         if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
             continue

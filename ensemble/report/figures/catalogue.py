@@ -13,6 +13,10 @@ from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spec
 from adhesis.ensemble.report.figures.along import along, with_figure
 from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.selection import beside_paper, has_fields
+from adhesis.ensemble.report.figures.shapes_and_spectra import (
+    cells_with_shape,
+    shown_penetrations,
+)
 from adhesis.ensemble.report.figures.style import PublishedFigure
 from adhesis.ensemble.report.further_axes import together
 from adhesis.ensemble.report.paper import PaperFigure
@@ -42,7 +46,7 @@ def _several(name: str) -> Callable[[Aggregate], bool]:
 
 
 def _with_fields(data: Aggregate) -> bool:
-    return any(has_fields(data, cell) for cell in data.cells)
+    return any(map(has_fields, data.cells))
 
 
 def _compared_with(figure: PaperFigure, addition: str = "") -> Callable[[Aggregate], str]:
@@ -95,7 +99,7 @@ LOSSES = (
         is_worth=_several("hurst"),
     ),
 )
-SHAPES = (
+FIELDS = (
     Illustration(
         "fig3_shapes",
         "Deformed shapes",
@@ -110,7 +114,7 @@ SHAPES = (
             " Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
             "h_rms = 1 µm, so the states here are those that the campaign kept.",
         ),
-        is_worth=lambda data: any(shape is not None for shape in data.fields.shapes),
+        is_worth=lambda data: bool(shown_penetrations(data, 1) and cells_with_shape(data)),
     ),
     Illustration(
         "fig4_spectra_of_branches",
@@ -155,8 +159,6 @@ SHAPES = (
         _compared_with(paper.FIGURE_8),
         is_worth=_with_fields,
     ),
-)
-HEIGHTS = (
     Illustration(
         "fig9_height_density",
         "Probability density of the heights",
@@ -200,15 +202,28 @@ PENETRATIONS = (
         "intervals over the realisations that all of them have finished. The curves are moved "
         "apart a little.",
         loss_figures.loss_against_penetration,
+        is_worth=lambda data: bool(loss_figures.of_penetration(data)),
     ),
 )
 
-ALL = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
+ALL = (*LOOPS, *LOSSES, *FIELDS, *MECHANISMS, *PENETRATIONS)
 
 
-def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
-    """One figure for each further axis of the campaign, unless it goes with H or γ."""
-    return tuple(_along_axis(data, axis) for axis in with_figure(data))
+def sections(data: Aggregate) -> dict[str, list[Illustration]]:
+    """Return the figures that are worth drawing, by section of the report."""
+    found = {
+        "loops": LOOPS,
+        "losses": LOSSES,
+        # One for each further axis of the campaign, unless it goes with H or γ
+        "axes": tuple(_along_axis(data, axis) for axis in with_figure(data)),
+        "mechanisms": MECHANISMS,
+        "fields": FIELDS,
+        "companions": PENETRATIONS,
+    }
+    return {
+        name: [item for item in items if item.is_worth(data if item.whole else data.shown)]
+        for name, items in found.items()
+    }
 
 
 def _along_axis(data: Aggregate, axis: Axis) -> Illustration:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.report.figures import style
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
@@ -90,13 +89,13 @@ def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
     return figure
 
 
-def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, Cell]]:
+def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, AveragedCell]]:
     """Cells of one H that have finished tasks, each with the place of its γ among those shown."""
     cells = ((k, data.cell(hurst, gamma)) for k, gamma in style.shown_gammas(data))
     return [(k, cell) for k, cell in cells if cell is not None and cell.done]
 
 
-def _in_contact(cell: Cell, branch: str) -> slice:
+def _in_contact(cell: AveragedCell, branch: str) -> slice:
     """The part of a branch up to one step after the last realisation has detached."""
     fraction = cell.curves[f"{branch}_contact_fraction"].mean
     touching = np.flatnonzero(fraction > 0)
@@ -105,7 +104,7 @@ def _in_contact(cell: Cell, branch: str) -> slice:
     return slice(0, min(fraction.size, int(touching[-1]) + 2))
 
 
-def _plot(axes: Axes, x: Array, y: Array, cell: Cell, branch: str, k: int) -> None:
+def _plot(axes: Axes, x: Array, y: Array, cell: AveragedCell, branch: str, k: int) -> None:
     """Draw a branch, with few markers, staggered, so that they tell curves apart and hide none."""
     part = _in_contact(cell, branch)
     every = max(1, (part.stop - part.start) // _MARKERS_PER_CURVE)
@@ -118,7 +117,7 @@ def _plot(axes: Axes, x: Array, y: Array, cell: Cell, branch: str, k: int) -> No
     )
 
 
-def _with_spread(axes: Axes, cell: Cell, branch: str, name: str, k: int) -> None:
+def _with_spread(axes: Axes, cell: AveragedCell, branch: str, name: str, k: int) -> None:
     part = _in_contact(cell, branch)
     axis = cell.penetration[branch][part]
     curve = cell.curves[f"{branch}_{name}"]

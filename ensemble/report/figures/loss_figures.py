@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
 
-from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion
-from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
+from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE, SMALL
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
@@ -254,7 +254,7 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
 def jump_energies(data: Aggregate) -> PublishedFigure:
     """Jumps per loop and decade of energy drop: large scale left, small scale right."""
     hursts = spread_out(data.hursts, MOST_PANELS)
-    shown = shown_gammas(data)
+    shown, occupied = shown_gammas(data), _occupied(data)
     height = (13 + 44 * len(hursts)) * MM
     figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
     for row, hurst in zip(figure.rows, hursts, strict=True):
@@ -262,7 +262,7 @@ def jump_energies(data: Aggregate) -> PublishedFigure:
             for k, gamma in shown:
                 cell = data.cell(hurst, gamma)
                 if cell is not None and cell.done:
-                    _jump_density(axes, data, cell, small, k)
+                    _jump_density(axes, cell, small, k, occupied)
             label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
     figure.label("energy drop of one jump (J/m²)", "jumps per loop and decade")
     for axes in figure.panels:
@@ -273,11 +273,8 @@ def jump_energies(data: Aggregate) -> PublishedFigure:
     return figure
 
 
-def _jump_density(axes: Axes, data: Aggregate, cell: Cell, small: bool, k: int) -> None:
-    found = data.jumps
-    histogram = found.histogram[data.cells.index(cell)]
-    density = histogram[found.small_scale == small].sum(axis=0) * BINS_PER_DECADE / cell.done
-    part = _occupied(found.histogram)
+def _jump_density(axes: Axes, cell: AveragedCell, small: bool, k: int, part: slice) -> None:
+    density = cell.jumps.histogram[small == SMALL].sum(axis=0) * BINS_PER_DECADE / cell.done
     edges = BIN_EDGES[part.start : part.stop + 1]
     # Jumps are counted: n of them are known to sqrt(n).
     scatter = density / np.sqrt(np.maximum(density * cell.done / BINS_PER_DECADE, 1))
@@ -328,9 +325,9 @@ def _cells(data: Aggregate) -> list[Cell]:
     return [c for c in data.cells if c.done and c.hurst in hursts and c.work_of_adhesion in gammas]
 
 
-def _occupied(histogram: np.ndarray) -> slice:
+def _occupied(data: Aggregate) -> slice:
     """The bins from the first to the last that holds a jump of any cell; at most eight decades."""
-    filled = np.flatnonzero(histogram.sum(axis=(0, 1)))
+    filled = np.flatnonzero(np.sum([cell.jumps.histogram for cell in data.cells], axis=(0, 1)))
     if not filled.size:
         return slice(0, 1)
     stop = int(filled[-1]) + 1

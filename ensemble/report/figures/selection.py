@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.report.figures.style import MOST_PANELS, spread_out
 from adhesis.ensemble.report.findings import typical_cell
 from adhesis.ensemble.report.paper import PaperFigure
 from adhesis.ensemble.task.fields import FieldPlan
 
 
-def has_fields(data: Aggregate, cell: Cell) -> bool:
+def has_fields(cell: AveragedCell) -> bool:
     """Whether a loop of a cell was in contact at a state with fields, as short of a preload."""
-    fields = data.fields.psd_displacement
-    return bool(fields.size and np.any(fields[data.cells.index(cell)] > 0))
+    return bool(np.any(cell.fields.psd_displacement > 0))
 
 
-def cell_of_hurst(data: Aggregate, hurst: float, figure: PaperFigure) -> Cell | None:
+def cell_of_hurst(data: Aggregate, hurst: float, figure: PaperFigure) -> AveragedCell | None:
     """Return the cell of H with the first γ of a figure; else the typical one of H."""
-    kept = [cell for cell in data.cells if has_fields(data, cell) and cell.hurst == hurst]
+    kept = [cell for cell in data.cells if has_fields(cell) and cell.hurst == hurst]
     of_paper = [cell for cell in kept if cell.work_of_adhesion == figure.works_of_adhesion[0]]
     return next(iter([*of_paper, *kept[(len(kept) - 1) // 2 :]]), typical_cell(data, hurst))
 
 
-def cells_of(data: Aggregate, figure: PaperFigure) -> list[Cell]:
+def cells_of(data: Aggregate, figure: PaperFigure) -> list[AveragedCell]:
     """Return the cells of a figure that have results.
 
     Where the campaign lacks its H, they are of the typical one; where it lacks all of its γ, they
     are of all γ of the campaign.
     """
-    kept = [cell for cell in data.cells if has_fields(data, cell)]
+    kept = [cell for cell in data.cells if has_fields(cell)]
     kept = kept or [cell for cell in data.cells if cell.done]
     known = {(cell.hurst, cell.work_of_adhesion): cell for cell in kept}
     typical = typical_cell(data)

@@ -16,9 +16,9 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell
-from adhesis.ensemble.aggregate.mean_fields import DeformedShape, FieldStatistics
+from adhesis.ensemble.aggregate.mean_fields import DeformedShape
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.selection import cell_of_hurst, cells_of, state_of
 from adhesis.ensemble.report.figures.style import (
@@ -39,6 +39,7 @@ from adhesis.ensemble.report.figures.style import (
     plain_decades,
     spread_out,
 )
+from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, field_plan
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
@@ -56,15 +57,14 @@ def shapes(data: Aggregate) -> PublishedFigure:
     Heights are those of the profile: on a machine or under a load the two branches have different
     separations at one prescribed value. ValueError if no cell has kept its fields.
     """
-    fields = data.fields
-    kept = [cell for cell in data.cells if fields.shapes[data.cells.index(cell)] is not None]
+    kept = cells_with_shape(data)
     wished = [cell for cell in cells_of(data, paper.FIGURE_3) if cell in kept]
     if not kept:
         raise ValueError("no loop has kept its fields")
     cell = (wished or kept)[0]
-    shape = fields.shapes[data.cells.index(cell)]
+    shape = cell.fields.shape
     assert shape is not None
-    chosen = shown_penetrations(fields, 3)
+    chosen = shown_penetrations(data, 3)
     height, ratios = (12 + 38 * len(chosen)) * MM, {"width_ratios": [2, 1]}
     figure = new_figure(len(chosen), 2, TWO_COLUMNS, height, sharex="col", gridspec_kw=ratios)
     everywhere = np.arange(cell.plan.position.size)
@@ -91,8 +91,8 @@ def spectra_of_branches(data: Aggregate) -> PublishedFigure:
     for (axes,), cell in zip(figure.rows, cells, strict=True):
         k = state_of(cell.plan, paper.FIGURE_4)
         for b, branch in enumerate(BRANCHES):
-            _spectrum(axes, data, cell, b, k, label=branch, **_look_of(branch))
-        _finish_spectra(axes, data, cell, f", {_depth(data, cell, k)}")
+            _spectrum(axes, cell, b, k, label=branch, **_look_of(branch))
+        _finish_spectra(axes, cell, f", {_depth(data, cell, k)}")
     _label_spectra(figure, [key(b, **_look_of(b)) for b in BRANCHES])
     return figure
 
@@ -112,8 +112,7 @@ def gap_density(data: Aggregate) -> PublishedFigure:
     hursts = spread_out(data.hursts, MOST_PANELS)
     height = (16 + 46 * len(hursts)) * MM
     figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
-    fields = data.fields
-    chosen = shown_penetrations(fields, MOST_CURVES)
+    chosen = shown_penetrations(data, MOST_CURVES)
     for row, hurst in zip(figure.rows, hursts, strict=True):
         cell = cell_of_hurst(data, hurst, paper.FIGURE_8)
         if cell is None:
@@ -121,11 +120,11 @@ def gap_density(data: Aggregate) -> PublishedFigure:
         for b, (axes, branch) in enumerate(zip(row, BRANCHES, strict=True)):
             for place, k in enumerate(chosen):
                 # The outermost bins also hold all gaps beyond the axis.
-                values = fields.gap_density[data.cells.index(cell), b, k][1:-1]
+                values = cell.fields.gap_density[b, k][1:-1]
                 if np.any(values > 0):
                     y, depth = np.where(values > 0, values, np.nan), cell.plan.penetration[k]
                     line: Any = {"color": colour(place), "linestyle": LINES[place]}
-                    axes.plot(fields.gap_bin[1:-1], y, label=f"{depth:.2f}", **line)
+                    axes.plot(GAP_BINS[1:-1], y, label=f"{depth:.2f}", **line)
             label_panel(axes, f"{_cell_label(cell)}, {branch}")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
@@ -140,15 +139,14 @@ def height_density(data: Aggregate) -> PublishedFigure:
     """Fig. 9: probability density of the heights of the rigid profiles, and the Gaussian."""
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
     axes = figure.panels[0]
-    fields = data.fields
     for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES)):
         # All γ have the same profiles: the cell with most of them says all.
         cell = max((c for c in data.cells if c.hurst == hurst), key=lambda c: c.done)
         if cell.done:
-            density = fields.height_density[data.cells.index(cell)]
+            density = cell.fields.height_density
             points: Any = {"linestyle": "none", "markersize": 2.4, "label": f"H = {hurst:g}"}
             y = np.where(density > 0, density, np.nan)
-            axes.plot(fields.height_bin, y, **points, **look(k))
+            axes.plot(HEIGHT_BINS, y, **points, **look(k))
     x = np.linspace(-4.5, 4.5, 200)
     axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color="0.3", label="Gaussian")
     axes.set(yscale="log", ylim=(1e-4, 1), xlim=(-4.5, 4.5))
@@ -157,24 +155,29 @@ def height_density(data: Aggregate) -> PublishedFigure:
     return figure
 
 
-def shown_penetrations(fields: FieldStatistics, most: int) -> list[int]:
+def cells_with_shape(data: Aggregate) -> list[AveragedCell]:
+    """Cells of which a finished loop has kept its fields."""
+    return [cell for cell in data.cells if cell.fields.shape is not None]
+
+
+def shown_penetrations(data: Aggregate, most: int) -> list[int]:
     """Places of the penetrations that a figure shows, deepest first."""
-    places = list(range(fields.penetration.size))[::-1]
+    places = list(range(data.cells[0].plan.penetration.size))[::-1]
     return [int(k) for k in spread_out(places, most)]
 
 
 def _spectra(data: Aggregate, b: int) -> PublishedFigure:
     hursts = spread_out(data.hursts, MOST_PANELS)
     figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 52 * len(hursts)) * MM, sharex=True)
-    chosen = shown_penetrations(data.fields, 3)
+    chosen = shown_penetrations(data, 3)
     for (axes,), hurst in zip(figure.rows, hursts, strict=True):
         cell = cell_of_hurst(data, hurst, paper.FIGURE_5)
         if cell is None:
             continue
         for place, k in enumerate(chosen):
             label = f"{cell.plan.penetration[k]:.2f}"
-            _spectrum(axes, data, cell, b, k, label=label, linestyle=LINES[place], **look(place))
-        _finish_spectra(axes, data, cell)
+            _spectrum(axes, cell, b, k, label=label, linestyle=LINES[place], **look(place))
+        _finish_spectra(axes, cell)
     _label_spectra(figure, _penetration_handles(data, chosen))
     return figure
 
@@ -184,18 +187,18 @@ def _look_of(branch: str) -> dict[str, Any]:
     return {"color": _COLOUR_OF_BRANCH[branch], "linestyle": LINE_OF_BRANCH[branch]}
 
 
-def _spectrum(axes: Axes, data: Aggregate, cell: Cell, b: int, k: int, **options: Any) -> None:
+def _spectrum(axes: Axes, cell: AveragedCell, b: int, k: int, **options: Any) -> None:
     """Draw the spectrum of one state, unless no realisation is in contact there."""
-    values = data.fields.psd_displacement[data.cells.index(cell), b, k]
+    values = cell.fields.psd_displacement[b, k]
     if np.any(values > 0):
         y = np.where(values > 0, values, np.nan)
         axes.loglog(cell.plan.wave_number, y, markersize=2, markevery=4, **options)
 
 
-def _finish_spectra(axes: Axes, data: Aggregate, cell: Cell, state: str = "") -> None:
+def _finish_spectra(axes: Axes, cell: AveragedCell, state: str = "") -> None:
     """Add the rigid profile and the reference slopes to a panel, and its labels."""
     present = cell.plan.filled
-    rigid = data.fields.psd_height[data.cells.index(cell)][present]
+    rigid = cell.fields.psd_height[present]
     q = cell.plan.wave_number[present]
     axes.loglog(q, rigid, color="0.55", linewidth=2, label="rigid", zorder=1.5)
     # q^-(2H+1) below and q^-(2+H) above the data, over the profile's own wave numbers
@@ -281,7 +284,7 @@ def _penetration_handles(
     unit = _penetration_sign(data)
     if len(tops) > 1 and not data.campaign.cycle.turns_at_stress:
         unit = r"\Delta/\Delta"
-    penetration = data.cells[0].plan.penetration if len(tops) == 1 else data.fields.penetration
+    penetration = (data.cells[0].plan if len(tops) == 1 else field_plan(data.campaign)).penetration
     return [
         key(
             rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",

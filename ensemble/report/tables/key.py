@@ -9,8 +9,9 @@ from typing import Any
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import AXIS_UNITS, common_unit
-from adhesis.ensemble.report.tables.table import TableColumn, Value
+from adhesis.ensemble.report.tables.table import Format, TableColumn, Value, at_least_0, number
 
 
 def _itself(entry: Any) -> Any:
@@ -72,3 +73,46 @@ def _in_unit(size: float, value: float) -> str:
 def estimate(name: str, part: str = "mean") -> Callable[[Cell], float]:
     """Return what takes a mean over a cell, or another part of its estimate, from the cell."""
     return lambda cell: float(getattr(cell.estimates[name], part))
+
+
+_HEADINGS = {"std": "", "sem": "s.e.", "ci_low": "95 % from", "ci_high": "to"}
+
+
+def estimated(
+    name: str,
+    parts: str = "mean",
+    heading: str = "",
+    show: Format | None = None,
+    *,
+    unit: str = "",
+    size: float = 1.0,
+    of: Callable[[Any], Estimate] | None = None,
+    least: bool = False,
+    last: bool = False,
+) -> list[TableColumn]:
+    """Return columns of an estimate: "mean sem ci_low", or "value", a mean by the name alone.
+
+    Without a ``heading`` they are for programs. People see multiples of ``size``; with ``least`` no
+    end of an interval below 0. ``of`` takes the estimate from what a row is about, by default that
+    of the same name from a cell.
+    """
+    formats = {"sem": number(2, unit=size)}
+    if least:
+        formats["ci_low"] = partial(at_least_0, unit=size)
+    columns = []
+    for part in parts.split():
+        attribute = "mean" if part == "value" else part.removeprefix("ci_")
+        columns.append(
+            TableColumn(
+                f"{name}{unit}" if part == "value" else f"{name}_{part}{unit}",
+                estimate(name, attribute) if of is None else partial(_part, of, attribute),
+                _HEADINGS.get(part, heading) if heading else "",
+                formats.get(part, show or number(unit=size)),
+                last=last,
+            )
+        )
+    return columns
+
+
+def _part(of: Callable[[Any], Estimate], part: str, entry: Any) -> float:
+    return float(getattr(of(entry), part))

@@ -17,12 +17,16 @@ from adhesis.ensemble.interval import interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import loops_short_of_preload
-from adhesis.ensemble.report.tables.key import axis_columns, estimate, gamma_column, key_columns
+from adhesis.ensemble.report.tables.key import (
+    axis_columns,
+    estimate,
+    estimated,
+    gamma_column,
+    key_columns,
+)
 from adhesis.ensemble.report.tables.table import (
-    Format,
     Table,
     TableColumn,
-    at_least_0,
     fixed,
     make_table,
     number,
@@ -31,6 +35,9 @@ from adhesis.ensemble.report.tables.table import (
 from adhesis.solver.loading.zero_range import RANGES
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import finite
+
+_ALL, _DIFFERENCE = "mean std sem ci_low ci_high", "value sem ci_low ci_high"
+_MILLI: Any = {"unit": " [J/m^2]", "size": 1e-3}
 
 
 def losses(data: Aggregate) -> Table:
@@ -41,11 +48,7 @@ def losses(data: Aggregate) -> Table:
         TableColumn("failed", attrgetter("failed"), "failed", only_if_any=True),
         TableColumn("pending", attrgetter("pending"), "pending", only_if_any=True),
         *_preload_columns(data),
-        _estimated("loss_dimensionless", "mean", "W~", number(), last=True),
-        _estimated("loss_dimensionless", "std"),
-        _estimated("loss_dimensionless", "sem", "s.e.", number(2), last=True),
-        _estimated("loss_dimensionless", "ci_low", "95 % from", at_least_0, last=True),
-        _estimated("loss_dimensionless", "ci_high", "to", number(), last=True),
+        *estimated("loss_dimensionless", _ALL, "W~", least=True, last=True),
         TableColumn(
             "loss_dimensionless_error_numerical",
             estimate("loss_error_dimensionless"),
@@ -69,16 +72,12 @@ def losses(data: Aggregate) -> Table:
         TableColumn(
             "loss_dimensionless_paper", papers_loss, "paper", fixed(2), only_if_any=True, last=True
         ),
-        _estimated("loss", "mean [J/m^2]", "loss (mJ/m²)", number(unit=1e-3)),
-        _estimated("loss", "std [J/m^2]"),
-        _estimated("loss", "sem [J/m^2]", "s.e.", number(2, unit=1e-3)),
-        _estimated("loss", "ci_low [J/m^2]", "95 % from", partial(at_least_0, unit=1e-3)),
-        _estimated("loss", "ci_high [J/m^2]", "to", number(unit=1e-3)),
+        *estimated("loss", _ALL, "loss (mJ/m²)", **_MILLI, least=True),
         *_friction_columns(data),
         TableColumn("loss_over_work_of_adhesion", _over_gamma, "W/γ", number(3), only_if_any=True),
         TableColumn("interval", lambda cell: interval_method(cell.done)),
-        _estimated("loss_from_drops", "mean [J/m^2]"),
-        _estimated("audit_residual", "mean"),
+        *estimated("loss_from_drops", **_MILLI),
+        *estimated("audit_residual"),
         TableColumn("audit_residual_rms", _of_audit(lambda audit: np.sqrt(np.mean(audit**2)))),
         TableColumn(
             "audit_residual_largest",
@@ -91,7 +90,7 @@ def losses(data: Aggregate) -> Table:
             *("races", plain),
             only_if_any=True,
         ),
-        _estimated("energy_at_stake_dimensionless", "mean"),
+        *estimated("energy_at_stake_dimensionless"),
         TableColumn(
             "range_least [m]",
             lambda cell: extreme(np.min, cell.least_range),
@@ -103,18 +102,19 @@ def losses(data: Aggregate) -> Table:
             "largest_interior_tension [Pa]",
             lambda cell: extreme(np.max, cell.values["largest_interior_tension"]),
         ),
-        *_for_programs("loss_small_scale", "mean sem", " [J/m^2]"),
-        *_for_programs("loss_large_scale", "mean sem", " [J/m^2]"),
-        *_for_programs("small_scale_share", "mean ci_low ci_high"),
-        *_for_programs("pull_off_stress", "mean sem ci_low ci_high", " [Pa]"),
+        *estimated("loss_small_scale", "mean sem", **_MILLI),
+        *estimated("loss_large_scale", "mean sem", **_MILLI),
+        *estimated("small_scale_share", "mean ci_low ci_high"),
+        *estimated("pull_off_stress", "mean sem ci_low ci_high", unit=" [Pa]"),
         TableColumn("pull_off_stress_dimensionless_mean", _if_done(_pull_off_stress)),
-        *_for_programs("pull_off_penetration", "mean sem"),
-        *(_estimated(name, "mean [m]") for name in ("h_max", "h_rms")),
-        _estimated("m0", "mean [m^2]"),
-        _estimated("m2", "mean"),
-        _estimated("m4", "mean [1/m^2]"),
+        *estimated("pull_off_penetration", "mean sem"),
+        *estimated("h_max", unit=" [m]"),
+        *estimated("h_rms", unit=" [m]"),
+        *estimated("m0", unit=" [m^2]"),
+        *estimated("m2"),
+        *estimated("m4", unit=" [1/m^2]"),
         TableColumn("m2_paper", _papers_m2),
-        _estimated("wall_time", "mean [s]"),
+        *estimated("wall_time", unit=" [s]"),
     )
     return make_table("Loss of one loop", columns, data.cells)
 
@@ -131,28 +131,14 @@ def _friction_columns(data: Aggregate) -> tuple[TableColumn, ...]:
     """Return the columns of the two parts of the loss; none for one work of adhesion."""
     if data.campaign.material.work_of_adhesion_open is None:
         return ()
-    milli = number(unit=1e-3)
     return (
-        _estimated("friction", "mean [J/m^2]", "friction", milli),
+        *estimated("friction", "mean", "friction", **_MILLI),
         TableColumn(
             "instability_mean [J/m^2]",
             _if_done(lambda cell: np.mean(cell.values["loss"] - cell.values["friction"])),
-            *("instability", milli),
+            *("instability", number(unit=1e-3)),
         ),
     )
-
-
-def _estimated(
-    quantity: str, part: str, heading: str = "", show: Format = plain, *, last: bool = False
-) -> TableColumn:
-    """Return the column of a part of a cell's estimate: "mean", or "ci_low [J/m^2]"."""
-    which = part.split(" ")[0].removeprefix("ci_")
-    return TableColumn(f"{quantity}_{part}", estimate(quantity, which), heading, show, last=last)
-
-
-def _for_programs(quantity: str, parts: str, unit: str = "") -> tuple[TableColumn, ...]:
-    """Return columns of the CSV file alone, of several parts of a cell's estimate."""
-    return tuple(_estimated(quantity, f"{part}{unit}") for part in parts.split())
 
 
 def _if_done(value: Callable[[Cell], Any]) -> Callable[[Cell], float | None]:
@@ -288,32 +274,18 @@ def _deviation(kind: str, data: Aggregate, cell: Cell) -> float | None:
 
 def paired(data: Aggregate) -> Table:
     """Tabulate the growth of the loss from one γ to the next on the same profiles."""
-    milli = number(unit=1e-3)
+    scaled, loss = attrgetter("loss_dimensionless"), attrgetter("loss")
     columns = (
         TableColumn("hurst", attrgetter("hurst"), "H"),
         *axis_columns(data.further),
         gamma_column(data, "_from", attrgetter("lower"), "γ from"),
         gamma_column(data, "_to", attrgetter("upper"), "to"),
         TableColumn("pairs", attrgetter("loss.n"), "pairs"),
-        *_differences("loss_dimensionless_difference", "loss_dimensionless", "W~ grows by"),
-        TableColumn("loss_difference [J/m^2]", attrgetter("loss.mean"), "loss by (mJ/m²)", milli),
-        TableColumn("loss_difference_sem [J/m^2]", attrgetter("loss.sem")),
-        TableColumn("loss_difference_ci_low [J/m^2]", attrgetter("loss.low")),
-        TableColumn("loss_difference_ci_high [J/m^2]", attrgetter("loss.high")),
+        *estimated("loss_dimensionless_difference", _DIFFERENCE, "W~ grows by", of=scaled),
+        *estimated("loss_difference", "value", "loss by (mJ/m²)", **_MILLI, of=loss),
+        *estimated("loss_difference", "sem ci_low ci_high", **_MILLI, of=loss),
     )
     return make_table("Growth of the loss with γ, profile by profile", columns, data.paired)
-
-
-def _differences(
-    name: str, estimate_: str, heading: str, digits: int = 4
-) -> tuple[TableColumn, ...]:
-    """Return the columns of a difference with its error and interval, from an estimate."""
-    return (
-        TableColumn(name, attrgetter(f"{estimate_}.mean"), heading, number(digits)),
-        TableColumn(f"{name}_sem", attrgetter(f"{estimate_}.sem"), "s.e.", number(2)),
-        TableColumn(f"{name}_ci_low", attrgetter(f"{estimate_}.low"), "95 % from", number(digits)),
-        TableColumn(f"{name}_ci_high", attrgetter(f"{estimate_}.high"), "to", number(digits)),
-    )
 
 
 def profiles(data: Aggregate) -> Table:
@@ -360,7 +332,9 @@ def companions(data: Aggregate) -> Table:
         TableColumn("pairs", attrgetter("loss.here.n"), "pairs"),
         TableColumn("loss_dimensionless_here", attrgetter("loss.here.mean"), "W~ here", number()),
         TableColumn("loss_dimensionless_there", attrgetter("loss.there.mean"), "there", number()),
-        *_differences("difference", "loss.difference", "difference", 3),
+        *estimated(
+            *("difference", _DIFFERENCE, "difference", number(3)), of=attrgetter("loss.difference")
+        ),
         TableColumn(
             "loss_dimensionless_paper",
             lambda pair: papers_loss(pair.cell) if paper.is_cell_of(pair.other) else None,

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 
-from adhesis.ensemble.aggregate.average import Aggregate
+import numpy as np
+
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.jumps import SMALL
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.quantities import percent
-from adhesis.ensemble.report.tables.key import estimate, key_columns
+from adhesis.ensemble.report.tables.key import estimate, estimated, key_columns
 from adhesis.ensemble.report.tables.table import (
     Table,
     TableColumn,
@@ -21,51 +24,44 @@ from adhesis.ensemble.report.tables.table import (
     plain,
 )
 from adhesis.solver.method import BRANCHES
+from adhesis.solver.model.jump import JUMP_KINDS
 
 
 @dataclass(frozen=True)
 class _Kind:
     """The jumps of one kind in all loops of a cell."""
 
-    cell: Cell
-    kind: str
-    small_scale: bool
-    number: float
-    energy: float
-    of_all_kinds: float
+    cell: AveragedCell
+    place: int  # in JUMP_KINDS
+
+    @property
+    def number(self) -> float:
+        """Number of jumps."""
+        return float(self.cell.jumps.number[self.place])
+
+    @property
+    def energy(self) -> float:
+        """Their drops together, J/m²."""
+        return float(self.cell.jumps.energy[self.place])
 
     @property
     def share(self) -> float | None:
         """Share of the kind in all drops; None without any."""
-        return self.energy / self.of_all_kinds if self.of_all_kinds else None
+        of_all_kinds = float(self.cell.jumps.energy.sum())
+        return self.energy / of_all_kinds if of_all_kinds else None
 
 
-def _kinds(data: Aggregate) -> list[tuple[Cell, list[_Kind]]]:
-    """Return every kind of jump that any cell has, cell by cell."""
-    found = data.jumps
-    used = [j for j in range(len(found.kinds)) if found.number[:, j].any()]
-    return [
-        (
-            cell,
-            [
-                _Kind(
-                    *(cell, found.kinds[j], bool(found.small_scale[j])),
-                    *(float(found.number[k, j]), float(found.energy[k, j])),
-                    float(found.energy[k].sum()),
-                )
-                for j in used
-            ],
-        )
-        for k, cell in enumerate(data.cells)
-    ]
+def _kinds(data: Aggregate) -> list[int]:
+    """Return the kinds of jumps that any cell has."""
+    return np.flatnonzero(np.any([cell.jumps.number for cell in data.cells], axis=0)).tolist()
 
 
 def jumps(data: Aggregate) -> Table:
     """One row for each cell and kind: how many jumps, and their share of all drops."""
     columns = (
         *key_columns(data, attrgetter("cell")),
-        TableColumn("kind", attrgetter("kind"), "kind"),
-        TableColumn("scale", lambda of: "small" if of.small_scale else "large", "scale"),
+        TableColumn("kind", lambda of: JUMP_KINDS[of.place], "kind"),
+        TableColumn("scale", lambda of: "small" if SMALL[of.place] else "large", "scale"),
         TableColumn(
             "jumps_per_loop", lambda of: of.number / of.cell.done, "jumps a loop", number(3)
         ),
@@ -76,25 +72,24 @@ def jumps(data: Aggregate) -> Table:
         ),
         TableColumn("share_of_drops", attrgetter("share"), "share", percent),
     )
-    rows = [of for _, kinds in _kinds(data) for of in kinds if of.number]
-    return make_table("Jumps by kind", columns, rows)
+    every = (_Kind(cell, place) for cell in data.cells for place in _kinds(data))
+    return make_table("Jumps by kind", columns, (of for of in every if of.number))
 
 
 def shares_by_kind(data: Aggregate) -> Table:
     """Share of each kind in the drops, one row for each cell: :func:`jumps` at a glance."""
-    rows = _kinds(data)
     columns = (
-        *key_columns(data, itemgetter(0)),
+        *key_columns(data),
         *(
-            TableColumn(of.kind, partial(_share, j), of.kind, percent)
-            for j, of in enumerate(rows[0][1])
+            TableColumn(JUMP_KINDS[k], partial(_share, k), JUMP_KINDS[k], percent)
+            for k in _kinds(data)
         ),
     )
-    return make_table("Share of the drops by kind of the jump", columns, rows)
+    return make_table("Share of the drops by kind of the jump", columns, data.cells)
 
 
-def _share(j: int, row: tuple[Cell, list[_Kind]]) -> float | None:
-    return row[1][j].share
+def _share(place: int, cell: AveragedCell) -> float | None:
+    return _Kind(cell, place).share
 
 
 def mechanisms(data: Aggregate) -> Table:
@@ -105,14 +100,8 @@ def mechanisms(data: Aggregate) -> Table:
     """
     columns = (
         *key_columns(data),
-        TableColumn(
-            "small_scale_share", estimate("small_scale_share"), "small-scale share", percent
-        ),
-        TableColumn(
-            "small_scale_share_ci_low", estimate("small_scale_share", "low"), "95 % from", percent
-        ),
-        TableColumn(
-            "small_scale_share_ci_high", estimate("small_scale_share", "high"), "to", percent
+        *estimated(
+            *("small_scale_share", "value ci_low ci_high", "small-scale share", percent),
         ),
         TableColumn("jumps_per_loop", estimate("jump_count"), "jumps a loop", number(3)),
         TableColumn(
@@ -125,10 +114,8 @@ def mechanisms(data: Aggregate) -> Table:
             estimate("pull_off_stress", "sem"),
             *("s.e. (kPa)", number(2, unit=1e3)),
         ),
-        TableColumn(
-            "pull_off_penetration",
-            estimate("pull_off_penetration"),
-            *("last contact lost at Δ/h_max", number(3)),
+        *estimated(
+            *("pull_off_penetration", "value", "last contact lost at Δ/h_max", number(3)),
         ),
         TableColumn(
             "wall_time [s]",
@@ -164,16 +151,15 @@ def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
         TableColumn("slope_persson", lambda of: -(2 + of.cell.hurst), "-(2+H)", fixed(2)),
         TableColumn("slope_profile", lambda of: -(2 * of.cell.hurst + 1), "-(2H+1)", fixed(2)),
     )
-    fields = data.fields
     rows = [
         _State(
-            *(cell, branch, penetration, int(fields.in_contact[index, b, k])),
-            *fitted_slope(cell.plan, fields.psd_displacement[index, b, k]),
+            *(cell, branch, penetration, int(cell.fields.in_contact[b, k])),
+            *fitted_slope(cell.plan, cell.fields.psd_displacement[b, k]),
         )
-        for index, cell in enumerate(data.cells)
+        for cell in data.cells
         for branch in branches
         for b in (BRANCHES.index(branch),)
         for k, penetration in enumerate(cell.plan.penetration.tolist())
-        if fields.in_contact[index, b, k]
+        if cell.fields.in_contact[b, k]
     ]
     return make_table("Slope of the spectrum of the deformed surface", columns, rows)
