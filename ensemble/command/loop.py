@@ -19,8 +19,7 @@ from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, 
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.quantities import drive_text
-from adhesis.ensemble.reporter import StatusLine, following
+from adhesis.ensemble.reporter import following
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -29,19 +28,18 @@ from adhesis.ensemble.trace.options import (
     what_was_read,
 )
 from adhesis.solver.checks import plain
-from adhesis.solver.loading.loop import Progress, run_loop
+from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import field_nodes
 from adhesis.solver.loading.path import PathResult, run_path
 from adhesis.solver.loading.turning_points import run_loops
-from adhesis.solver.method import Branch, ContactState, Method, PathError
+from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem, strength_of
 from adhesis.solver.model.profile import Profile, profile_from_heights, self_affine_profile
 from adhesis.solver.registry import make_method
 
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
-_SECONDS_BETWEEN_LINES = 5.0
 _BELONGS_TO_TRACE = "{} belongs to --trace, which is not given"
 FIGURE_FORMATS = (".png", ".pdf", ".svg")
 _MATERIAL = {"work_of_adhesion": 0.04, "young": 1e6, "poisson": 0.5}
@@ -106,13 +104,8 @@ def execute(args: argparse.Namespace) -> int:
     if args.film is not None:
         with writing.output("--film", args.film):
             _film(results, args.film, args.quiet)
-    loops: tuple[LoopResult | PathResult, ...]
-    if isinstance(results, PathResult):
-        loops = (results,)
-        print(record.path_summary(results))
-    else:
-        loops = results
-        print("\n\n".join(map(record.loop_summary, results)))
+    loops = (results,) if isinstance(results, PathResult) else results
+    print("\n\n".join(map(record.summary, loops)))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
@@ -127,21 +120,12 @@ def execute(args: argparse.Namespace) -> int:
 def _run(
     args: argparse.Namespace, method: Method, cycle: Cycle
 ) -> tuple[LoopResult, ...] | PathResult:
-    step = cycle.top(method.problem) / cycle.load_steps
-    progress = None if args.quiet else _progress(step, cycle.control.is_load)
+    options: dict[str, Any] = {"load_steps": cycle.load_steps, "progress": not args.quiet}
     if cycle.is_path:
-        return run_path(
-            method,
-            cycle.points,
-            load_steps=cycle.load_steps,
-            out=cycle.out,
-            progress=progress,
-        )
+        return run_path(method, cycle.points, out=cycle.out, **options)
     if len(cycle.points) > 1:
-        turn = cycle.arguments(cycle.points)
-        return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turn)
-    turn = cycle.arguments(cycle.points[0])
-    return (run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn),)
+        return run_loops(method, **cycle.arguments(cycle.points), **options)
+    return (run_loop(method, **cycle.arguments(cycle.points[0]), **options),)
 
 
 # ---------------------------------------------------------------------- input
@@ -248,7 +232,7 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     warnings = []
     if np.all(np.isfinite(heights)):
         found = (closure_warning, few_heights_warning)
-        warnings = [text for make in found if (text := make(heights, str(args.heights)))]
+        warnings = [text for make in found if (text := make(heights, f"{args.heights}"))]
     return profile_from_heights(heights, args.period), warnings
 
 
@@ -337,22 +321,3 @@ def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool)
     result = results if isinstance(results, PathResult) else results[0]
     with nullcontext() if quiet else following("frames of the film") as show:
         film_of(result, progress=show).save(path, progress=show)
-
-
-# ---------------------------------------------------------------------- progress
-
-
-def _progress(step: float, load: bool) -> Progress:
-    """Return what reports the branch, the load step, the contact and the time on stderr."""
-    line = StatusLine(_SECONDS_BETWEEN_LINES)
-
-    def show(branch: Branch, drive: float, state: ContactState) -> None:
-        line.show(
-            lambda: (
-                f"{branch:<9} step {round(drive / step):>4}  {drive_text(drive, load)}  A/A0 "
-                f"{state.contact_fraction:.4f}  patches {state.patches:>4}  {line.seconds:.0f} s"
-            ),
-            last=branch == "unloading" and not state.patches,
-        )
-
-    return show

@@ -13,7 +13,6 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -272,22 +271,6 @@ def gamma_label(work_of_adhesion: float) -> str:
     return rf"$\gamma$ = {gamma_text(work_of_adhesion)}"
 
 
-@contextmanager
-def _without_shaping_tables() -> Iterator[None]:
-    """Leave out of a PDF's fonts what shapes text, which costs more than all else in them.
-
-    A PDF names its glyphs by number, so that no reader looks there. The list does not belong to
-    fontTools' interface: where there is none, a PDF takes longer and is a little larger.
-    """
-    options: Any = import_module("fontTools.subset").Options  # matplotlib's own dependency
-    dropped = getattr(options, "_drop_tables_default", [])
-    options._drop_tables_default = [*dropped, "GSUB", "GPOS", "GDEF"]
-    try:
-        yield
-    finally:
-        options._drop_tables_default = dropped
-
-
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """Save a figure as PNG (300 dpi) and PDF; the same figure gives the same bytes.
 
@@ -295,11 +278,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """
     png, pdf = stem.with_suffix(".png"), stem.with_suffix(".pdf")
     # What no layout engine means: savefig, too, sets it again.
-    with (
-        style(),
-        _without_shaping_tables(),
-        mpl.rc_context({"figure.constrained_layout.use": False}),
-    ):
+    with style(), mpl.rc_context({"figure.constrained_layout.use": False}):
         FigureCanvasAgg(figure)
         figure.set_dpi(mpl.rcParams["savefig.dpi"])
         engine = figure.get_layout_engine()
