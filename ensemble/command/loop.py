@@ -49,8 +49,7 @@ _MOST_FIELD_VALUES = 2**26
 
 def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
-    taken = _defaults_taken(args)
-    _set_material(args)
+    taken = _take_defaults(args)
     _check_files(args)
     with refused_as_input(vars(args), thickness="layer"):
         profile, warnings = _profile(args)
@@ -87,7 +86,7 @@ def execute(args: argparse.Namespace) -> int:
     if args.json is not None:
         with writing.output("--json", args.json):
             numbers = record.document(results, warnings)
-            seed = (args.seed or 0) if source is None else None
+            seed = args.seed if source is None else None
             numbers["provenance"] = provenance(args.words, source, seed, numbers)
             write_json(args.json, numbers)
     if args.csv is not None:
@@ -131,33 +130,31 @@ def _run(
 # ---------------------------------------------------------------------- input
 
 
-def _defaults_taken(args: argparse.Namespace) -> list[str]:
-    """Return the options whose defaults make the profile and the material of ``--hurst``."""
-    if args.hurst is None:
-        return []
-    taken: dict[str, Any] = {"period": f"{1e3 * PERIOD:.5g}mm", "n0": N0, "ratio": RATIO, "seed": 0}
-    if args.m2 is None and args.c0 is None:
-        taken["h_rms"] = f"{1e6 * H_RMS:g}um"
-    return [
-        f"--{name.replace('_', '-')} {plain(value) if isinstance(value, float) else value}"
-        for name, value in {**taken, **_MATERIAL}.items()
-        if getattr(args, name) is None
-    ]
+def _take_defaults(args: argparse.Namespace) -> list[str]:
+    """Set what ``--hurst`` leaves open of profile and material; return it as options.
 
-
-def _set_material(args: argparse.Namespace) -> None:
-    """Set the material's defaults; with heights or a trace of one's own there are none."""
-    missing = [name for name in _MATERIAL if getattr(args, name) is None]
-    given_source = "--heights" if args.heights else "--trace" if args.trace else ""
-    if given_source and missing:
-        options = ", ".join("--" + name.replace("_", "-") for name in missing)
-        verb = "is" if len(missing) == 1 else "are"
+    With heights or a trace of one's own the material has no defaults (InputError).
+    """
+    if args.hurst is not None:
+        texts = {"period": f"{1e3 * PERIOD:.5g}mm", "h_rms": f"{1e6 * H_RMS:g}um"}
+        defaults: dict[str, Any] = {"period": PERIOD, "n0": N0, "ratio": RATIO, "seed": 0}
+        if args.m2 is None and args.c0 is None:
+            defaults["h_rms"] = H_RMS
+        taken = []
+        for name, value in {**defaults, **_MATERIAL}.items():
+            if getattr(args, name) is None:
+                setattr(args, name, value)
+                text = plain(value) if isinstance(value, float) else value
+                taken.append(f"--{name.replace('_', '-')} {texts.get(name, text)}")
+        return taken
+    missing = [f"--{n.replace('_', '-')}" for n in _MATERIAL if getattr(args, n) is None]
+    if missing and (args.heights or args.trace):
         raise InputError(
-            f"{options} {verb} missing: with {given_source} the material has to be given "
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing: with "
+            f"{'--heights' if args.heights else '--trace'} the material has to be given "
             "(--work-of-adhesion in J/m², --young in Pa, --poisson)"
         )
-    for name in missing:
-        setattr(args, name, _MATERIAL[name])
+    return []
 
 
 def _check_files(args: argparse.Namespace) -> None:
@@ -241,14 +238,12 @@ def _self_affine(args: argparse.Namespace) -> Profile:
     several = [f"--{n.replace('_', '-')}" for n, value in norms.items() if value is not None]
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)} are given: give one of --h-rms, --m2 and --c0")
-    if all(value is None for value in norms.values()):
-        norms["h_rms"] = H_RMS
     return self_affine_profile(
         args.hurst,
-        period=PERIOD if args.period is None else args.period,
-        n0=N0 if args.n0 is None else args.n0,
-        ratio=RATIO if args.ratio is None else args.ratio,
-        seed=0 if args.seed is None else args.seed,
+        period=args.period,
+        n0=args.n0,
+        ratio=args.ratio,
+        seed=args.seed,
         amplitudes=args.amplitudes or "deterministic",
         **norms,
     )
