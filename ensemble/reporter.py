@@ -113,24 +113,17 @@ class Bar(Protocol):
 
 
 @contextmanager
-def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
-    """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals and a last one.
-
-    ``remaining`` estimates the time that is left, from the pace so far.
-    """
+def bar(what: str) -> Iterator[Bar]:
+    """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals and a last one."""
     line = StatusLine(_EVERY)
     shown = what
 
     def show(done: float | None, total: float | None, text: str = "") -> None:
         nonlocal shown
         parts = [text or what]
-        share = done / total if done is not None and total else None
-        if share is not None:
-            parts.append(f"[{'#' * round(_CELLS * share):.<{_CELLS}}]")
-        parts.append(duration(line.seconds))
-        if remaining and share and share < 1:
-            parts.append(f"about {duration(line.seconds * (1 / share - 1))} left")
-        shown = "  ".join(parts)
+        if done is not None and total:
+            parts.append(f"[{'#' * round(_CELLS * done / total):.<{_CELLS}}]")
+        shown = "  ".join([*parts, duration(line.seconds)])
         line.show(lambda: shown)
 
     try:

@@ -15,10 +15,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
@@ -27,8 +29,7 @@ from adhesis.ensemble.versions import commit, versions  # noqa: E402  # needs th
 
 BESIDE = tuple(sorted((ROOT / "jobs" / "beside").glob("*.toml")))
 KEPT = (".png", ".csv", ".md")  # PDF, NetCDF and HTML are made anew by whoever wants them
-_IMAGE_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"
-_NAME = b"Source\x00"
+_NAME = "Source"
 
 
 @dataclass(frozen=True)
@@ -67,22 +68,14 @@ def _paper() -> tuple[str, ...]:
     )
 
 
+_DRAWN = ("loop", "structure", "zero_range", "opening", "one_asperity", "two_scales", "two_methods")
 PARTS = {
-    "loop": Part(("docs/figures/loop.py OUT/loop.png",), "loop.png", "figures"),
-    "structure": Part(("docs/figures/structure.py OUT/structure.png",), "structure.png", "figures"),
-    "zero-range": Part(
-        ("docs/figures/zero_range.py OUT/zero_range.png",), "zero_range.png", "figures"
-    ),
-    "opening": Part(("docs/figures/opening.py OUT/opening.png",), "opening.png", "figures"),
-    "one-asperity": Part(
-        ("docs/figures/one_asperity.py OUT/one_asperity.png",), "one_asperity.png", "figures"
-    ),
-    "two-scales": Part(
-        ("docs/figures/two_scales.py OUT/two_scales.png",), "two_scales.png", "figures"
-    ),
-    "two-methods": Part(
-        ("docs/figures/two_methods.py OUT/two_methods.png",), "two_methods.png", "figures"
-    ),
+    **{
+        name.replace("_", "-"): Part(
+            (f"docs/figures/{name}.py OUT/{name}.png",), f"{name}.png", "figures"
+        )
+        for name in _DRAWN
+    },
     "tutorial": Part(
         ("-m tools.transcripts docs/tutorial.md --keep OUT",), "first_*.png", "figures"
     ),
@@ -96,31 +89,17 @@ PARTS = {
 
 def stamp(path: Path, text: str) -> None:
     """Put a text into a PNG, in place of an older one."""
-    data = path.read_bytes()
-    old = _place(data)
-    if old is not None:
-        data = data[: old[0]] + data[old[1] :]
-    body = b"tEXt" + _NAME + text.encode("latin-1", "replace")
-    chunk = (len(body) - 4).to_bytes(4, "big") + body + zlib.crc32(body).to_bytes(4, "big")
-    if not data.endswith(_IMAGE_END):
-        raise ValueError(f"{path} is no PNG")
-    path.write_bytes(data[: -len(_IMAGE_END)] + chunk + _IMAGE_END)
+    about = PngInfo()
+    about.add_text(_NAME, text)
+    with Image.open(path) as picture:
+        picture.save(path, pnginfo=about, dpi=picture.info.get("dpi"))
 
 
 def stamped(path: Path) -> str | None:
     """Return the text that :func:`stamp` put there, None without one."""
-    data = path.read_bytes()
-    place = _place(data)
-    return (
-        None if place is None else data[place[0] + 8 + len(_NAME) : place[1] - 4].decode("latin-1")
-    )
-
-
-def _place(data: bytes) -> tuple[int, int] | None:
-    start = data.find(b"tEXt" + _NAME)
-    if start < 0:
-        return None
-    return start - 4, start + 8 + int.from_bytes(data[start - 4 : start], "big")
+    with Image.open(path) as picture:
+        text: str | None = picture.info.get(_NAME)
+    return text
 
 
 def figures(part: Part) -> list[Path]:
@@ -163,15 +142,6 @@ def make(name: str, ranks: int) -> None:
         print(f"{path.relative_to(ROOT)} removed", flush=True)
 
 
-def stamps() -> dict[str, str | None]:
-    """Return the stamp of each figure, by its place."""
-    return {
-        str(path.relative_to(ROOT)): stamped(path)
-        for part in PARTS.values()
-        for path in figures(part)
-    }
-
-
 def main(words: Sequence[str] | None = None) -> int:
     """Make or check; returns 1 if a check finds one without a stamp."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0], allow_abbrev=False)
@@ -180,9 +150,9 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="only say of which commit each is")
     args = parser.parse_args(words)
     if args.check:
-        found = stamps()
+        found = {path: stamped(path) for part in PARTS.values() for path in figures(part)}
         for path, text in found.items():
-            print(f"{path}: {text or 'not stamped'}")
+            print(f"{path.relative_to(ROOT)}: {text or 'not stamped'}")
         return 0 if all(found.values()) else 1
     for name in args.parts or PARTS:
         make(name, args.ranks)

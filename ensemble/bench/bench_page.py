@@ -62,19 +62,16 @@ def page(
     made_by: str,
 ) -> str:
     """Return the Markdown page: a table for each scene, the ratios, the growth."""
-    parts = [f"Made by {made_by}.", ""]
+    parts = [f"Made by {made_by}."]
     for scene in dict.fromkeys(line.run.scene for line in lines):
         chosen = [line for line in lines if line.run.scene is scene]
-        parts += [f"### {scene.title[0].upper()}{scene.title[1:]}", ""]
         parts += [
+            f"### {scene.title[0].upper()}{scene.title[1:]}",
             f"Δ~max = {scene.max_penetration:g}, {scene.load_steps} load steps. "
             f"Reference: {chosen[0].reference.text}.",
-            "",
             _table(LINE_COLUMNS, (cells(line, LINE_COLUMNS) for line in chosen)),
-            "",
         ]
     if compared:
-        parts += ["### CPU time of grid over sharp at equal error", ""]
         rows = [
             [
                 ratio.line.run.scene.title,
@@ -85,12 +82,11 @@ def page(
             ]
             for ratio in compared
         ]
-        parts += [_table(_RATIO_COLUMNS, rows), ""]
+        parts += ["### CPU time of grid over sharp at equal error", _table(_RATIO_COLUMNS, rows)]
     if grown:
-        parts += ["### How the cost grows", ""]
-        parts += [_table(GROWTH_COLUMNS, (cells(line, GROWTH_COLUMNS) for line in grown)), ""]
+        rows = [cells(line, GROWTH_COLUMNS) for line in grown]
+        parts += ["### How the cost grows", _table(GROWTH_COLUMNS, rows)]
     if fitted:
-        parts += ["### Exponents of the growth of sharp", ""]
         rows = [
             [
                 *(one.among, one.variable, str(one.least), str(one.most)),
@@ -98,8 +94,8 @@ def page(
             ]
             for one in fitted
         ]
-        parts += [_table(_EXPONENT_COLUMNS, rows), ""]
-    return "\n".join(parts)
+        parts += ["### Exponents of the growth of sharp", _table(_EXPONENT_COLUMNS, rows)]
+    return "\n\n".join(parts) + "\n"
 
 
 def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.ensemble.bench.measure import Measured, Measurement, Run, measure
-from adhesis.ensemble.bench.scenes import FULL, GROWTH, Scene
+from adhesis.ensemble.bench.scenes import FULL, Scene
 from adhesis.ensemble.bench.tamaas import has_tamaas
 
 # Doubling the nodes multiplies the time of a grid run by up to this factor.
@@ -112,22 +112,10 @@ def benchmark(
     return lines
 
 
-def growth(*, seconds: float = 360.0, on_line: Callable[[Line], None] | None = None) -> list[Line]:
-    """Measure the growth of cost; these lines have no reference and no error."""
-    unknown = Reference(math.nan, "none")
-    lines: list[Line] = []
-    for scene in GROWTH:
-        for run in sorted(_runs(scene, seconds), key=lambda run: run.method == "grid"):
-            lines.append(Line(run, unknown, measure(run)))
-            if on_line is not None:
-                on_line(lines[-1])
-    return lines
-
-
 def exponents(lines: Sequence[Line]) -> list[Exponent]:
     """Fit the growth of the CPU time of ``sharp`` with its patches, and with the wave numbers.
 
-    A series is made of the finished lines of :func:`growth` that differ in γ alone, or in the
+    A series is made of finished lines on scenes of growth that differ in γ alone, or in the
     highest harmonic alone.
     """
     done = [line for line in lines if line.run.method == "sharp" and not line.measured.note]
@@ -245,4 +233,4 @@ def _reference(scene: Scene, seconds: float) -> Reference:
         if math.isfinite(loss):
             text = f"sharp, accuracy {run.described}, {run.load_steps} load steps"
             return Reference(loss, text)
-    return Reference(math.nan, "none: no reference run finished")
+    return Reference(math.nan, "none: no reference run finished" if scene.tightest else "none")

@@ -121,14 +121,14 @@ def _numbers(run: Run) -> dict[str, Any]:
     """Run the loop; return its numbers."""
     if run.method == "tamaas":
         problem = run.scene.problem()
-        found = tamaas_loop(
+        loss, states = tamaas_loop(
             problem,
             reach=run.setting * problem.profile.h_max,
             max_penetration=run.scene.max_penetration,
             load_steps=run.load_steps,
         )
-        scaled = found.loss / problem.loss_scale
-        return {"loss": found.loss, "loss_dimensionless": scaled, "solutions": found.states}
+        scaled = loss / problem.loss_scale
+        return {"loss": loss, "loss_dimensionless": scaled, "solutions": states}
     loop = _loop(run.method, run.scene, run.setting, run.load_steps)
     same = ("loss", "loss_dimensionless", "audit_residual")
     return {name: getattr(loop, name) for name in same} | {

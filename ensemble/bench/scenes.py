@@ -38,7 +38,7 @@ class Scene:
     name: str
     title: str
     # A cos(q0 x), the same with a ripple, or self-affine (H = 0.8, h_rms = 1 µm, seed 1)
-    shape: Shape
+    shape: Shape = "rough"
     work_of_adhesion: float = 0.0  # γ in J/m²; not read for one wave, where it follows from α = 0.2
     max_penetration: float = 0.9
     load_steps: int = 40  # steps from first touch to ``max_penetration`` (Δ~max)
@@ -105,7 +105,6 @@ TWO_WAVES = Scene(
 SMALL_ROUGH = Scene(
     name="rough-32",
     title="rough, m = 2 … 32, γ = 0.01",
-    shape="rough",
     work_of_adhesion=0.01,
     load_steps=20,
     n0=2,
@@ -117,7 +116,6 @@ SMALL_ROUGH = Scene(
 ROUGH = Scene(
     name="rough-250",
     title="rough, m = 10 … 250, γ = 0.01",
-    shape="rough",
     work_of_adhesion=0.01,
     n0=10,
     ratio=25,
@@ -128,7 +126,6 @@ ROUGH = Scene(
 PAPER = Scene(
     name="paper",
     title="the paper's scale, m = 10 … 1000, γ = 0.04",
-    shape="rough",
     work_of_adhesion=0.04,
     n0=10,
     ratio=100,
@@ -151,7 +148,6 @@ GROWTH = tuple(
     Scene(
         name=f"growth-{10 * ratio}-{gamma:g}",
         title=f"rough, m = 10 … {10 * ratio}, γ = {gamma:g}",
-        shape="rough",
         work_of_adhesion=gamma,
         n0=10,
         ratio=ratio,
@@ -166,7 +162,6 @@ GROWTH = tuple(
 WARM_UP = Scene(
     name="warm-up",
     title="warm-up",
-    shape="rough",
     work_of_adhesion=0.02,
     load_steps=4,
     n0=2,

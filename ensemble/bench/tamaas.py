@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,14 +27,6 @@ _START = 6.0
 _MAX_STROKES = 20
 
 
-@dataclass(frozen=True)
-class TamaasLoop:
-    """Loss in J/m² of nominal area, and number of states."""
-
-    loss: float
-    states: int
-
-
 def has_tamaas() -> bool:
     """Return whether tamaas is installed."""
     return importlib.util.find_spec("tamaas") is not None
@@ -50,10 +41,11 @@ def nodes_for(problem: Problem, reach: float) -> int:
 
 def tamaas_loop(
     problem: Problem, *, reach: float, max_penetration: float, load_steps: int
-) -> TamaasLoop:
+) -> tuple[float, int]:
     """Run one complete loop at fixed separations with adhesion of the range ``reach`` (m).
 
-    RuntimeError if the contact has not detached after twenty loading strokes.
+    Returns its loss in J/m² of nominal area and the number of states. RuntimeError if the contact
+    has not detached after twenty loading strokes.
     """
     solver = _Continuation(importlib.import_module("tamaas"), problem, reach)
     h_max = problem.profile.h_max
@@ -79,7 +71,7 @@ def tamaas_loop(
     s, stress = np.array(separations), np.array(stresses)
     closed = s <= s[-1] * (1 + 1e-9)
     loss = -float(np.trapezoid(stress[closed], s[closed]))
-    return TamaasLoop(loss, s.size)
+    return loss, s.size
 
 
 class _Continuation:

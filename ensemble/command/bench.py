@@ -7,13 +7,12 @@ does not count. The full benchmark takes three quarters of an hour, --quick less
 from __future__ import annotations
 
 import argparse
-import math
 import platform
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import following
 
@@ -41,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="small scenes only, under a minute")
     parser.add_argument(
         "--budget",
-        type=float,
+        type=within(1e-9, 1e9, "a positive number of seconds"),
         default=360.0,
         metavar="SECONDS",
         help="CPU time after which a run is given up (default 360)",
@@ -53,12 +52,11 @@ def execute(args: argparse.Namespace) -> int:
     from rich.console import Console
 
     from adhesis.ensemble.bench.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, RECORD, cells, page
-    from adhesis.ensemble.bench.equal_error import benchmark, exponents, growth, ratios
-    from adhesis.ensemble.bench.scenes import FULL, QUICK
+    from adhesis.ensemble.bench.equal_error import benchmark, exponents, ratios
+    from adhesis.ensemble.bench.scenes import FULL, GROWTH, QUICK
     from adhesis.ensemble.report.tables.table import make_table, rich_table
+    from adhesis.ensemble.versions import processor
 
-    if not (math.isfinite(args.budget) and args.budget > 0):
-        raise InputError(f"--budget is {args.budget!r}: it must be a positive number of seconds")
     check_output_folder("--to", args.to, _FILES, {})
     # A file or a pipe has no width of its own; the tables need this one.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
@@ -70,8 +68,10 @@ def execute(args: argparse.Namespace) -> int:
                 print(run.scene.name, *cells(line, LINE_COLUMNS), sep="  ", file=sys.stderr)
             show_run(None, None, f"{run.scene.title}: {run.method}, {run.described}")
 
-        lines = benchmark(QUICK if args.quick else FULL, seconds=args.budget, on_line=show)
-        grown = [] if args.quick else growth(seconds=args.budget, on_line=show)
+        scenes = QUICK if args.quick else (*FULL, *GROWTH)
+        measured = benchmark(scenes, seconds=args.budget, on_line=show)
+    lines = [line for line in measured if line.run.scene not in GROWTH]
+    grown = [line for line in measured if line.run.scene in GROWTH]
     for scene in dict.fromkeys(line.run.scene for line in lines):
         chosen = [line for line in lines if line.run.scene is scene]
         title = f"{scene.title}; reference: {chosen[0].reference.text}"
@@ -81,31 +81,17 @@ def execute(args: argparse.Namespace) -> int:
         rows = [cells(line, GROWTH_COLUMNS) for line in grown]
         console.print(rich_table("How the cost grows", GROWTH_COLUMNS, rows, slice(2, None)))
     compared = ratios(lines)
+    machine = f"one core of {processor()}, Python {platform.python_version()}"
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
-    text = page(lines, grown, compared, exponents(grown), f"`{command}` on {_machine()}")
-    writing = Writing()
-    with writing.output("the benchmark in", args.to), staged_folder(args.to) as folder:
-        make_table("", RECORD, [*lines, *grown]).write_csv(folder / "benchmark.csv")
-        (folder / "benchmark.md").write_text(text, encoding="utf-8")
-        _draw(lines, folder / "benchmark")
-    writing.finish()
-    console.print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
-    return 0
-
-
-def _draw(lines: list[Line], stem: Path) -> None:
-    from adhesis.ensemble.bench.bench_figure import (
-        draw,  # matplotlib only when everything is measured
-    )
+    text = page(lines, grown, compared, exponents(grown), f"`{command}` on {machine}")
+    from adhesis.ensemble.bench.bench_figure import draw  # matplotlib, when all is measured
     from adhesis.ensemble.report.figures.style import save
 
-    save(draw(lines), stem)
-
-
-def _machine() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            name = next(line.split(":")[1].strip() for line in file if "model name" in line)
-    except (OSError, StopIteration):
-        name = platform.processor() or platform.machine()
-    return f"one core of {name}, Python {platform.python_version()}"
+    writing = Writing()
+    with writing.output("the benchmark in", args.to), staged_folder(args.to) as folder:
+        make_table("", RECORD, measured).write_csv(folder / "benchmark.csv")
+        (folder / "benchmark.md").write_text(text, encoding="utf-8")
+        save(draw(lines), folder / "benchmark")
+    writing.finish()
+    print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
+    return 0

@@ -19,8 +19,7 @@ from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, 
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.quantities import drive_text
-from adhesis.ensemble.reporter import StatusLine, following
+from adhesis.ensemble.reporter import following
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -33,15 +32,13 @@ from adhesis.solver.loading.loop import run_loop, run_loops
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import field_nodes
 from adhesis.solver.loading.path import PathResult, run_path
-from adhesis.solver.loading.path_record import Progress
-from adhesis.solver.method import Branch, ContactState, Method, PathError
+from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem, strength_of
 from adhesis.solver.model.profile import Profile, profile_from_heights, self_affine_profile
 from adhesis.solver.registry import make_method
 
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
-_SECONDS_BETWEEN_LINES = 5.0
 _BELONGS_TO_TRACE = "{} belongs to --trace, which is not given"
 FIGURE_FORMATS = (".png", ".pdf", ".svg")
 _MATERIAL = {"work_of_adhesion": 0.04, "young": 1e6, "poisson": 0.5}
@@ -51,8 +48,7 @@ _MOST_FIELD_VALUES = 2**26
 
 def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
-    taken = _defaults_taken(args)
-    _set_material(args)
+    taken = _take_defaults(args)
     _check_files(args)
     with refused_as_input(vars(args), thickness="layer"):
         profile, warnings = _profile(args)
@@ -89,7 +85,7 @@ def execute(args: argparse.Namespace) -> int:
     if args.json is not None:
         with writing.output("--json", args.json):
             numbers = record.document(results, warnings)
-            seed = (args.seed or 0) if source is None else None
+            seed = args.seed if source is None else None
             numbers["provenance"] = provenance(args.words, source, seed, numbers)
             write_json(args.json, numbers)
     if args.csv is not None:
@@ -106,13 +102,8 @@ def execute(args: argparse.Namespace) -> int:
     if args.film is not None:
         with writing.output("--film", args.film):
             _film(results, args.film, args.quiet)
-    loops: tuple[LoopResult | PathResult, ...]
-    if isinstance(results, PathResult):
-        loops = (results,)
-        print(record.path_summary(results))
-    else:
-        loops = results
-        print("\n\n".join(map(record.loop_summary, results)))
+    loops = (results,) if isinstance(results, PathResult) else results
+    print("\n\n".join(map(record.summary, loops)))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
@@ -127,53 +118,42 @@ def execute(args: argparse.Namespace) -> int:
 def _run(
     args: argparse.Namespace, method: Method, cycle: Cycle
 ) -> tuple[LoopResult, ...] | PathResult:
-    step = cycle.top(method.problem) / cycle.load_steps
-    progress = None if args.quiet else _progress(step, cycle.control.is_load)
+    options: dict[str, Any] = {"load_steps": cycle.load_steps, "progress": not args.quiet}
     if cycle.is_path:
-        return run_path(
-            method,
-            cycle.points,
-            load_steps=cycle.load_steps,
-            out=cycle.out,
-            progress=progress,
-        )
+        return run_path(method, cycle.points, out=cycle.out, **options)
     if len(cycle.points) > 1:
-        turn = cycle.arguments(cycle.points)
-        return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turn)
-    turn = cycle.arguments(cycle.points[0])
-    return (run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn),)
+        return run_loops(method, **cycle.arguments(cycle.points), **options)
+    return (run_loop(method, **cycle.arguments(cycle.points[0]), **options),)
 
 
 # ---------------------------------------------------------------------- input
 
 
-def _defaults_taken(args: argparse.Namespace) -> list[str]:
-    """Return the options whose defaults make the profile and the material of ``--hurst``."""
-    if args.hurst is None:
-        return []
-    taken: dict[str, Any] = {"period": f"{1e3 * PERIOD:.5g}mm", "n0": N0, "ratio": RATIO, "seed": 0}
-    if args.m2 is None and args.c0 is None:
-        taken["h_rms"] = f"{1e6 * H_RMS:g}um"
-    return [
-        f"--{name.replace('_', '-')} {plain(value) if isinstance(value, float) else value}"
-        for name, value in {**taken, **_MATERIAL}.items()
-        if getattr(args, name) is None
-    ]
+def _take_defaults(args: argparse.Namespace) -> list[str]:
+    """Set what ``--hurst`` leaves open of profile and material; return it as options.
 
-
-def _set_material(args: argparse.Namespace) -> None:
-    """Set the material's defaults; with heights or a trace of one's own there are none."""
-    missing = [name for name in _MATERIAL if getattr(args, name) is None]
-    given_source = "--heights" if args.heights else "--trace" if args.trace else ""
-    if given_source and missing:
-        options = ", ".join("--" + name.replace("_", "-") for name in missing)
-        verb = "is" if len(missing) == 1 else "are"
+    With heights or a trace of one's own the material has no defaults (InputError).
+    """
+    if args.hurst is not None:
+        texts = {"period": f"{1e3 * PERIOD:.5g}mm", "h_rms": f"{1e6 * H_RMS:g}um"}
+        defaults: dict[str, Any] = {"period": PERIOD, "n0": N0, "ratio": RATIO, "seed": 0}
+        if args.m2 is None and args.c0 is None:
+            defaults["h_rms"] = H_RMS
+        taken = []
+        for name, value in {**defaults, **_MATERIAL}.items():
+            if getattr(args, name) is None:
+                setattr(args, name, value)
+                text = plain(value) if isinstance(value, float) else value
+                taken.append(f"--{name.replace('_', '-')} {texts.get(name, text)}")
+        return taken
+    missing = [f"--{n.replace('_', '-')}" for n in _MATERIAL if getattr(args, n) is None]
+    if missing and (args.heights or args.trace):
         raise InputError(
-            f"{options} {verb} missing: with {given_source} the material has to be given "
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing: with "
+            f"{'--heights' if args.heights else '--trace'} the material has to be given "
             "(--work-of-adhesion in J/m², --young in Pa, --poisson)"
         )
-    for name in missing:
-        setattr(args, name, _MATERIAL[name])
+    return []
 
 
 def _check_files(args: argparse.Namespace) -> None:
@@ -248,7 +228,7 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     warnings = []
     if np.all(np.isfinite(heights)):
         found = (closure_warning, few_heights_warning)
-        warnings = [text for make in found if (text := make(heights, str(args.heights)))]
+        warnings = [text for make in found if (text := make(heights, f"{args.heights}"))]
     return profile_from_heights(heights, args.period), warnings
 
 
@@ -257,14 +237,12 @@ def _self_affine(args: argparse.Namespace) -> Profile:
     several = [f"--{n.replace('_', '-')}" for n, value in norms.items() if value is not None]
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)} are given: give one of --h-rms, --m2 and --c0")
-    if all(value is None for value in norms.values()):
-        norms["h_rms"] = H_RMS
     return self_affine_profile(
         args.hurst,
-        period=PERIOD if args.period is None else args.period,
-        n0=N0 if args.n0 is None else args.n0,
-        ratio=RATIO if args.ratio is None else args.ratio,
-        seed=0 if args.seed is None else args.seed,
+        period=args.period,
+        n0=args.n0,
+        ratio=args.ratio,
+        seed=args.seed,
         amplitudes=args.amplitudes or "deterministic",
         **norms,
     )
@@ -337,22 +315,3 @@ def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool)
     result = results if isinstance(results, PathResult) else results[0]
     with nullcontext() if quiet else following("frames of the film") as show:
         film_of(result, progress=show).save(path, progress=show)
-
-
-# ---------------------------------------------------------------------- progress
-
-
-def _progress(step: float, load: bool) -> Progress:
-    """Return what reports the branch, the load step, the contact and the time on stderr."""
-    line = StatusLine(_SECONDS_BETWEEN_LINES)
-
-    def show(branch: Branch, drive: float, state: ContactState) -> None:
-        line.show(
-            lambda: (
-                f"{branch:<9} step {round(drive / step):>4}  {drive_text(drive, load)}  A/A0 "
-                f"{state.contact_fraction:.4f}  patches {state.patches:>4}  {line.seconds:.0f} s"
-            ),
-            last=branch == "unloading" and not state.patches,
-        )
-
-    return show

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from pathlib import Path, PosixPath
 from typing import Any, NoReturn
 
 from adhesis.ensemble.errors import InputError, quoted
+from adhesis.ensemble.escape import printable
 
 _GIVEN = "_given"  # of a namespace: the options so far
 
@@ -28,7 +29,8 @@ class Parser(argparse.ArgumentParser):
         )
         for action in (None, "store"):
             self.register("action", action, _StoreOnce)
-        for kind, convert in ((None, _text), (int, _whole_number), (float, _number), (Path, _path)):
+        whole = within(-math.inf, math.inf, "a whole number", int)
+        for kind, convert in ((None, _text), (int, whole), (float, _number), (Path, _path)):
             self.register("type", kind, convert)
 
     def parse(self, words: Sequence[str]) -> argparse.Namespace:
@@ -83,13 +85,6 @@ def _text(value: str) -> str:
     return value
 
 
-def _whole_number(value: str) -> int:
-    try:
-        return int(value)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"is {quoted(value)}: it must be a whole number") from None
-
-
 def _number(value: str) -> float:
     try:
         return float(value)  # NaN too: the rule of the quantity refuses it
@@ -119,4 +114,11 @@ def _path(value: str) -> Path:
         raise argparse.ArgumentTypeError(
             f"is {quoted(value)}: it must be the name of a file or directory"
         )
-    return Path(value)
+    return _Named(value)
+
+
+class _Named(PosixPath):
+    """A path that was given; a message that names it spells out its control characters."""
+
+    def __format__(self, form: str) -> str:
+        return format(printable(str(self)), form)

@@ -18,10 +18,17 @@ from adhesis.ensemble.quantities import (
     words_of,
 )
 from adhesis.ensemble.reporter import StatusLine
-from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
+from adhesis.ensemble.trace.answer import (
+    FIGURE_FILES,
+    FILES,
+    NoAnswer,
+    check,
+    document,
+    make_cycle,
+    run_plan,
+)
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
-from adhesis.ensemble.trace.page_files import FIGURE_FILES, FILES
 from adhesis.ensemble.trace.variants import Plan, make_plan
 from adhesis.solver.model.half_space import HalfSpace
 

@@ -48,13 +48,6 @@ class Cycle(Turns):
         """Return the arguments of ``run_loop`` or ``run_loops`` for some of the points."""
         return turn_arguments(self.control, points, self.are_preloads, self.latest)
 
-    def top(self, problem: Problem) -> float:
-        """Return the prescribed value of the last load step; ValueError as in :meth:`check`."""
-        largest = max(self.points)
-        if self.are_preloads:
-            return latest_turn(problem, largest, self.latest)
-        return largest
-
     def check(self, problem: Problem) -> None:
         """Check that the cycle can be followed; the ValueError gives the rule that it breaks."""
         if self.is_path:

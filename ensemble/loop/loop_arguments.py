@@ -66,8 +66,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in Pa, or 1MPa (likewise; with --hurst 1e6)",
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
-    trace_arguments.add_open_argument(contact)
-    trace_arguments.add_measure_argument(contact)
     trace_arguments.add_cycle_arguments(contact)
     contact.add_argument(
         "--path",

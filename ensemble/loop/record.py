@@ -79,6 +79,11 @@ def _displacement(result: LoopResult | PathResult) -> dict[str, Any]:
     return {"displacement": (far / h_max).tolist()}
 
 
+def summary(result: LoopResult | PathResult) -> str:
+    """Return a loop or path in a few lines for the terminal."""
+    return path_summary(result) if isinstance(result, PathResult) else loop_summary(result)
+
+
 def path_summary(result: PathResult) -> str:
     """Return a path in a few lines for the terminal."""
     way = ", ".join(f"{point:g}" for point in result.turning_points)

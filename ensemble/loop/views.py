@@ -13,11 +13,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble.loop.record import summary
 from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.quantities import (
     UNITS,
     drive_text,
-    in_works_of_adhesion,
     stress_text,
     with_units,
 )
@@ -84,7 +84,8 @@ def page(shown: Any) -> str:
     from adhesis.ensemble.report.html import picture_of, table_of
 
     if isinstance(shown, LoopResult | PathResult):
-        return table_of(_rows_of_result(shown)) + picture_of(plot(shown))
+        rows = _rows_of_summary(summary(shown)) + [("warning", text) for text in shown.warnings]
+        return table_of(rows) + picture_of(plot(shown))
     figure = draw_shape(shown)
     return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))
 
@@ -101,8 +102,7 @@ def trace_page(answer: Answer) -> str:
     from adhesis.ensemble.report.html import picture_of, table_of
     from adhesis.ensemble.trace.figures import draw_loop
 
-    rows = [line.split(maxsplit=1) for line in str(answer).splitlines()]
-    return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
+    return table_of(_rows_of_summary(str(answer))) + picture_of(draw_loop(answer))
 
 
 def write_trace_page(answer: Answer, folder: str | os.PathLike[str]) -> Path:
@@ -127,29 +127,9 @@ def table_of_runs(answer: Answer) -> Any:
     return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
 
 
-def _rows_of_result(result: Result) -> list[tuple[str, str]]:
-    """Return the main numbers of a loop or path."""
-    problem = result.problem
-    is_loop = isinstance(result, LoopResult)
-    rows = [
-        (
-            "loss" if is_loop else "work",
-            f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²"
-            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)}"
-            f"{f'; {result.loss_note}' if result.loss_note else ''}",
-        ),
-        ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
-        *(("friction", text) for text in (result.friction_summary(),) if text),
-        ("jumps", str(len(result.jumps))),
-        ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),
-        ("h_max", f"{problem.profile.h_max:.4g} m"),
-        ("largest contact fraction A/A0", f"{result.largest_contact_fraction:.4g}"),
-        ("method", result.method.name),
-    ]
-    if isinstance(result, LoopResult):
-        rows.insert(3, ("pull-off stress", f"{result.pull_off_stress:.4g} Pa"))
-        rows.insert(1, ("turns at", result.turning_text))
-    return rows + [("warning", text) for text in result.warnings]
+def _rows_of_summary(text: str) -> list[tuple[str, str]]:
+    """Return the lines of a summary for the terminal as rows."""
+    return [(line[:12].strip(), line[12:]) for line in text.splitlines()]
 
 
 # By class: what the figure shows, and what is shown beside the fields.
@@ -193,7 +173,10 @@ def progress_bar(top: float, load: bool) -> Iterator[Progress]:
     with bar("loading") as shown:
 
         def show(branch: Branch, drive: float, state: ContactState) -> None:
-            text = f"{branch:<9} {drive_text(drive, load)} of {end}, {state.patches} patches"
+            text = (
+                f"{branch:<9} {drive_text(drive, load)} of {end}  A/A0 "
+                f"{state.contact_fraction:.4f}  {state.patches} patches"
+            )
             if branch == "loading":
                 shown(drive / top, 1.0, text)
             else:

@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, get_args
@@ -28,6 +28,17 @@ from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Measure, Problem
 from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
 from adhesis.solver.values import ByValue, finite
+
+FIGURES = {
+    "trace": "The trace, as measured and as used",
+    "spectrum": "Its power spectrum",
+    "loop": "The loop",
+    "cut-off": "Loss against the shortest wave kept",
+    "tables": "Against work of adhesion and turning point",
+}
+"""Title of each figure of the page by the stem of its files."""
+FIGURE_FILES = tuple(f"{name}.{suffix}" for name in FIGURES for suffix in ("png", "pdf"))
+FILES = ("trace.json", "trace.html", "trace.md", *FIGURE_FILES)
 
 QUANTITIES = ("loss", "pull_off_stress", "contact_fraction")
 """Numbers of the answer that have doubts, in J/m², in Pa, and dimensionless."""
@@ -381,20 +392,9 @@ def loss_of_trace(
     elif max_penetration is not None:
         latest = checks.real("max_penetration", max_penetration)
     cycle = make_cycle(
-        half_space,
-        work_of_adhesion,
-        turns,
-        load_steps,
-        method,
-        accuracy,
-        control,
-        adhesion_range,
-        strength,
-        at_preload=preload is not None,
-        latest=latest,
-        work_of_adhesion_open=work_of_adhesion_open,
-        measure=measure,
-    )
+        half_space, work_of_adhesion, turns, load_steps, method, accuracy, control,
+        adhesion_range, strength, preload is not None, latest, work_of_adhesion_open, measure,
+    )  # fmt: skip
     check(prepared, cycle)
     checks.flag("quick", quick)
     checks.function("watch", watch)
@@ -418,44 +418,36 @@ def make_cycle(
     half_space: HalfSpace,
     work_of_adhesion: Several,
     turning_points: Several,
-    load_steps: int,
-    method: MethodName,
-    accuracy: float,
-    control: Control | None = None,
-    adhesion_range: float | None = None,
-    strength: float | None = None,
-    *,
-    at_preload: bool = False,
-    latest: float | None = None,
-    work_of_adhesion_open: float | None = None,
-    measure: Measure = "arc",
+    *settings: Any,
+    **named: Any,
 ) -> Cycle:
-    """Make contact and cycle, with the values of both tables (TypeError, ValueError)."""
-    checks.choice("method", method, METHOD_NAMES)
-    checks.real("accuracy", accuracy, checks.ACCURACY)
-    checks.choice("measure", measure, get_args(Measure))
-    control = control or Control()
-    turning = "max_stress" if control.is_load else "max_penetration"
-    turning = "preload" if at_preload else turning
+    """Make contact and cycle, with the values of both tables (TypeError, ValueError).
+
+    The settings are the fields of a Cycle from ``load_steps`` on.
+    """
     given = _several("work_of_adhesion", work_of_adhesion)
-    if work_of_adhesion_open is not None and len(given) > 1:
+    cycle = Cycle(half_space, tuple(given), (), *settings, **named)
+    checks.choice("method", cycle.method, METHOD_NAMES)
+    checks.real("accuracy", cycle.accuracy, checks.ACCURACY)
+    checks.choice("measure", cycle.measure, get_args(Measure))
+    control = cycle.control
+    if cycle.work_of_adhesion_open is not None and len(given) > 1:
         raise ValueError(
-            f"work_of_adhesion_open is {work_of_adhesion_open!r} beside {len(given)} works of "
-            "adhesion: give one of each (in the table both keep their ratio)"
+            f"work_of_adhesion_open is {cycle.work_of_adhesion_open!r} beside {len(given)} works "
+            "of adhesion: give one of each (in the table both keep their ratio)"
         )
+    turning = "max_stress" if control.is_load else "max_penetration"
+    turning = "preload" if cycle.at_preload else turning
     gammas, turns = default_tables(given, _several(turning, turning_points))
     for name, values in (("work_of_adhesion", gammas), (turning, turns)):
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
     for point in turns:
-        if at_preload:
+        if cycle.at_preload:
             check_preload(point, control)
-            point = checks.FULL_PENETRATION if latest is None else latest
-        check_cycle(point, load_steps, control)
-    cycle = Cycle(
-        half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength,
-        at_preload, latest, work_of_adhesion_open, measure,
-    )  # fmt: skip
+            point = checks.FULL_PENETRATION if cycle.latest is None else cycle.latest
+        check_cycle(point, cycle.load_steps, control)
+    cycle = replace(cycle, works_of_adhesion=gammas, turning_points=turns)
     for gamma in gammas:
         cycle.strength_at(gamma)
     return cycle

@@ -22,9 +22,8 @@ from adhesis.ensemble.report.figures.style import (
     save,
     style,
 )
-from adhesis.ensemble.trace.answer import Answer
+from adhesis.ensemble.trace.answer import FIGURES, Answer
 from adhesis.ensemble.trace.job import Cycle
-from adhesis.ensemble.trace.page_files import FIGURES
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.model.measured_profile import trace_spectrum

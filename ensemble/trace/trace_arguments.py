@@ -33,8 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--young", type=STRESS.option, required=True, metavar="E", help="in Pa, or 1MPa"
     )
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
-    add_open_argument(contact)
-    add_measure_argument(contact)
     add_cycle_arguments(contact)
     add_method_arguments(contact, "of each loop (default 1e-3)")
     add_reading_arguments(parser)
@@ -49,7 +47,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare strength, turning points and control, which ``adhesis loop`` shares."""
+    """Declare laws of adhesion, turning points and control, which ``adhesis loop`` shares."""
+    group.add_argument(
+        "--work-of-adhesion-open",
+        type=WORK_OF_ADHESION.option,
+        metavar="G",
+        help="where an edge recedes, at least that where it advances, --work-of-adhesion; between "
+        "both it is pinned (default: the same)",
+    )
+    group.add_argument(
+        "--measure",
+        default="arc",
+        metavar="NAME",
+        help="adhesion acts on the length of the profile (arc, default) or its projection (flat)",
+    )
     group.add_argument(
         "--adhesion-range",
         type=LENGTH.option,
@@ -90,27 +101,6 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         help="instead: the stiffness of a layer of this thickness, 1mm",
     )
     group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
-
-
-def add_open_argument(group: argparse._ArgumentGroup) -> None:
-    """Declare the work of adhesion of an edge that recedes; ``adhesis loop`` shares it."""
-    group.add_argument(
-        "--work-of-adhesion-open",
-        type=WORK_OF_ADHESION.option,
-        metavar="G",
-        help="where an edge recedes, at least that where it advances, --work-of-adhesion; between "
-        "both it is pinned (default: the same)",
-    )
-
-
-def add_measure_argument(group: argparse._ArgumentGroup) -> None:
-    """Declare the length on which adhesion acts; ``adhesis loop`` shares it."""
-    group.add_argument(
-        "--measure",
-        default="arc",
-        metavar="NAME",
-        help="adhesion acts on the length of the profile (arc, default) or its projection (flat)",
-    )
 
 
 def add_method_arguments(group: argparse._ArgumentGroup, accuracy: str) -> None:

@@ -17,9 +17,16 @@ from adhesis.ensemble.quantities import (
     with_error,
 )
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Uncertain, document
+from adhesis.ensemble.trace.answer import (
+    COVERAGE,
+    DOUBTS,
+    FIGURE_FILES,
+    LEAST,
+    Answer,
+    Uncertain,
+    document,
+)
 from adhesis.ensemble.trace.figures import Drawn, draw_all
-from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.equilibrium_path import friction_text, sticking_text
 

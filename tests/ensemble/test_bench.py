@@ -178,7 +178,7 @@ def test_tamaas_approaches_the_exact_loss_from_below():
     losses = [
         peer.tamaas_loop(
             problem, reach=reach * problem.profile.h_max, max_penetration=0.2, load_steps=10
-        ).loss
+        )[0]
         for reach in (0.1, 0.05, 0.03)
     ]
     assert 0 < losses[0] < losses[1] < losses[2] < ONE_WAVE.exact_loss

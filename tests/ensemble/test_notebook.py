@@ -111,7 +111,7 @@ def test_every_object_without_a_result_has_a_short_repr():
 def test_a_notebook_shows_the_main_numbers_and_the_figure(result):
     page = result._repr_html_()
     value = result.work if isinstance(result, PathResult) else result.loss
-    assert f"{value:.5g}" in html.unescape(page)
+    assert f"{value:.6g}" in html.unescape(page)
     assert "data:image/png;base64," in page
     assert len(page) < 200_000
     figure = result.plot()

@@ -107,7 +107,7 @@ def test_the_way_under_a_weight_has_a_unit(monkeypatch, tmp_path, capsys):
     words = ["--stiffness", "0", "--max-stress", "500", "--json", str(tmp_path / "loop.json")]
     assert main([word for word in [*SCENE, *words] if word != "--quiet"]) == 0
     last = capsys.readouterr().err.splitlines()[-1]
-    assert re.search(r"unloading step +-\d+  p̄ -[\d.]+ k?Pa  A/A0", last)
+    assert re.search(r"unloading p̄ -[\d.]+ k?Pa of 500 Pa  A/A0", last)
     monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
     loops = Loops((), 1)
     plan = SimpleNamespace(runs=(), seconds={"answer": 2.0})

@@ -89,7 +89,7 @@ report r/curves.nc --to text -> --to is text:
 validate --method '' -> --method is ''
 validate --method magic -> method is 'magic': it must be one of grid, sharp
 BENCH --budget {{0,-1,nan,inf}} -> --budget is
-BENCH --budget 0 -> --budget is 0.0: it must be a positive number of seconds
+BENCH --budget 0 -> --budget is '0': it must be a positive number of seconds
 BENCH --to {{text,text/below}} -> text is not a directory
 BENCH --to /proc/x -> --to is /proc/x: it cannot be written
 doctor --in none -> --in is none: it must be a folder that can be written

@@ -4,23 +4,22 @@
                                 [--rows 300] [--head 300] [--cuts 100]
 
 Bits of a random byte are inverted, in bytes that rows hold and in all others, and the file is cut
-short at random places. Each case is judged in a process of its own, so that a crash of HDF5 is
-seen, within 4 GB of memory. With --seconds new cases are drawn until the time is over. A case is
+short at random places. Cases are judged in another process, so that a crash of HDF5 is seen, within
+4 GB of memory. With --seconds new cases are drawn until the time is over. A case is
 repeated by its seed, kind and number.
 """
 
 from __future__ import annotations
 
 import argparse
-import multiprocessing as mp
 import os
 import resource
 import sys
 import tempfile
 import time
 from collections import Counter
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
@@ -28,9 +27,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 import numpy as np
 
 from tools.damage import Damage
+from tools.isolated import Isolated
 
 KINDS = ("rows", "head", "cuts")
-LIMIT = 300.0  # s of one case, also on a busy machine
+LIMIT = 300.0  # s of CPU time of one case
 _MEMORY = 4 * 2**30
 
 
@@ -45,27 +45,18 @@ def draw(damage: Damage, seed: int, kind: str, number: int) -> tuple[str, bytes]
     return f"byte {place} ^ {mask}", damage.flipped(place, mask)
 
 
-def _judge(damage: Damage, content: bytes, answer: Any) -> None:
+def judged(folder: str, seed: int, kind: str, number: int) -> tuple[str, str, str]:
+    """Damage a file and judge it: what was done to it, what it is, and why."""
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    answer.send(damage.judge(content))
+    damage = _damage(folder)
+    what, content = draw(damage, seed, kind, number)
+    return what, *damage.judge(content)
 
 
-def judged(damage: Damage, content: bytes) -> tuple[str, str]:
-    """Judge a damaged file in a process of its own."""
-    context = mp.get_context("fork")
-    answer, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_judge, args=(damage, content, sender))
-    process.start()
-    sender.close()
-    try:
-        return answer.recv() if answer.poll(LIMIT) else ("WRONG", f"longer than {LIMIT:g} s")
-    except EOFError:
-        process.join()
-        return "WRONG", f"the process ended with {process.exitcode}"
-    finally:
-        process.kill()
-        process.join()
+@cache
+def _damage(folder: str) -> Damage:
+    return Damage(Path(folder))
 
 
 def main() -> int:
@@ -85,16 +76,14 @@ def main() -> int:
     found: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     wrong = 0
     print(f"seed {args.seed}", flush=True)
+    isolated = Isolated(judged, LIMIT)
     with tempfile.TemporaryDirectory() as folder:
-        damage = Damage(Path(folder))
-        for rows in [(), *((row,) for row in range(damage.campaign.task_count))]:
-            damage.answer(rows)  # once, and not in every process
         for number in range(max(most.values())):
             for kind in KINDS:
                 if number >= most[kind] or time.monotonic() > end:
                     continue
-                what, content = draw(damage, args.seed, kind, number)
-                verdict, reason = judged(damage, content)
+                answer, ended = isolated(folder, args.seed, kind, number)
+                what, verdict, reason = answer or ("", "WRONG", ended)
                 found[kind][verdict] += 1
                 if verdict == "WRONG":
                     wrong += 1

@@ -18,13 +18,12 @@ that a crash is counted too.
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,13 +33,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 import numpy as np
 
 from tools.interrupted import interrupted
+from tools.isolated import Isolated
 
 KINDS = ("strong", "weak", "grid", "first", "trace", "pool", "campaign")
 OF_ONE_PROCESS_EACH = ("first",)
 LOAD_STEPS = 40
 WAVES = 10  # the longest ones in a period
-AT_ONCE = 50  # interrupts of one process
-LIMIT = 1200.0  # s after which a process is taken for hanging
+LIMIT = 300.0  # s of CPU time of one interrupt, its set-up included
 
 
 # ---------------------------------------------------------------------------------- the kinds
@@ -207,6 +206,7 @@ class Campaigns:
         return f"{failed} FAILED TASKS, {ended}" if failed else ended
 
 
+@cache
 def kind_of(name: str) -> Any:
     """Set up what is interrupted."""
     if name == "strong":
@@ -224,47 +224,10 @@ def kind_of(name: str) -> Any:
     return Campaigns(3.0)
 
 
-# --------------------------------------------------------------------------------- processes
-
-
-def work(name: str, seed: int, numbers: range) -> None:
-    """Interrupt some times; a line of JSON for each."""
-    kind = kind_of(name)
-    for number in numbers:
-        rng = np.random.default_rng([seed, KINDS.index(name), number])
-        print(json.dumps([number, kind.once(rng)]), flush=True)
-
-
-def run(name: str, seed: int, numbers: range) -> dict[int, str]:
-    """Interrupt some times in a process of its own; what each ended in."""
-    ended: dict[int, str] = {}
-    words = ["--kind", name, "--seed", str(seed), "--count", str(len(numbers))]
-    words += ["--first", str(numbers.start), "--work"]
-    try:
-        done = subprocess.run(
-            [sys.executable, str(Path(__file__).resolve()), *words],
-            stdout=subprocess.PIPE,
-            text=True,
-            check=False,
-            timeout=LIMIT,
-        )
-        lines, code = done.stdout, done.returncode
-    except subprocess.TimeoutExpired as late:
-        lines, code = (late.stdout or b"").decode(), None
-    for line in lines.splitlines():
-        if line.startswith("["):
-            number, how = json.loads(line)
-            ended[number] = how
-    missing = [number for number in numbers if number not in ended]
-    if missing:
-        how = "hangs" if code is None else f"ended with {code}"
-        ended[missing[0]] = f"CRASH: the process {how}"
+def once(name: str, seed: int, number: int) -> str:
+    """Interrupt once; returns what it ended in."""
+    ended: str = kind_of(name).once(np.random.default_rng([seed, KINDS.index(name), number]))
     return ended
-
-
-def is_wrong(how: str) -> bool:
-    """Whether an interrupt ended in anything but itself."""
-    return how.split()[0] not in ("raised", "done")
 
 
 def main() -> int:
@@ -275,34 +238,26 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=100, help="of each kind")
     parser.add_argument("--first", type=int, default=0, help="number of the first")
     parser.add_argument("--seconds", type=float, default=np.inf, help="at most so long, in all")
-    parser.add_argument("--log", type=Path, help="a line of JSON for each")
-    parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
-    args.until = time.monotonic() + args.seconds
-    stop = args.first + args.count
-    if args.work:
-        work(args.kind[0], args.seed, range(args.first, stop))
-        return 0
+    until = time.monotonic() + args.seconds
     wrong = 0
     for place, name in enumerate(args.kind):
         started = time.monotonic()
-        end = started + (args.until - started) / (len(args.kind) - place)
-        ended: dict[int, str] = {}
-        number = args.first
-        while number < stop and (time.monotonic() < end or not ended):
-            size = 1 if name in OF_ONE_PROCESS_EACH else AT_ONCE
-            ended |= run(name, args.seed, range(number, min(number + size, stop)))
-            number = max(ended) + 1
-        if args.log is not None:
-            with args.log.open("a") as log:
-                for number, how in ended.items():
-                    print(json.dumps([name, args.seed, number, how]), file=log)
-        count = Counter(ended.values())
-        bad = sum(is_wrong(how) for how in ended.values())
-        bad += name == "first" and len({how.split()[-1] for how in ended.values()}) > 1
+        end = started + (until - started) / (len(args.kind) - place)
+        isolated = Isolated(once, LIMIT)
+        count: Counter[str] = Counter()
+        for number in range(args.first, args.first + args.count):
+            if count and time.monotonic() > end:
+                break
+            how, died = isolated(name, args.seed, number)
+            count[how or f"CRASH: {died}"] += 1
+            if name in OF_ONE_PROCESS_EACH and not died:
+                isolated.end()
+        bad = sum(n for how, n in count.items() if how.split()[0] not in ("raised", "done"))
+        bad += name == "first" and len({how.split()[-1] for how in count}) > 1
         wrong += bad
         print(
-            f"interrupts: {name}, seed {args.seed}: {len(ended)} in "
+            f"interrupts: {name}, seed {args.seed}: {count.total()} in "
             f"{time.monotonic() - started:.0f} s, {bad} wrong; {dict(count)}",
             flush=True,
         )

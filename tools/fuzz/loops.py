@@ -23,9 +23,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing as mp
 import os
-import queue
 import sys
 import time
 from collections import Counter
@@ -39,52 +37,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 import numpy as np
 
 from tools.hostile import compared_tightly, draw, judge
+from tools.isolated import Isolated
 
 LIMIT = 120.0  # s of CPU time of one scene, all its runs together
 _QUANTILES = (0.1, 0.5, 0.9, 0.99)  # of the differences over loss_error that are printed
-_PATIENCE = 20  # times as many seconds of the clock, should a process only sleep
 
 
-def _work(tasks: Any, results: Any) -> None:
-    for seed, number, strength, many in iter(tasks.get, None):
-        results.put((number, judge(draw(seed, number, strength, many), number)))
-
-
-class Worker:
-    """A process that judges scenes, and can be ended."""
-
-    def __init__(self) -> None:
-        context = mp.get_context("spawn")
-        self.tasks, self.results = context.Queue(), context.Queue()
-        self.process = context.Process(target=_work, args=(self.tasks, self.results), daemon=True)
-        self.process.start()
-
-    def _spent(self) -> float:
-        """CPU time of the process, in s."""
-        assert self.process.pid is not None
-        clock = (~self.process.pid << 3) | 2  # Linux: the CPU clock of another process
-        return time.clock_gettime(clock)
-
-    def judge(self, *drawn: int) -> dict[str, Any]:
-        """Judge the scene that these draw; a process that dies or takes too long is a failure."""
-        self.tasks.put(drawn)
-        started, begun = self._spent(), time.monotonic()
-        spent = 0.0
-        while spent < LIMIT and time.monotonic() - begun < _PATIENCE * LIMIT:
-            try:
-                found: dict[str, Any] = self.results.get(timeout=0.5)[1]
-                return found
-            except queue.Empty:
-                if not self.process.is_alive():
-                    return {"wrong": [f"the process died: {self.process.exitcode}"], "kind": "died"}
-                spent = self._spent() - started
-        self.process.kill()
-        self.process.join()
-        return {
-            "wrong": [f"not done after {spent:.0f} s of CPU time"],
-            "kind": "late",
-            "seconds": spent,
-        }
+def judged(seed: int, number: int, strength: bool, many: bool) -> dict[str, Any]:
+    """Draw a scene and judge it."""
+    return judge(draw(seed, number, strength, many), number)
 
 
 def calibration(found: list[dict[str, Any]]) -> str:
@@ -138,7 +99,7 @@ def main() -> int:
         print(one)
         return int(bool(one["wrong"]))
     end, shown = time.monotonic() + args.seconds, time.monotonic()
-    worker = Worker()
+    isolated = Isolated(judged, LIMIT)
     everything: list[dict[str, Any]] = []
     kinds: Counter[str] = Counter()
     failures = races = 0
@@ -150,9 +111,8 @@ def main() -> int:
             args.tight and not compared_tightly(scene, number)
         ):
             continue
-        found = worker.judge(args.seed, number, args.strength, args.many)
-        if not worker.process.is_alive():
-            worker = Worker()
+        found, ended = isolated(args.seed, number, args.strength, args.many)
+        found = found or {"wrong": [ended], "kind": "ended"}
         everything.append(found)
         kinds[found["kind"]] += 1
         races += bool(found.get("races"))

@@ -51,10 +51,15 @@ def execute(args: argparse.Namespace) -> int:
 
 def _watch(path: Path | str, interval: float) -> int:
     """Show the status again and again: in place on a terminal, else one after the other."""
+    from rich.console import Console
+    from rich.live import Live
+
     from adhesis.ensemble.results.status import as_text, read_status
     from adhesis.ensemble.run.lock import holder
 
-    live = _live() if sys.stdout.isatty() else None
+    live = Live(console=Console(highlight=False, markup=False), auto_refresh=False)
+    if sys.stdout.isatty():
+        live.start()
     first: tuple[float, int] | None = None
     try:
         while True:
@@ -66,17 +71,16 @@ def _watch(path: Path | str, interval: float) -> int:
                 first = (now, finished)
             pace = _pace(status, now - first[0], finished - first[1])
             text = as_text(status, pace + _life(status))
-            if live is None:
-                print(text, flush=True)
-            else:
+            if live.is_started:
                 live.update(text, refresh=True)
+            else:
+                print(text, flush=True)
             if not status["pending"]:
                 return 0
             # Every look reads all rows with a result: it takes at most a fifth of the time.
             time.sleep(max(interval, 4 * (time.monotonic() - now)))
     finally:
-        if live is not None:
-            live.stop()
+        live.stop()
 
 
 def _life(status: dict[str, Any]) -> str:
@@ -88,15 +92,6 @@ def _life(status: dict[str, Any]) -> str:
     text = "no run is writing" if run is None else f"a run is writing ({described(run)})"
     age = "" if last is None else f"; last row {duration(max(0.0, time.time() - last))} ago"
     return f"\n{text}{age}"
-
-
-def _live() -> Any:
-    from rich.console import Console
-    from rich.live import Live
-
-    live = Live(console=Console(highlight=False, markup=False), auto_refresh=False)
-    live.start()
-    return live
 
 
 def _pace(status: dict[str, Any], seconds: float, finished: int) -> str:

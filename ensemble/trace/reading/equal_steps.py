@@ -116,18 +116,18 @@ def _step_of_rounded(x: Array) -> tuple[float, float] | None:
     middle = float(np.median(steps))
     if np.sum(np.abs(steps - middle) > max(digit / 2, _UNEVEN * middle)) < _IRREGULAR:
         return None
-    k = np.arange(x.size)
-    allowed = digit * (1 + 1e-6)
+    from scipy.optimize import linprog  # here: they take long to load
+    from scipy.spatial import ConvexHull
 
-    def spread(step: float) -> float:
-        return float(np.ptp(x - step * k))
-
-    low, high = (float(x[-1] - x[0] + sign * digit) / k[-1] for sign in (-1, 1))
-    best = _lowest(spread, low, high)
-    if spread(best) > allowed:
+    # A straight line that passes within half a digit of the corners does so of all positions; the
+    # slopes of such lines are one range.
+    k = ConvexHull(np.column_stack([np.arange(x.size), x / digit])).vertices
+    line = np.column_stack([np.ones(k.size), k])
+    sides = np.concatenate([line, -line]), np.concatenate([x[k], -x[k]]) / digit + 0.5
+    ends = [linprog((0, sign), *sides, bounds=(None, None)) for sign in (1, -1)]
+    if not all(found.success for found in ends):
         return None
-    first = _edge(spread, allowed, best, low)
-    last = _edge(spread, allowed, best, high)
+    first, last = (float(found.x[1]) * digit for found in ends)
     step = _roundest(first, last)
     if step < _FINEST * digit:
         return None
@@ -148,36 +148,6 @@ def _printed_digit(x: Array) -> float | None:
         if whole.any() and np.all(np.abs(multiples - whole) <= 1e-6):
             return float(10.0**-decimals)
     return None
-
-
-def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a convex function is lowest, by a golden section."""
-    ratio = (np.sqrt(5) - 1) / 2
-    left, right = high - ratio * (high - low), low + ratio * (high - low)
-    at_left, at_right = function(left), function(right)
-    for _ in range(60):
-        if at_left < at_right:
-            high, right, at_right = right, left, at_left
-            left = high - ratio * (high - low)
-            at_left = function(left)
-        else:
-            low, left, at_left = left, right, at_right
-            right = low + ratio * (high - low)
-            at_right = function(right)
-    return float(left if at_left < at_right else right)
-
-
-def _edge(function: Callable[[float], float], allowed: float, inside: float, end: float) -> float:
-    """Return how far from a value inside towards an end a convex function is allowed."""
-    if function(end) <= allowed:
-        return end
-    for _ in range(50):
-        middle = (inside + end) / 2
-        if function(middle) <= allowed:
-            inside = middle
-        else:
-            end = middle
-    return inside
 
 
 def _roundest(low: float, high: float) -> float:

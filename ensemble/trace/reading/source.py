@@ -122,15 +122,10 @@ class Source:
         exported first.
         """
         try:
-            if self.content is None:
-                _refuse_no_file(Path(self.name))
             with self.open() as stream:
                 begin = stream.read(_BEGIN)
-        except InputError:
-            raise
-        except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-            reason = getattr(error, "strerror", None) or error
-            raise InputError(f"cannot read {self}: {reason}") from None
+        except OSError as error:
+            raise InputError(f"cannot read {self}: {error.strerror or error}") from None
         if not begin.strip():
             raise InputError(f"{self} is empty")
         for magic, (name, program) in _COMPRESSED.items():
@@ -185,12 +180,3 @@ def source_of(given: Any) -> Source:
         name if isinstance(name, str) else "the stream",
         content.encode() if isinstance(content, str) else bytes(content),
     )
-
-
-def _refuse_no_file(path: Path) -> None:
-    if path.is_dir():
-        raise InputError(f"{path} is a directory: a trace is a file")
-    if not path.exists():
-        raise InputError(f"cannot read {path}: there is no such file")
-    if not path.is_file():
-        raise InputError(f"{path} is a pipe or a device: write its content to a file first")

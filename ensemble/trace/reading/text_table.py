@@ -12,6 +12,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite, isnan, nan
 from typing import NoReturn
 
@@ -154,9 +155,13 @@ class _Reader:
     decimal: str
     count: int
 
-    def row(self, place: int) -> _Row | None:
-        """Return the row that a line holds; None for words, a comment, or too many fields."""
-        line = self.lines[place]
+    @cached_property
+    def rows(self) -> dict[int, _Row]:
+        """The rows by their lines, without words, comments, and lines of too many fields."""
+        found = ((place, self._row(line)) for place, line in enumerate(self.lines))
+        return {place: row for place, row in found if row is not None}
+
+    def _row(self, line: str) -> _Row | None:
         begin = line.strip()[:1]
         if begin and begin in COMMENT and (begin == "#" or not is_missing(line.strip())):
             return None
@@ -177,9 +182,8 @@ class _Reader:
 
     def may_be_row(self, place: int) -> bool:
         """Return whether a line holds a row of numbers, or what may be a damaged one."""
-        row = self.row(place)
-        if row is not None:
-            return not row.is_empty
+        if place in self.rows:
+            return not self.rows[place].is_empty
         line = self.lines[place].strip()
         if not line or line[0] in COMMENT:
             return False
@@ -207,10 +211,11 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     start = _first_row(reader)
     if start is None:
         _refuse_no_rows(reader, len(sample))
-    rows, places = _rows(reader, start)
+    places = _block(reader, start)
     _refuse_numbers_outside(reader, start, places[-1])
-    filled = tuple(k for k in range(count) if any(row.fields[k] for row in rows))
-    rows, places = _without_empty_rows(reader, rows, places, len(filled))
+    filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
+    places = _without_empty_rows(reader, places, len(filled))
+    rows = [reader.rows[place] for place in places]
     if not is_given and decimal == ",":
         _refuse_perhaps_thousands(source, rows)
     for k in filled:
@@ -224,7 +229,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         if len(filled) == 1:
             numbers = [row.values[k] for row in rows]
             _refuse_odd_ends(source, column, numbers, places)
-            _refuse_parts(source, numbers, places, reader.lines)
+            _refuse_parts(reader, numbers, places)
     header = [line[:_LONGEST_HEADER_LINE].strip().lstrip(COMMENT).strip() for line in lines[:start]]
     # Of one column, a line of the header is a name as a whole.
     names = [(line,) if count == 1 else _names(line, delimiter, count, filled) for line in header]
@@ -255,7 +260,7 @@ def _first_row(reader: _Reader) -> int | None:
     found: list[int] = []
     needed = 1 if reader.count >= _LONG_ROW else _ROWS_TO_BEGIN
     for place in range(len(reader.lines)):
-        row = reader.row(place)
+        row = reader.rows.get(place)
         if row is None or (not row.is_empty and not reader.is_whole(place)):
             found = []
         elif not row.is_empty or (found and reader.count == 1):
@@ -269,7 +274,7 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
     source = reader.source
     for place, line in enumerate(reader.lines):
         fields = split(line, reader.delimiter)
-        flaw = flaw_of(fields) if looks_like_numbers(line) and reader.row(place) is None else None
+        flaw = flaw_of(fields) if looks_like_numbers(line) and place not in reader.rows else None
         if flaw is not None:
             raise InputError(f"line {place + 1} of {source} has {flaw}")
     if numbers < _ROWS_TO_BEGIN:
@@ -284,13 +289,12 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
     )
 
 
-def _rows(reader: _Reader, start: int) -> tuple[list[_Row], list[int]]:
-    """Return the rows of the block, empty ones too, and their lines from 0."""
-    rows: list[_Row] = []
+def _block(reader: _Reader, start: int) -> list[int]:
+    """Return the lines of the block, from 0, those of empty rows too."""
     places: list[int] = []
     is_blank = [not line.strip() for line in reader.lines]
     for place in range(start, len(reader.lines)):
-        row = reader.row(place)
+        row = reader.rows.get(place)
         if row is None:
             break
         if reader.count == 1 and place > start and is_blank[place - 1] and is_blank[place]:
@@ -302,29 +306,20 @@ def _rows(reader: _Reader, start: int) -> tuple[list[_Row], list[int]]:
                 f"of the {reader.count} columns are missing cannot be seen between spaces, so save "
                 "it with another delimiter"
             )
-        rows.append(row)
         places.append(place)
-    while rows[-1].is_empty:
-        rows.pop()
+    while reader.rows[places[-1]].is_empty:
         places.pop()
-    return rows, places
+    return places
 
 
-def _without_empty_rows(
-    reader: _Reader, rows: list[_Row], places: list[int], columns: int
-) -> tuple[list[_Row], list[int]]:
+def _without_empty_rows(reader: _Reader, places: list[int], columns: int) -> list[int]:
     """Leave out empty rows; of one column they are gaps, which have their places."""
     if columns > 1:
-        whole = [not row.is_empty for row in rows]
-    else:
-        blank = [not reader.lines[place].strip() for place in places]
-        # A text with double line ends has no gaps.
-        is_double = len(rows) > _TO_JUDGE and all(blank[1::2]) and not any(blank[::2])
-        whole = [not (is_double and k % 2) for k in range(len(rows))]
-    return (
-        [row for row, kept in zip(rows, whole, strict=True) if kept],
-        [place for place, kept in zip(places, whole, strict=True) if kept],
-    )
+        return [place for place in places if not reader.rows[place].is_empty]
+    blank = [not reader.lines[place].strip() for place in places]
+    # A text with double line ends has no gaps.
+    is_double = len(places) > _TO_JUDGE and all(blank[1::2]) and not any(blank[::2])
+    return places[::2] if is_double else places
 
 
 def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
@@ -332,10 +327,10 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
     source, lines = reader.source, reader.lines
     touches = True  # nothing but empty rows has come in between
     for place in range(start - 1, -1, -1):
-        row = reader.row(place)
-        if row is not None and row.is_empty:
+        is_row = place in reader.rows
+        if is_row and reader.rows[place].is_empty:
             continue
-        if reader.may_be_row(place) and (touches or (row is not None and reader.is_whole(place))):
+        if reader.may_be_row(place) and (touches or (is_row and reader.is_whole(place))):
             raise InputError(
                 f"line {place + 1} of {source} is {shown_line(lines[place])}, above the numbers "
                 f"that begin on line {start + 1}: remove it if it is none of them, and correct it "
@@ -344,7 +339,7 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
         touches = False
     for place in range(last + 1, len(lines)):
         if reader.may_be_row(place):
-            words = (k for k in range(last + 1, place + 1) if reader.row(k) is None)
+            words = (k for k in range(last + 1, place + 1) if k not in reader.rows)
             end = next(words, last + 1)
             flaw = flaw_of(split(lines[end], reader.delimiter))
             if flaw is not None and reader.may_be_row(end):
@@ -392,15 +387,13 @@ def _refuse_odd_ends(
             )
 
 
-def _refuse_parts(
-    source: Source, numbers: Sequence[float], places: Sequence[int], lines: Sequence[str]
-) -> None:
+def _refuse_parts(reader: _Reader, numbers: Sequence[float], places: Sequence[int]) -> None:
     """Refuse a column that an empty line divides into several profiles.
 
     One empty line is a missing height. It is none if all parts have one length, or if the heights
     leap there as they do nowhere else.
     """
-    empty = [k for k, place in enumerate(places) if not lines[place].strip()]
+    empty = [k for k, place in enumerate(places) if not reader.lines[place].strip()]
     bounds = [-1, *empty, len(numbers)]
     lengths = {end - start - 1 for start, end in itertools.pairwise(bounds)}
     if not empty or max(lengths) < _LONG_ROW:
@@ -417,8 +410,8 @@ def _refuse_parts(
     else:
         return
     raise InputError(
-        f"line {places[place] + 1} of {source} is empty, and {reason}: write NaN on it if one "
-        "height is missing, or keep one profile in a file"
+        f"line {places[place] + 1} of {reader.source} is empty, and {reason}: write NaN on it if "
+        "one height is missing, or keep one profile in a file"
     )
 
 
