@@ -23,7 +23,7 @@ from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
 from adhesis.solver.sharp.tolerances import (
-    FIRST_MOTION,
+    LONGEST_STEP,
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
@@ -161,7 +161,7 @@ class Branch:
 
     def _next_step(self) -> float:
         predictor = self._predictor
-        motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
+        motion = LONGEST_STEP if predictor.way == 0 else PREDICTED_MOTION
         step = self.steps.next(predictor, self._target.at, motion * self._edges.wave)
         self._free_step, self._begins_to_move = step, False
         return step if self.point.pinned is None else self._step_to_kink(step, self.point.pinned)

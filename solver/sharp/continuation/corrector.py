@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from adhesis.solver._kernels import COMPARABLE
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.tolerances import CORRECTED, LONGEST_PREDICTION
+from adhesis.solver.sharp.tolerances import LONGEST_STEP
 
 
 def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | None:
@@ -17,6 +18,6 @@ def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | No
     """
     gaps = predictor.gaps(at)
     # not written as > : a prediction that is no number is none
-    if not np.abs(gaps - predictor.point.gaps).max() <= LONGEST_PREDICTION * edges.wave:
+    if not np.abs(gaps - predictor.point.gaps).max() <= COMPARABLE * edges.wave:
         return None
-    return edges.equilibrium(gaps, at, CORRECTED * edges.wave, memory=predictor.point.gaps)
+    return edges.equilibrium(gaps, at, LONGEST_STEP * edges.wave, memory=predictor.point.gaps)

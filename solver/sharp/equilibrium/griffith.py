@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver._kernels import EdgeLaw, Panels
+from adhesis.solver._kernels import CLOSING_SHARE, EdgeLaw, Panels
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import lengths_of, outward
-from adhesis.solver.sharp.tolerances import CLOSING_SHARE
 
 
 def imbalance(opening: Array, gaps: Array, law: EdgeLaw, panels: Panels) -> Array:

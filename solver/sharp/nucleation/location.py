@@ -7,6 +7,7 @@ the criterion of touches, ``opening.Openings`` that of gaps that open inside pat
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -19,8 +20,7 @@ from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
 from adhesis.solver.sharp.tolerances import (
     BISECTION_EVERY,
     CLEAR_TRIALS,
-    CORRECTED,
-    TOUCH_TRIALS,
+    LONGEST_STEP,
 )
 
 Seed = TypeVar("Seed")
@@ -112,7 +112,7 @@ def locate(
         clear_value = clearance
     tracked = criterion.track_between(last, hit)
     cleared = 0  # trials one after the other that were clear
-    for trials in range(1, TOUCH_TRIALS + 1):
+    for trials in range(1, sys.float_info.mant_dig + 1):
         if criterion.is_located(hit_value, abs(clear - hit.at) <= resolution):
             break
         share = 0.5
@@ -124,7 +124,7 @@ def locate(
         trial = clear + (hit.at - clear) * share
         if trial in (clear, hit.at):  # there its value differs by the error of the field
             return Located(last, criterion.choose_seeds(hit_candidates), 0.0), 0.0
-        reach = CORRECTED * edges.wave
+        reach = LONGEST_STEP * edges.wave
         gaps = last.interpolate(hit, trial)
         point = edges.equilibrium(gaps, trial, reach, memory=last.gaps)
         for start in (last, hit) if share < 0.5 else (hit, last):

@@ -10,6 +10,7 @@ touch: its seed is put when the overlap is large enough for the narrowest patch 
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -31,7 +32,7 @@ from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
 from adhesis.solver.sharp.nucleation.location import Located, secant_share
-from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, COMPARABLE, OVERLAP, TOUCH_TRIALS
+from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, OVERLAP
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Nucleation:
         self.problem, self.edges = problem, edges
         self.searched = SearchedGaps()
         self._lengths = SearchLengths(
-            max_displacement=COMPARABLE * edges.wave,
+            wave=float(edges.wave),
             closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=math.pi * edges.critical**2 / 8,  # Γ
             narrowest=float(3 * edges.smallest),
@@ -163,7 +164,7 @@ class Nucleation:
         high, minima = self.minimum(field)
         if high > -self.tolerance:
             return None
-        for _ in range(TOUCH_TRIALS):
+        for _ in range(sys.float_info.mant_dig):
             if high >= -0.5 * self.tolerance:
                 break
             # openings are linear in d at fixed edges
