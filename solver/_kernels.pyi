@@ -1,31 +1,45 @@
 """Kernels of the methods sharp and grid."""
 
+from collections.abc import Sequence
 import enum
 from typing import Annotated, overload
 
 import numpy
+import numpy.typing
 from numpy.typing import NDArray
 
 
 COMPILER: str
 
+CLOSING_SHARE: float
+
+COMPARABLE: float
+
+PREDICTION_TRUSTED: float
+
+SHAPE_NODES: float
+
+STEP_GROWTH: float
+
+STEP_REDUCTION: float
+
 class Panels:
     """The full-contact stress of a profile, compressed on panels."""
 
-    def __init__(self, *, width: float, finest_count: int, x: NDArray[numpy.float64], w: NDArray[numpy.float64], stress: NDArray[numpy.float64], slope: NDArray[numpy.float64], tilt: NDArray[numpy.float64], half_plane: NDArray[numpy.float64], weights: NDArray[numpy.float64], level_start: NDArray[numpy.int64], end_x: NDArray[numpy.float64], end_w: NDArray[numpy.float64], short_count: int, length_x: NDArray[numpy.float64], length_w: NDArray[numpy.float64], length_before: NDArray[numpy.float64], top: int) -> None: ...
+    def __init__(self, *, width: float, finest_count: int, x: numpy.typing.NDArray[numpy.float64], w: numpy.typing.NDArray[numpy.float64], stress: numpy.typing.NDArray[numpy.float64], slope: numpy.typing.NDArray[numpy.float64], tilt: numpy.typing.NDArray[numpy.float64], half_plane: Sequence[numpy.typing.NDArray[numpy.float64]], weights: Sequence[numpy.typing.NDArray[numpy.float64]], level_start: numpy.typing.NDArray[numpy.int64], end_x: numpy.typing.NDArray[numpy.float64], end_w: numpy.typing.NDArray[numpy.float64], short_count: int, length_x: numpy.typing.NDArray[numpy.float64], length_w: numpy.typing.NDArray[numpy.float64], length_before: numpy.typing.NDArray[numpy.float64], top: int) -> None: ...
 
-    def stress(self, theta: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    def stress(self, theta: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """Evaluate S and S' at any angles."""
 
-    def measure(self, theta: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    def measure(self, theta: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """Evaluate sqrt(1 + h'²) and its θ-derivative."""
 
-    def half_plane_opening(self, theta: NDArray[numpy.float64], side: int) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    def half_plane_opening(self, theta: numpy.typing.NDArray[numpy.float64], side: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.
         """
 
-    def contact_length(self, gaps: NDArray[numpy.float64]) -> float:
+    def contact_length(self, gaps: numpy.typing.NDArray[numpy.float64]) -> float:
         """Integrate sqrt(1 + h'²) dθ over the patches between gaps."""
 
 class LoadingDevice:
@@ -59,7 +73,7 @@ class EdgeLaw:
     """Law by which the edges move, with the tolerances of one problem."""
 
     @overload
-    def __init__(self, *, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, overlap_limit: float, force_error: float, pinning: float) -> None: ...
+    def __init__(self, *, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, rough_rate: float, force_error: float, pinning: float) -> None: ...
 
     @overload
     def __init__(self, arg: EdgeLaw, /) -> None: ...
@@ -67,26 +81,8 @@ class EdgeLaw:
     @property
     def critical(self) -> float: ...
 
-    @critical.setter
-    def critical(self, arg: float, /) -> None: ...
-
-    @property
-    def newton_tolerance(self) -> float: ...
-
-    @newton_tolerance.setter
-    def newton_tolerance(self, arg: float, /) -> None: ...
-
-    @property
-    def field_error(self) -> float: ...
-
-    @field_error.setter
-    def field_error(self, arg: float, /) -> None: ...
-
     @property
     def rest_step(self) -> float: ...
-
-    @rest_step.setter
-    def rest_step(self, arg: float, /) -> None: ...
 
     @property
     def longest_step(self) -> float: ...
@@ -101,45 +97,27 @@ class EdgeLaw:
     def smallest(self, arg: float, /) -> None: ...
 
     @property
-    def overlap_limit(self) -> float: ...
-
-    @overlap_limit.setter
-    def overlap_limit(self, arg: float, /) -> None: ...
-
-    @property
-    def force_error(self) -> float: ...
-
-    @force_error.setter
-    def force_error(self, arg: float, /) -> None: ...
-
-    @property
     def pinning(self) -> float: ...
-
-    @pinning.setter
-    def pinning(self, arg: float, /) -> None: ...
 
     @property
     def memory(self) -> NDArray[numpy.float64]:
         """Gaps at the last state."""
 
     @memory.setter
-    def memory(self, arg: NDArray[numpy.float64], /) -> None: ...
+    def memory(self, arg: numpy.typing.NDArray[numpy.float64], /) -> None: ...
 
-    def at_memory(self, gaps: NDArray[numpy.float64]) -> NDArray[numpy.bool_]:
-        """Mark the edges at their memory; none with one work of adhesion."""
+    def free_edges(self, gaps: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Find the edges that are not at their memory; all with one work of adhesion.
+        """
 
-    def critical_of(self, gaps: NDArray[numpy.float64], opening: NDArray[numpy.float64], panels: Panels) -> NDArray[numpy.float64]:
+    def critical_of(self, gaps: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64], panels: Panels) -> numpy.typing.NDArray[numpy.float64]:
         """Compute C_c at every edge with the opening C."""
 
-    def critical_openings(self, theta: NDArray[numpy.float64], panels: Panels) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    def critical_openings(self, theta: numpy.typing.NDArray[numpy.float64], panels: Panels) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """Evaluate C_c of edges that advance, and its θ-derivative."""
 
-def map_gaps(gaps: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
-    """
-    Make the table of gaps: both ends, widths of the patches beside them, α.
-    """
-
-def shortest_length(gaps: NDArray[numpy.float64]) -> float:
+def shortest_length(gaps: numpy.typing.NDArray[numpy.float64]) -> float:
     """Find the length of the shortest gap or patch."""
 
 class Field:
@@ -162,48 +140,48 @@ class Field:
         """-2π/resistance is ∂p/∂d at fixed edges."""
 
     @property
-    def opening(self) -> NDArray[numpy.float64]:
+    def opening(self) -> numpy.typing.NDArray[numpy.float64]:
         """C at each edge."""
 
     @property
-    def scaled_opening(self) -> NDArray[numpy.float64]:
+    def scaled_opening(self) -> numpy.typing.NDArray[numpy.float64]:
         """f: the openings over sqrt(1-η²), at all nodes."""
 
     @property
-    def orders(self) -> NDArray[numpy.int64]: ...
+    def orders(self) -> numpy.typing.NDArray[numpy.int64]: ...
 
     @property
-    def offset(self) -> NDArray[numpy.int64]: ...
+    def offset(self) -> numpy.typing.NDArray[numpy.int64]: ...
 
     @property
-    def theta(self) -> NDArray[numpy.float64]: ...
+    def theta(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def weight(self) -> NDArray[numpy.float64]:
+    def weight(self) -> numpy.typing.NDArray[numpy.float64]:
         """X."""
 
     @property
-    def load(self) -> NDArray[numpy.float64]:
+    def load(self) -> numpy.typing.NDArray[numpy.float64]:
         """S~."""
 
     def block(self, k: int) -> NDArray[numpy.float64]:
         """Diagonal block of B + G of a gap."""
 
-    def edge_openings(self, scaled: NDArray[numpy.float64], with_end_terms: bool = True) -> NDArray[numpy.float64]:
+    def edge_openings(self, scaled: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """Evaluate C at each edge from f at all nodes, of all modes."""
 
-    def openings_by_prescribed(self) -> NDArray[numpy.float64]:
+    def openings_by_prescribed(self) -> numpy.typing.NDArray[numpy.float64]:
         """∂C/∂d at fixed edges."""
 
-    def fine_opening(self, k: int, per_wave: float) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]:
+    def fine_opening(self, k: int, per_wave: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Evaluate θ, T and the weight of ∫ T g dθ over T of a gap at fine nodes, and b_n.
         """
 
-    def sum_modes(self, k: int, theta: NDArray[numpy.float64], modes: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+    def sum_modes(self, k: int, theta: numpy.typing.NDArray[numpy.float64], modes: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """Sum b_n sin((n+1)t), cos t = η(θ), in gap k."""
 
-    def refine_opening(self, k: int, modes: NDArray[numpy.float64], factor: int) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    def refine_opening(self, k: int, modes: numpy.typing.NDArray[numpy.float64], factor: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Evaluate θ and T of gap k at about `factor` times as many nodes as modes.
         """
@@ -211,10 +189,10 @@ class Field:
     def work_of_gaps(self) -> float:
         """Integrate S_full T dθ over the gaps."""
 
-def sum_pull(theta: NDArray[numpy.float64], sine: NDArray[numpy.float64], cosine: NDArray[numpy.float64], weight: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+def sum_pull(theta: numpy.typing.NDArray[numpy.float64], sine: numpy.typing.NDArray[numpy.float64], cosine: numpy.typing.NDArray[numpy.float64], weight: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2."""
 
-def solve_field(gaps: NDArray[numpy.float64], prescribed: float, model: FieldModel, orders: NDArray[numpy.int64] | None = None) -> Field:
+def solve_field(gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, model: FieldModel, orders: numpy.typing.NDArray[numpy.int64] | None = None) -> Field:
     """
     Solve the field of gaps, shape (L, 2); `orders` are those of their rules.
     """
@@ -223,10 +201,7 @@ class ResponseSolution:
     """All edges as a linear response has them at a prescribed value."""
 
     @property
-    def motion(self) -> NDArray[numpy.float64]: ...
-
-    @property
-    def rate(self) -> NDArray[numpy.float64]: ...
+    def motion(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
     def pressure(self) -> float: ...
@@ -250,7 +225,7 @@ class Equilibrium:
     def gaps(self) -> NDArray[numpy.float64]: ...
 
     @property
-    def rate(self) -> NDArray[numpy.float64]: ...
+    def rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
     def pressure(self) -> float: ...
@@ -262,11 +237,11 @@ class Equilibrium:
     def slope(self) -> float: ...
 
     @property
-    def pinned_share(self) -> NDArray[numpy.float64]:
+    def pinned_share(self) -> numpy.typing.NDArray[numpy.float64]:
         """Place of C of pinned edges between both critical openings."""
 
     @property
-    def pinned_rate(self) -> NDArray[numpy.float64]:
+    def pinned_rate(self) -> numpy.typing.NDArray[numpy.float64]:
         """Its derivative by d."""
 
     def solve_field(self, prescribed: float, model: FieldModel) -> Field:
@@ -303,7 +278,7 @@ class Descent:
 class Running:
     """What a descent knows of the way that its edges have come."""
 
-    def __init__(self, start: NDArray[numpy.float64], reach: float) -> None: ...
+    def __init__(self, start: numpy.typing.NDArray[numpy.float64]) -> None: ...
 
 class LinearResponse:
     """Linear response of all gaps and their edges."""
@@ -312,48 +287,52 @@ class LinearResponse:
     def gap_count(self) -> int: ...
 
     @property
-    def orders(self) -> NDArray[numpy.int64]: ...
+    def orders(self) -> numpy.typing.NDArray[numpy.int64]: ...
 
     @property
-    def opening(self) -> NDArray[numpy.float64]:
+    def opening(self) -> numpy.typing.NDArray[numpy.float64]:
         """C of every edge in its reference."""
 
     @property
-    def potential(self) -> NDArray[numpy.float64]:
-        """Potentials of the last solution, without p and by a unit of p."""
+    def potential(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """Potentials of the last solution without p, and with a unit of p."""
 
     @property
     def negative(self) -> int:
         """Number of negative eigenvalues."""
 
-    def update(self, gaps: NDArray[numpy.float64], prescribed: float, least: NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
+    @property
+    def charges(self) -> numpy.typing.NDArray[numpy.int64]:
+        """Number of charges of every run of the tree of gaps."""
+
+    def update(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, least: numpy.typing.NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
         """Set up a response of gaps of which most are those of this one."""
 
-    def count_unknown(self, gaps: NDArray[numpy.float64], law: EdgeLaw, model: FieldModel) -> int:
+    def count_unknown(self, gaps: numpy.typing.NDArray[numpy.float64], law: EdgeLaw, model: FieldModel) -> int:
         """Count the gaps that `update` would not take over."""
 
-    def settle(self, gaps: NDArray[numpy.float64], prescribed: float, law: EdgeLaw, model: FieldModel) -> bool:
+    def settle(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, law: EdgeLaw, model: FieldModel) -> bool:
         """Renew the response for a known equilibrium; False if it is outgrown."""
 
     def solve(self, prescribed: float, law: EdgeLaw, model: FieldModel) -> ResponseSolution: ...
 
-    def solve_separately(self, gaps: NDArray[numpy.float64], pressure: float, prescribed: float, model: FieldModel) -> Field:
+    def solve_separately(self, gaps: numpy.typing.NDArray[numpy.float64], pressure: float, prescribed: float, model: FieldModel) -> Field:
         """Solve every gap by itself in the potential of the last solution."""
 
-    def tangent_between(self, gaps: NDArray[numpy.float64], edges: NDArray[numpy.int64], prescribed: float, law: EdgeLaw, model: FieldModel) -> NDArray[numpy.float64]:
+    def tangent_between(self, gaps: numpy.typing.NDArray[numpy.float64], edges: numpy.typing.NDArray[numpy.int64], prescribed: float, law: EdgeLaw, model: FieldModel) -> NDArray[numpy.float64]:
         """
         Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.
 
         All others follow, but those at their memory, which are pinned.
         """
 
-    def find_equilibrium(self, gaps: NDArray[numpy.float64], prescribed: float, reach: float, strict: bool, law: EdgeLaw, model: FieldModel) -> Equilibrium:
+    def find_equilibrium(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, reach: float, strict: bool, law: EdgeLaw, model: FieldModel) -> Equilibrium:
         """Find the equilibrium next to these gaps by Newton's iteration."""
 
-    def descend(self, gaps: NDArray[numpy.float64], prescribed: float, most: int, equal_speeds: bool, running: Running, law: EdgeLaw, model: FieldModel) -> Descent:
+    def descend(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, most: int, equal_speeds: bool, running: Running, law: EdgeLaw, model: FieldModel) -> Descent:
         """Descend in energy until an event."""
 
-def set_up_response(gaps: NDArray[numpy.float64], prescribed: float, least: NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
+def set_up_response(gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, least: numpy.typing.NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
     """
     Solve the field of these gaps, and linearise about it; None if they have none.
     """
@@ -361,50 +340,48 @@ def set_up_response(gaps: NDArray[numpy.float64], prescribed: float, least: NDAr
 class SearchLengths:
     """Lengths of a search for touches, in 1/q0."""
 
-    def __init__(self, *, max_displacement: float, closing_per_motion: float, surface: float, narrowest: float, widest: float) -> None: ...
+    def __init__(self, *, wave: float, closing_per_motion: float, surface: float, narrowest: float, widest: float) -> None: ...
 
-    def seed_widths(self, curvature: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+    def seed_widths(self, curvature: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """Compute the widths of seeds at touches with these curvatures."""
 
-    def clearances(self, opening: NDArray[numpy.float64], curvature: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+    def clearances(self, opening: numpy.typing.NDArray[numpy.float64], curvature: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Compute the opening left at minima before a seed is put; not positive at a touch.
         """
 
 class SearchedGaps:
-    """Gaps as they were when they were last searched."""
+    """Gaps as they were when they were last searched; a copy has none."""
 
     def __init__(self) -> None: ...
 
-    def __getstate__(self) -> NDArray[numpy.float64]: ...
+    def __getstate__(self) -> int: ...
 
-    def __setstate__(self, arg: NDArray[numpy.float64], /) -> None: ...
+    def __setstate__(self, arg: int, /) -> None: ...
 
-def search(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> tuple[float, int, tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]], SearchedGaps]:
+def search(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> tuple[float, int, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]], SearchedGaps]:
     """
     Find the least clearance of a field, searching only gaps that may have closed.
 
-    Also returns the number of these gaps, their minima, and the updated searched gaps.
+    Also returns the number of these gaps, their minima (positions, openings and curvatures), and the updated searched gaps.
     """
 
-def clearance_left(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> NDArray[numpy.float64]:
+def clearance_left(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> numpy.typing.NDArray[numpy.float64]:
     """Bound the clearance left in each gap from below."""
 
-def least_clearances(field: Field, gaps: NDArray[numpy.int64], lengths: SearchLengths) -> NDArray[numpy.float64]:
+def least_clearances(field: Field, gaps: numpy.typing.NDArray[numpy.int64], lengths: SearchLengths) -> numpy.typing.NDArray[numpy.float64]:
     """Find the least clearance of some gaps."""
 
 class TwoPoints:
     """Two points of a branch, `way` apart in d."""
 
-    def __init__(self, gaps: NDArray[numpy.float64], rate: NDArray[numpy.float64], gaps_before: NDArray[numpy.float64], rate_before: NDArray[numpy.float64], way: float) -> None: ...
+    def __init__(self, gaps: numpy.typing.NDArray[numpy.float64], rate: numpy.typing.NDArray[numpy.float64], gaps_before: numpy.typing.NDArray[numpy.float64], rate_before: numpy.typing.NDArray[numpy.float64], way: float) -> None: ...
 
     def leading_edge(self) -> LeadingEdge:
         """Find the leading edge, and the fold ahead."""
 
-    def other_fold(self, leading: int) -> tuple[int, float]:
-        """
-        Find the nearest fold ahead that other gaps lead to: edge and distance.
-        """
+    def other_fold(self, leading: int) -> OtherFold:
+        """Find the nearest fold ahead that other gaps lead to."""
 
     def predict_gaps(self, on: float, leading: LeadingEdge) -> NDArray[numpy.float64]:
         """Predict the gaps at a distance `on` in d."""
@@ -436,6 +413,19 @@ class LeadingEdge:
     @property
     def fold_distance(self) -> float: ...
 
+class OtherFold:
+    """Fold that others lead to than the leading edge."""
+
+    def __init__(self) -> None: ...
+
+    @property
+    def edge(self) -> int:
+        """-1 for none."""
+
+    @property
+    def distance(self) -> float:
+        """In d; infinite for none."""
+
 def dot(a: NDArray[numpy.float64], b: NDArray[numpy.float64]) -> float:
     """Sum a_i b_i, in an order that depends on their number alone."""
 
@@ -465,95 +455,67 @@ def advance(stress: NDArray[numpy.float64], displacement: NDArray[numpy.float64]
 def inverse_form(matrix: NDArray[numpy.float64], vector: NDArray[numpy.float64]) -> float:
     """Return bᵀA⁻¹b for a symmetric positive definite A; overwrites A."""
 
-def gap_moments(gap: NDArray[numpy.float64], panels: Panels, modes: int, fields: int) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
-    """
-    Compute s_n of S, and with two fields of S', and the loads of both ends.
-    """
-
-def theta_at(gap: NDArray[numpy.float64], eta: float) -> tuple[float, float]:
-    """Compute θ and dθ/dη at η."""
-
-def fast_size(fewest: int) -> int:
-    """Round up a number of nodes of a sine transform."""
-
-def sine_sums(x: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
-    """Compute Σ_j x_j sin(π (j+1)(k+1)/N) of N - 1 numbers."""
-
-def count_charges(gaps: NDArray[numpy.float64], digits: float) -> NDArray[numpy.int64]:
-    """Count the charges of every run of the tree of gaps."""
-
-def pair_runs(count: int) -> NDArray[numpy.int64]:
+def pair_runs(count: int) -> list[list[int]]:
     """
     Pair neighbouring runs of gaps, level by level: the halves of every run.
     """
 
-def pair_again(known: NDArray[numpy.int64], source: NDArray[numpy.int64]) -> tuple[NDArray[numpy.int64], NDArray[numpy.int64]]:
+def pair_again(known: Sequence[Sequence[int]], source: numpy.typing.NDArray[numpy.int64]) -> tuple[list[list[int]], numpy.typing.NDArray[numpy.int64]]:
     """Pair the runs of gaps most of which are those of known halves."""
 
-def count_negative(h: NDArray[numpy.float64], r: NDArray[numpy.float64]) -> int:
+def count_negative(h: numpy.typing.NDArray[numpy.float64], r: numpy.typing.NDArray[numpy.float64]) -> int:
     """Count the negative eigenvalues of [[h, 1], [1, r]]."""
 
-def solve_definite(matrix: NDArray[numpy.float64], load: NDArray[numpy.float64]) -> NDArray[numpy.float64] | None:
-    """Solve a system; None if its matrix is not positive definite."""
-
-def invert_definite(matrix: NDArray[numpy.float64]) -> NDArray[numpy.float64] | None:
-    """Invert a matrix; None if it is not positive definite."""
-
-def local_minima(theta: NDArray[numpy.float64], opening: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]:
+def local_minima(theta: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """Find local minima where θ falls: position, value, its error."""
 
-def on_new_tree(response: LinearResponse, digits: float) -> tuple[NDArray[numpy.float64], int]:
-    """
-    Solve for the potentials of a response on a tree that is built anew, and count its negative eigenvalues.
-    """
+def on_new_tree(response: LinearResponse, prescribed: float, law: EdgeLaw, model: FieldModel) -> LinearResponse:
+    """Solve a response on a tree that is built anew."""
 
 class EdgeModel:
     """Model of the edge openings about solved edges."""
 
-    def __init__(self, edges: NDArray[numpy.int64], gaps: NDArray[numpy.float64], residual: NDArray[numpy.float64], tangent: NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> None: ...
+    def __init__(self, edges: numpy.typing.NDArray[numpy.int64], gaps: numpy.typing.NDArray[numpy.float64], residual: numpy.typing.NDArray[numpy.float64], tangent: numpy.typing.NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> None: ...
 
     @property
-    def opening(self) -> NDArray[numpy.float64]: ...
+    def opening(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def own(self) -> NDArray[numpy.float64]: ...
+    def own(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
     def coupling(self) -> NDArray[numpy.float64]: ...
 
     @property
-    def forces(self) -> NDArray[numpy.float64]: ...
+    def forces(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
     def hessian(self) -> NDArray[numpy.float64]: ...
 
-    def advance(self, step: NDArray[numpy.float64]) -> None:
+    def advance(self, step: numpy.typing.NDArray[numpy.float64]) -> None:
         """Move the edges outwards by these steps."""
 
-    def flow(self, limit: NDArray[numpy.float64], equal_speeds: bool, is_long: bool, strongest: float, law: EdgeLaw) -> ModelFlow: ...
+    def flow(self, limit: numpy.typing.NDArray[numpy.float64], equal_speeds: bool, is_long: bool, strongest: float, law: EdgeLaw) -> ModelFlow: ...
 
 class ModelFlow:
     """Flow through the model."""
 
-    def __init__(self, motion: NDArray[numpy.float64], opening: NDArray[numpy.float64], lengths: NDArray[numpy.float64], residuals: NDArray[numpy.float64]) -> None: ...
+    def __init__(self, motion: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64], lengths: numpy.typing.NDArray[numpy.float64], residuals: Sequence[numpy.typing.NDArray[numpy.float64]]) -> None: ...
 
     @property
-    def motion(self) -> NDArray[numpy.float64]: ...
+    def motion(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def lengths(self) -> NDArray[numpy.float64]: ...
+    def lengths(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    @property
-    def is_at_limit(self) -> bool: ...
-
-def implicit_step(hessian: NDArray[numpy.float64], force: NDArray[numpy.float64], longest: float, equal_speeds: bool) -> NDArray[numpy.float64]:
+def implicit_step(hessian: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], longest: float, equal_speeds: bool) -> numpy.typing.NDArray[numpy.float64]:
     """Take a linearly implicit step."""
 
-def distance_to_minimum(hessian: NDArray[numpy.float64], force: NDArray[numpy.float64]) -> float:
+def distance_to_minimum(hessian: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64]) -> float:
     """
     Compute the largest motion to the minimum of a quadratic model; infinite without one.
     """
 
-def model_error(flow: ModelFlow, residual: NDArray[numpy.float64], edges: NDArray[numpy.int64], gaps: NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> float: ...
+def model_error(flow: ModelFlow, residual: numpy.typing.NDArray[numpy.float64], edges: numpy.typing.NDArray[numpy.int64], gaps: numpy.typing.NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> float: ...
 
 def next_reach(before: float, length: float, error: float) -> float: ...

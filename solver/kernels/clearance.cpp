@@ -18,11 +18,11 @@ Vector low_openings(const Field& field, int k, const GaussRule& rule) {
 double clearance_since(const Field& field, int k, const SearchedGap& was,
                        const SearchLengths& lengths, const GaussRule& rule) {
   const Gap& gap = field.nodes.gaps[k];
-  const double furthest = lengths.max_displacement;
+  const double furthest = COMPARABLE * lengths.wave;
   const double begin = gap.end[0] - was.end[0], end = gap.end[1] - was.end[1];
   if (std::abs(begin) > furthest || std::abs(end) > furthest || field.nodes.orders[k] != was.order)
     return -1;
-  const double within = NO_MINIMUM_WITHIN / COMPARABLE * furthest;
+  const double within = NO_MINIMUM_WITHIN * lengths.wave;
   const double by_edges = lengths.closing_per_motion * (std::max(begin, 0.0) + std::max(-end, 0.0));
   const Vector opening = low_openings(field, k, rule);
   double closed = 0, most = 0;
@@ -64,7 +64,7 @@ RemainingClearance clearance_left(const Field& field, const SearchedGaps& search
   RemainingClearance out{Vector(count, -1), Integers(count, -1), {}};
   size_t j = 0;
   for (int k = 0; k < count; ++k) {
-    const double least = field.nodes.gaps[k].end[0] - lengths.max_displacement;
+    const double least = field.nodes.gaps[k].end[0] - COMPARABLE * lengths.wave;
     while (j < searched.size() && searched[j]->end[0] < least) ++j;
     if (j < searched.size()) {
       const GaussRule& rule = gauss_rules()[field.nodes.orders[k]];

@@ -19,7 +19,7 @@ namespace adhesis {
 
 // Lengths of a search, in units of 1/q0.
 struct SearchLengths {
-  double max_displacement;    // nodes that moved further are not compared
+  double wave;                // λ_min
   double closing_per_motion;  // closing beside an edge over the motion of the edge
   double surface;             // Γ
   double narrowest, widest;   // of a seed

@@ -60,7 +60,7 @@ bool run_more(Flags& runs, const LinearResponse& response, const ResponseSolutio
     const Edge& edge = response.edges[e];
     const bool pinned = law.pinning > 0 && edge.held;
     const double residual = edge.imbalance(e % 2, law.pinning).value;
-    const bool unbalanced = std::abs(residual) > RUNNING * law.critical && !pinned;
+    const bool unbalanced = std::abs(residual) > UNBALANCED * law.critical && !pinned;
     const bool far = std::abs(now.motion[e] - edge.here) > FOLLOWING * law.longest_step;
     if ((unbalanced || (none && far)) && !runs[e]) runs[e] = more = true;
   }
@@ -134,7 +134,7 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
     ModelFlow flow = flow_through(openings, limit, equal_speeds, is_long, strongest, law);
     for (int i = 0; i < count; ++i) motion[edges[i]] = flow.motion[i];
     const bool vanished = shortest_length(move_edges(ends, motion)) < law.smallest;
-    const bool runs_on = flow.is_at_limit || largest(motion) > RUNNING_LENGTH * law.longest_step;
+    const bool runs_on = flow.is_at_limit || largest(motion) > FOLLOWING * law.longest_step;
     if (!is_long || (runs_on && !vanished)) return flow;
     is_long = false;
   }
@@ -146,18 +146,17 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
 // vanished does not matter.
 bool may_race(const Integers& edges, const Matrix& tangent, const Vector& start, const Vector& ends,
               const EdgeLaw& law) {
-  const double ran = RAN * law.longest_step / LONGEST_STEP;
   for (int i = 0; i < tangent.n; ++i) {
     const int e = edges[i];
     const double way = outwards(e) * (ends[e] - start[e]);
-    if (std::abs(way) < ran) continue;
+    if (std::abs(way) < law.longest_step) continue;
     double taken = 0;
     for (int j = 0; j < tangent.n; ++j) {
       const int f = edges[j];
       const double apart = std::abs(ends[e] - ends[f]);
       if (i == j || std::min(apart, 2 * pi - apart) < law.smallest) continue;
       const double along = outwards(f) * (ends[f] - start[f]);
-      if (std::abs(along) > ran) {
+      if (std::abs(along) > law.longest_step) {
         const double force = law.critical * (tangent(i, j) + tangent(j, i)) * along;
         // written so that a force that is no number stays one
         taken += way * force < 0 ? 0 : std::copysign(1, way) * force;
@@ -207,8 +206,8 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
       judges = false;
       const double error = model_error(flow, residual, edges, ends, law, panels);
       const double length = largest(flow.motion) / law.longest_step;
-      reach = std::max(next_reach(reach, length, error), SHORTEST_REACH);
-      if (error > 1 && length > 1.5 * SHORTEST_REACH) {
+      reach = std::max(next_reach(reach, length, error), MODEL_SHORT_STEP);
+      if (error > 1 && length > 1.5 * MODEL_SHORT_STEP) {
         ends = before;
         moved = true;
         continue;

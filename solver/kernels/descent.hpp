@@ -32,9 +32,9 @@ struct Descent {
 
 // What a descent knows of the way that its edges have come.
 struct Running {
-  Flags edges;   // those that run
-  Vector start;  // ends where they began to run
-  double reach;  // of the first long step, in longest steps
+  Flags edges;                 // those that run
+  Vector start;                // ends where they began to run
+  double reach = FIRST_REACH;  // of the first long step, in longest steps
 };
 
 // Descend until an event; `running.edges` follows. Without adhesion the edges are stable but where

@@ -23,10 +23,10 @@ struct EdgeLaw {
   double rest_step;         // a descent with shorter steps is left to Newton's iteration
   double longest_step;      // longest short step of an edge in a descent
   double smallest;          // narrower patches and gaps are removed
-  double overlap_limit;     // an opening this far below zero is one that descent cannot weigh
-  double force_error;       // a force C_c² - C² this small is that of rounding
+  double rough_rate;        // of an opening over a shortest wave, by roughness or by C_c
+  double force_error;       // a force C_c² - C² this small is the error of the field
   double pinning;           // sqrt(γ_open/γ) - 1, by which C_c of a receding edge is larger
-  Vector memory;            // ends at the last state; empty for one work of adhesion
+  Vector memory = {};       // ends at the last state; empty for one work of adhesion
 };
 
 inline double outwards(int edge) { return edge % 2 == 0 ? 1 : -1; }

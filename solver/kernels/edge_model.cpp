@@ -50,16 +50,15 @@ Vector implicit_step(const Matrix& hessian, const Vector& force, double longest,
                      bool equal_speeds) {
   const int n = hessian.n;
   const double strongest = largest(force);
-  double growth = 1 / longest;
   Vector step(n);
-  for (int tries = 0; tries < TIME_TRIES; ++tries) {
+  for (double growth = 1 / longest; growth < infinity;) {
     Matrix factor = hessian;
     for (int e = 0; e < n; ++e) {
       double own = equal_speeds ? std::max(std::abs(force[e]), SLOWEST * strongest) : strongest;
       factor(e, e) += growth * own;
     }
     if (!factor_rows(factor.values.data(), n, n)) {
-      growth *= RATE_GROWTH;
+      growth /= STEP_REDUCTION;
       continue;
     }
     step = force;
@@ -67,7 +66,7 @@ Vector implicit_step(const Matrix& hessian, const Vector& force, double longest,
     const double size = largest(step);
     if (size <= longest) break;
     for (double& motion : step) motion *= longest / size;
-    growth *= std::min(RATE_GROWTH, 1.1 * size / longest);
+    growth *= std::min(1 / STEP_REDUCTION, 1.1 * size / longest);
   }
   return step;
 }
@@ -176,7 +175,7 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
   ModelFlow out;
   Matrix hessian(count);
   Vector force(count);
-  const double longest = (is_long ? MODEL_STEP : MODEL_SHORT_STEP) * law.longest_step;
+  const double longest = (is_long ? 1 : MODEL_SHORT_STEP) * law.longest_step;
   double length = 0, share = 1, first = 0, shortest = RUNNING_ENDS * law.longest_step;
   for (double own : limit) shortest = std::min(shortest, RUNNING_ENDS * own);
   while (int(out.lengths.size()) < MODEL_STEPS && share == 1) {
@@ -189,7 +188,7 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
     Vector step = implicit_step(hessian, force, longest, equal_speeds);
     if (law.pinning > 0) stop_at_memory(model, force, step, law);
     if (!(largest(step) > shortest) &&
-        (distance_to_minimum(hessian, force) <= shortest || total < FAINT_SADDLE * law.force_error))
+        (distance_to_minimum(hessian, force) <= shortest || total < law.force_error))
       break;
     share = share_within(model, step, limit);
     if (share < 1)

@@ -11,7 +11,7 @@ namespace adhesis {
 struct ShortRule {
   Vector minus, plus, eta, sine;  // 1 - η and 1 + η, to rounding, η, and sin t
 
-  explicit ShortRule(int count);
+  ShortRule(int count);
 };
 
 // Rule on a finest panel from 0 to 1, and ∫ sqrt(1 + h'²) dθ from 0 to the start of each panel.

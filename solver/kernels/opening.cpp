@@ -35,7 +35,7 @@ void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
     const double slope = (right - left) / (2 * width);
     if (!(half > 0)) {
       low = here;
-      half = std::max(half, NO_CURVATURE);
+      half = std::max(half, std::numeric_limits<double>::min());
       break;
     }
     const double step = std::min(std::max(-slope / (2 * half), -4 * width), 4 * width);

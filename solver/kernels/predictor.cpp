@@ -52,7 +52,7 @@ double led(double on, double way, const LeadingEdge& leading) {
     if (high > PREDICTION_TRUSTED * 2 * on / here) return low;
   }
   double lead = std::min(on / here, high);
-  for (int i = 0; i < PREDICTOR_ITERATIONS; ++i) {
+  for (int i = 0; i < std::numeric_limits<double>::digits; ++i) {
     const double value = polynomial(leading, lead) - on;
     (value > 0 ? high : low) = lead;
     const double slope = here + lead * (2 * leading.square + 3 * lead * leading.cube);

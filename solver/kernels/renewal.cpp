@@ -76,7 +76,7 @@ Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, cons
   const double softness = response.softness[k];
   Outdated out = is_outdated(response.nodes.gaps[k], gap, softness, law);
   // in other potentials than those of its reference its edges follow otherwise
-  const double allowed = REFERENCE_BALANCE * law.critical;
+  const double allowed = UNBALANCED * law.critical;
   for (int side = 0; side < 2; ++side) {
     const Edge& edge = response.edges[2 * k + side];
     const bool pinned = law.pinning > 0 && edge.held;

@@ -72,11 +72,10 @@ void LinearResponse::update_softness(const Pair& motion, double by_pressure, con
   double held_mean = dot(tree.stretch.data(), held_charge[1].data(), nodes.size());
   held_mean = device.separation_weight * held_mean - 2 * pi * device.compliance;
   const double more = std::abs(held_mean / by_pressure) / SOFT_EDGE;
-  const double rough = 0.5 * law.overlap_limit / law.longest_step;
   softness.assign(count, 1);
   for (int e = 0; e < 2 * count; ++e) {
     const Edge& edge = edges[e];
-    double stiff = std::max(rough, std::abs(edge.tangent[0]) + std::abs(edge.tangent[1]));
+    double stiff = std::max(law.rough_rate, std::abs(edge.tangent[0]) + std::abs(edge.tangent[1]));
     double soft = more * stiff * std::abs(motion[1][e] / edge.opening_by_pressure);
     for (int beside : {count - 1, 0, 1}) {
       double& of_gap = softness[(e / 2 + beside) % count];

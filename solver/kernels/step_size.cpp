@@ -22,10 +22,10 @@ double model_error(const ModelFlow& flow, const Vector& residual, const Integers
 
 double next_reach(double before, double length, double error) {
   const double safe = REACH_SAFETY / std::sqrt(std::max(error, 1e-9));
-  const double factor = std::min(REACH_GROWTH, std::max(REACH_CUT, safe));
+  const double factor = std::min(STEP_GROWTH, std::max(STEP_REDUCTION, safe));
   double reach = length * factor;
   if (error <= 1) reach = std::max(reach, factor >= 1 ? before : 0.0);
-  return std::min(reach, LONGEST_REACH);
+  return reach;
 }
 
 }  // namespace adhesis

@@ -18,7 +18,7 @@ Gap interval(const std::vector<Gap>& gaps, int first, int last) {
 // Return the number of charges that a run needs.
 int wanted_rank(const Gap& interval, double digits) {
   int wanted = int(std::ceil((digits + CHARGE_MARGIN) / convergence_rate(interval)));
-  return std::min(std::max(wanted, FEWEST_CHARGES), MOST_CHARGES);
+  return std::min(std::max(wanted, gauss_rules().front().count), MOST_CHARGES);
 }
 
 // Compute K between two sets of charges.
@@ -369,7 +369,9 @@ void Tree::factor(int index) {
   // than its halves: Haynsworth's formula, applied twice. These are none where the eigenvalues of
   // H R1, real if one of both is definite, are below one.
   run.count = {one.count.negative + two.count.negative, 1};
-  if (squares > WEAK_INTERACTION || (one.count.negative > 0 && two.count.negative > 0)) {
+  // Below so large a sum of squares none is near one, and none is counted.
+  const double weak = 1 - 1 / SOFT_EDGE;
+  if (squares > weak * weak || (one.count.negative > 0 && two.count.negative > 0)) {
     Vector own_first(first, first + n * n);
     const NegativeCount pair = count_negative(reflected.data(), own_first.data(), n);
     run.count.negative += n - pair.negative;
@@ -404,7 +406,7 @@ WIDE void Tree::charge(int index, Charges& charges) const {
   double *g1 = &charges.potential_of_sibling[one.node],
          *g2 = &charges.potential_of_sibling[two.node];
   const double *q1_alone = &charges.isolated[one.node], *q2_alone = &charges.isolated[two.node];
-  double q1[MOST_RANK], q2[MOST_RANK], g[MOST_RANK];
+  double q1[MOST_CHARGES], q2[MOST_CHARGES], g[MOST_CHARGES];
   // g1 = -(1 - H R1)⁻¹ K12 (q2° + R2 K21 q1°);  g2 = -K21 q1
   apply_transposed(k12, n, m, q1_alone, g2);
   apply(second, m, m, g2, q2);

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 @dataclass
 class Counters:
-    """Numbers of field and derivative solutions, energies, fine openings and steps."""
+    """Numbers of field solutions, energies, fine openings and steps."""
 
     fields: int = 0
-    derivatives: int = 0
     energies: int = 0
     openings: int = 0
     newton_steps: int = 0
@@ -20,10 +19,8 @@ class Counters:
         """Add the steps of a Newton iteration."""
         self.newton_steps += steps
         self.fields += steps
-        self.derivatives += steps
 
-    def add_descent(self, fields: int, tangents: int) -> None:
-        """Add the fields and the tangents of a descent."""
-        self.descent_steps += fields
-        self.fields += fields
-        self.derivatives += tangents
+    def add_descent(self, steps: int) -> None:
+        """Add the steps of a descent."""
+        self.descent_steps += steps
+        self.fields += steps

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.solver._kernels import (
+    CLOSING_SHARE,
     Descent,
     DescentEvent,
     EdgeLaw,
@@ -37,11 +38,9 @@ from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import (
-    DESCENT_LIMIT,
-    EQUAL_GAINS,
-    FINER_FIELD,
-    FIRST_REACH,
-    LAST_GAP,
+    ENDLESS,
+    EQUAL,
+    FIELD_ACCURACY,
     RESPONSE_TRIALS,
     RESTS,
 )
@@ -95,7 +94,7 @@ class EdgeMechanics(EdgeProblem):
     def _solve_finer(self, point: Point) -> Field:
         """Solve the field of a point more accurately than that of the path."""
         if self._finer is None or self._finer[0] is not point:
-            self._finer = point, self.solution(point.gaps, point.at, FINER_FIELD)
+            self._finer = point, self.solution(point.gaps, point.at, FIELD_ACCURACY)
         return self._finer[1]
 
     def equilibrium(
@@ -173,7 +172,7 @@ class EdgeMechanics(EdgeProblem):
             If the last gap closes, as it may where the separation is not fixed.
         """
         law = self.law_at(gaps)
-        left, rests, raced = DESCENT_LIMIT, 0, False
+        left, rests, raced = ENDLESS, 0, False
         orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
@@ -222,7 +221,7 @@ class EdgeMechanics(EdgeProblem):
 
         None if the edges have no field.
         """
-        running = Running(start, FIRST_REACH)
+        running = Running(start)
         while True:
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
@@ -230,7 +229,7 @@ class EdgeMechanics(EdgeProblem):
             end = near.response.descend(
                 gaps, prescribed, most, equal_speeds, running, law, self.model
             )
-            self.count.add_descent(end.steps, end.steps)
+            self.count.add_descent(end.steps)
             if end.event != DescentEvent.OUTGROWN:
                 return end, near.response.orders
             gaps = end.gaps
@@ -243,7 +242,7 @@ class EdgeMechanics(EdgeProblem):
         first, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
-        near, free = self.responses.at(gaps, prescribed), np.flatnonzero(~law.at_memory(gaps))
+        near, free = self.responses.at(gaps, prescribed), law.free_edges(gaps)
         if near is None or self.critical == 0 or len(free) == 0:
             return []
         tangent = near.response.tangent_between(gaps, free, prescribed, law, self.model)
@@ -260,7 +259,7 @@ class EdgeMechanics(EdgeProblem):
             onwards = self._force_along(ways[0], step, prescribed, law)
             backwards = self._force_along(ways[1], -step, prescribed, law)
             if max(onwards, backwards) > 0:
-                return ways if onwards >= backwards * (1 - EQUAL_GAINS) else ways[::-1]
+                return ways if onwards >= backwards * (1 - EQUAL) else ways[::-1]
             step = 0.5 * step
         return []
 
@@ -285,7 +284,7 @@ class EdgeMechanics(EdgeProblem):
         length, _ = lengths_of(gaps)
         if length[0] < self.smallest and self.model.device.compliance > 0:
             raise FullContact
-        return min(smallest, LAST_GAP * float(length[0]))
+        return min(smallest, CLOSING_SHARE * float(length[0]))
 
     def _perturb_most_unbalanced(
         self, gaps: Array, prescribed: float, times: int, law: EdgeLaw
@@ -301,6 +300,7 @@ class EdgeMechanics(EdgeProblem):
         length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
-        step[e] = min(0.5 * times * law.longest_step, 0.25 * length[e // 2], 0.25 * beside)
+        closing = CLOSING_SHARE * min(length[e // 2], beside)
+        step[e] = min(0.5 * times * law.longest_step, closing)
         onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
         return onwards

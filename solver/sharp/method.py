@@ -43,7 +43,6 @@ from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 from adhesis.solver.sharp.output.interior_tension import largest_tension
 from adhesis.solver.sharp.tolerances import (
-    CORRECTED,
     FIELD_ACCURACY,
     FIELD_RESOLVES,
     FIELD_SHARE,
@@ -55,6 +54,7 @@ from adhesis.solver.sharp.tolerances import (
     LEAST_DROP,
     LEAST_FIELD_TOLERANCE,
     LEAST_JUMP_RESOLUTION,
+    LONGEST_STEP,
     PLACED_BY_PROFILE,
     TRAPEZOID,
     WEAKNESS_POWER,
@@ -73,7 +73,7 @@ class SharpReport(MethodReport):
         Relative accuracy of the field.
     jump_resolution : float
         Separation to which a jump is located, over h_max.
-    fields, derivatives, energies, openings, newton_steps, descent_steps : int
+    fields, energies, openings, newton_steps, descent_steps : int
         See ``counters.Counters``.
     """
 
@@ -81,7 +81,6 @@ class SharpReport(MethodReport):
     field_tolerance: float
     jump_resolution: float
     fields: int
-    derivatives: int
     energies: int
     openings: int
     newton_steps: int
@@ -251,7 +250,7 @@ class SharpMethod(Method):
         else:
             gaps = state.internal.gaps
             if point is None:
-                point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
+                point = self.edges.equilibrium(gaps, at, LONGEST_STEP * self.edges.wave)
                 if point is not None:
                     point = point.with_clearance(state.internal.clearance)
             else:

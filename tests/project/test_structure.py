@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from adhesis.solver.sharp import tolerances
 from tests.support.campaign_support import run_python
 from tests.support.synthetic_results import campaign, rows, text_of, write
 from tools.stub import stub
@@ -77,17 +76,6 @@ def test_what_a_benchmark_imports_is_there(path: Path) -> None:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module != "__future__":
             exec(ast.unparse(node), {})  # raises ImportError
-
-
-def test_tolerances_of_the_kernels_are_those_of_the_page_of_tolerances() -> None:
-    """Each stands in both languages; units and reasons in Python alone."""
-    text = (ROOT / "solver" / "kernels" / "tolerances.hpp").read_text()
-    found = dict(re.findall(r"([A-Z][A-Z_]+) = ([-0-9.e]+)", text))
-    assert len(found) > 40
-    assert float(found.pop("MOST_RANK")) >= float(found["MOST_CHARGES"])
-    assert {name: getattr(tolerances, name) for name in found} == {
-        name: float(value) for name, value in found.items()
-    }
 
 
 def test_the_types_of_the_kernels_are_those_of_the_module() -> None:

@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
 from adhesis.solver._kernels import (
+    STEP_GROWTH,
+    STEP_REDUCTION,
     Descent,
     DescentEvent,
     EdgeLaw,
@@ -25,13 +27,6 @@ from adhesis.solver.sharp.equilibrium.griffith import imbalance, leaving_step
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.tolerances import (
-    FIRST_REACH,
-    LONGEST_REACH,
-    MODEL_STEP,
-    REACH_CUT,
-    REACH_GROWTH,
-)
 from tests.support.dense import DenseSolution, dense_tangent, solve_densely
 
 SOLID = HalfSpace(1e6, 0.5)
@@ -245,7 +240,7 @@ def test_steps_through_the_model_converge_to_its_flow(rough):
         finer = EdgeLaw(law)
         finer.longest_step *= share
         flow = rough.model().flow(limit, False, True, 0.0, finer)
-        assert np.diff(flow.lengths, prepend=0.0).max() <= MODEL_STEP * finer.longest_step * 1.001
+        assert np.diff(flow.lengths, prepend=0.0).max() <= finer.longest_step * 1.001
         assert np.abs(flow.motion).max() == pytest.approx(WAVE)
         errors.append(np.abs(flow.motion - exact).max() / WAVE)
     assert errors[0] < 0.1
@@ -311,9 +306,8 @@ def test_openings_of_the_model_may_be_wrong_by_more_far_from_balance(rough):
 
 def test_the_reach_of_long_steps_follows_the_root_of_their_error():
     assert 0.3 * 10 < next_reach(10.0, 10.0, 4.0) < 0.5 * 10  # at half of it it is what is allowed
-    assert next_reach(10.0, 10.0, np.inf) == pytest.approx(REACH_CUT * 10)
-    assert next_reach(10.0, 10.0, 0.0) == REACH_GROWTH * 10
-    assert next_reach(10.0, 90.0, 0.0) == LONGEST_REACH
+    assert next_reach(10.0, 10.0, np.inf) == pytest.approx(STEP_REDUCTION * 10)
+    assert next_reach(10.0, 10.0, 0.0) == STEP_GROWTH * 10
     assert next_reach(10.0, 1.0, 1e-4) == 10  # edges came to rest: no reason to shorten
 
 
@@ -329,7 +323,7 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     """Descend on a single wave of amplitude 1 µm, at a separation in amplitudes."""
     edges, ends = method.edges, np.array(gaps, dtype=float)
     prescribed = separation * 2 * np.pi * 1e-3
-    none = Running(ends, FIRST_REACH)
+    none = Running(ends)
     while True:
         near = edges.responses.near(ends, prescribed, None)
         assert near is not None

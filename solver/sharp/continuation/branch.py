@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver._kernels import shortest_length
+from adhesis.solver._kernels import COMPARABLE, shortest_length
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.jump import ComputedJump
@@ -19,9 +19,7 @@ from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
-    CORRECTED,
-    FIRST_MOTION,
-    LONGEST_PREDICTION,
+    LONGEST_STEP,
     ORDER_RESOLVED,
     PREDICTED_MOTION,
     QUIET_STRESS,
@@ -294,7 +292,7 @@ class Branch:
 
     def _next_step(self) -> float:
         predictor = self._predictor
-        motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
+        motion = LONGEST_STEP if predictor.way == 0 else PREDICTED_MOTION
         step = self.steps.next(predictor, self._target.at, motion * self._edges.wave)
         self._free_step, self._begins_to_move = step, False
         return step if self.point.pinned is None else self._step_to_kink(step, self.point.pinned)
@@ -405,6 +403,6 @@ def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | No
     """
     gaps = predictor.gaps(at)
     # not written as > : a prediction that is no number is none
-    if not np.abs(gaps - predictor.point.gaps).max() <= LONGEST_PREDICTION * edges.wave:
+    if not np.abs(gaps - predictor.point.gaps).max() <= COMPARABLE * edges.wave:
         return None
-    return edges.equilibrium(gaps, at, CORRECTED * edges.wave, memory=predictor.point.gaps)
+    return edges.equilibrium(gaps, at, LONGEST_STEP * edges.wave, memory=predictor.point.gaps)

@@ -30,11 +30,11 @@ from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import (
-    CORRECTED,
-    EQUAL_AMPLITUDES,
+    DESCENT_HANDS_OVER,
+    EQUAL,
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
-    SAME_BRANCH,
+    LONGEST_STEP,
     SECOND_FOLD_DISPLACED,
 )
 from adhesis.solver.values import with_values
@@ -187,7 +187,7 @@ class Follower:
         if refined < branch.steps.finest:
             branch.steps.refine(refined)
             return None
-        goes_on = fold.at != target.at and self._is_near(fold.point, after, SAME_BRANCH)
+        goes_on = fold.at != target.at and self._is_near(fold.point, after, DESCENT_HANDS_OVER)
         if goes_on and after is not None:
             # Newton's iteration failed where there was no fold: the branch goes on.
             branch.continue_from(after)
@@ -358,14 +358,14 @@ class Follower:
         point = fold.point
         if not self.jumps.mirror.is_symmetric(point.gaps):
             return point.gaps, self._orders_of_folds(fold)
-        reach = CORRECTED * self.edges.wave
+        reach = LONGEST_STEP * self.edges.wave
         saddle = self.edges.equilibrium(point.extrapolate(fold.at), fold.at, reach, strict=False)
         if saddle is not None:
             ways = self.edges.ways_off_saddle(saddle.gaps, fold.at, self.edges.law_at(point.gaps))
             if ways:
                 return ways[0], Orders(fold.at, tuple(ways))
         rate = np.abs(point.rate)
-        fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
+        fastest = np.flatnonzero(rate >= (1 - EQUAL) * rate.max())
         away = positions(point.gaps, self.edges.source.highest)[fastest]
         edge = int(fastest[np.argmin(away)])
         way = np.sign(point.rate[edge] * (fold.at - point.at))

@@ -16,8 +16,8 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
-    CORRECTED,
-    MOST_NUCLEATIONS,
+    ENDLESS,
+    LONGEST_STEP,
     OTHER_MINIMUM,
 )
 
@@ -216,7 +216,7 @@ class Jumps:
         """
         # without adhesion patches narrower than the least are left out, and overlap so much
         adhesive = self.edges.critical > 0
-        for _ in range(MOST_NUCLEATIONS):
+        for _ in range(ENDLESS):
             if point is None:
                 if not (adhesive and self.states.overlaps_when_detached(at)):
                     return None
@@ -277,7 +277,7 @@ class Jumps:
         self, gaps: Array, at: float, *, equal_speeds: bool = False
     ) -> tuple[Point | None, bool]:
         """Descend until nothing vanishes; returns also whether edges may have raced."""
-        reach, races = CORRECTED * self.edges.wave, False
+        reach, races = LONGEST_STEP * self.edges.wave, False
         while len(gaps):
             found, raced = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds)
             races = races or raced

@@ -13,11 +13,10 @@ the next to come to a fold.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from adhesis.solver._kernels import TwoPoints
+from adhesis.solver._kernels import PREDICTION_TRUSTED, OtherFold, TwoPoints
 from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import outward
@@ -25,7 +24,6 @@ from adhesis.solver.sharp.tolerances import (
     BEYOND_FOLD,
     LEAST_LEFT_BEFORE_FOLD,
     LEFT_BEFORE_FOLD,
-    PREDICTION_TRUSTED,
 )
 
 
@@ -65,8 +63,8 @@ class Predictor:
     def other_fold(self) -> OtherFold:
         """Predict the nearest fold in which other gaps lead; at infinity if none is seen."""
         if math.isinf(self.fold_distance):
-            return OtherFold(-1, math.inf)
-        return OtherFold(*self._points.other_fold(self._leading.edge))
+            return OtherFold()
+        return self._points.other_fold(self._leading.edge)
 
     def gaps(self, at: float) -> Array:
         """Gaps that are expected at d = ``at``."""
@@ -103,20 +101,6 @@ class Predictor:
     def across_fold(self, distance: float, finest: float) -> float:
         """Step across a fold at this distance."""
         return (1 + LEFT_BEFORE_FOLD) * distance + BEYOND_FOLD * finest
-
-
-class OtherFold(NamedTuple):
-    """Fold ahead that others lead to than the leading edge: their edge, -1 for none, and distance.
-
-    Attributes
-    ----------
-    edge : int
-    distance : float
-        In d.
-    """
-
-    edge: int
-    distance: float
 
 
 def carry_previous(earlier: PreviousPoint, before: Point, after: Point, near: float) -> Point:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from adhesis.solver._kernels import STEP_GROWTH, STEP_REDUCTION
 from adhesis.solver.sharp.continuation.predictor import Predictor
-from adhesis.solver.sharp.tolerances import FOLD_RESOLVED, STEP_GROWTH, STEP_REDUCTION
 
 
 class StepSize:
@@ -39,7 +39,7 @@ class StepSize:
         if 0 < self._failed <= size:
             size = 0.5 * self._failed
         if not predictor.fold_distance < self.finest:
-            size = max(size, FOLD_RESOLVED * self.finest)
+            size = max(size, self.finest)
         if self.crosses_fold:
             size = predictor.across(self.finest)
         left = target - predictor.point.at
@@ -53,7 +53,7 @@ class StepSize:
         """Note that no equilibrium was found; return whether another step is to be tried."""
         if not self.is_smallest(step):
             self._failed = abs(step)
-            self._largest = max(STEP_REDUCTION * abs(step), FOLD_RESOLVED * self.finest)
+            self._largest = max(STEP_REDUCTION * abs(step), self.finest)
             return True
         self.crosses_fold = (
             not self.crosses_fold and abs(step) < predictor.fold_distance < 2 * self.finest

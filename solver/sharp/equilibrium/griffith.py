@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver._kernels import EdgeLaw, Panels
+from adhesis.solver._kernels import CLOSING_SHARE, EdgeLaw, Panels
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import lengths_of, outward
-from adhesis.solver.sharp.tolerances import CLOSING_SHARE, EQUAL_AMPLITUDES, EQUAL_MODES
+from adhesis.solver.sharp.tolerances import EQUAL
 
 
 def imbalance(opening: Array, gaps: Array, law: EdgeLaw, panels: Panels) -> Array:
@@ -43,8 +43,8 @@ def leaving_step(hessian: Array, limit: Array, order: Array) -> Array | None:
     values, vectors = np.linalg.eigh(hessian)
     if not values[0] < 0:
         return None
-    soft = vectors[:, values <= min(values[0] + EQUAL_MODES * np.abs(values).max(), 0.0)]
+    soft = vectors[:, values <= min(values[0] + EQUAL * np.abs(values).max(), 0.0)]
     freedom = (soft**2).sum(axis=1)
-    equal = np.flatnonzero(freedom > EQUAL_AMPLITUDES * freedom.max())
+    equal = np.flatnonzero(freedom > (1 - EQUAL) * freedom.max())
     step = soft @ soft[equal[np.argmin(order[equal])]]
     return np.asarray(step / np.abs(step / limit).max())

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adhesis.solver._kernels import SHAPE_NODES
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField
-from adhesis.solver.sharp.tolerances import SHAPE_NODES
 
 
 @dataclass(frozen=True)

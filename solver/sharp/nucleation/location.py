@@ -7,6 +7,7 @@ the criterion of touches, ``opening.Openings`` that of gaps that open inside pat
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
@@ -22,8 +23,7 @@ from adhesis.solver.sharp.tolerances import (
     BISECTION_EVERY,
     CLEAR_TRIALS,
     CLOSING_BY_MOTION,
-    CORRECTED,
-    TOUCH_TRIALS,
+    LONGEST_STEP,
     TRIAL_FROM_END,
 )
 
@@ -146,7 +146,7 @@ def secant_share(clear_value: float, hit_value: float, tolerance: float) -> floa
 
 def equilibrium_between(edges: EdgeMechanics) -> Solve:
     """Return a function that solves the equilibrium between two points of a branch."""
-    reach = CORRECTED * edges.wave
+    reach = LONGEST_STEP * edges.wave
 
     def solve(clear: Point, hit: Point, at: float) -> Point | None:
         gaps = clear.interpolate(hit, at)
@@ -203,7 +203,7 @@ def locate(
         clear_value = clearance
     tracked = criterion.track_between(clear, hit)
     cleared = 0  # trials one after the other that were clear
-    for trials in range(1, TOUCH_TRIALS + 1):
+    for trials in range(1, sys.float_info.mant_dig + 1):
         if criterion.is_located(hit_value, abs(clear.at - hit.at) <= resolution):
             break
         share = 0.5

@@ -30,7 +30,7 @@ from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation
-from adhesis.solver.sharp.tolerances import COMPARABLE, OVERLAP
+from adhesis.solver.sharp.tolerances import OVERLAP
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Nucleation:
         self.problem, self.edges = problem, edges
         self.searched = SearchedGaps()
         self._lengths = SearchLengths(
-            max_displacement=COMPARABLE * edges.wave,
+            wave=float(edges.wave),
             closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=math.pi * edges.critical**2 / 8,  # Γ
             narrowest=float(3 * edges.smallest),

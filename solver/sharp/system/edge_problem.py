@@ -11,10 +11,7 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
     COARSE_FIELD,
     DESCENT_HANDS_OVER,
-    FAINT_FORCE,
-    LEAST_FAINT_FORCE,
     LONGEST_STEP,
-    OVERLAPPING,
     SETTLED,
     SMALLEST_LENGTH,
     SMALLEST_OF_SEED,
@@ -72,7 +69,6 @@ class EdgeProblem:
         self.smallest = SMALLEST_LENGTH * self.wave
         if critical > 0:
             self.smallest = min(self.smallest, SMALLEST_OF_SEED * seed)
-        roughness_opening = np.sqrt(source.m2 * self.wave)
         self.law = EdgeLaw(
             critical=float(critical),
             newton_tolerance=self.settled,
@@ -80,8 +76,8 @@ class EdgeProblem:
             rest_step=DESCENT_HANDS_OVER * self.wave,
             longest_step=self.longest_step,
             smallest=float(self.smallest),
-            overlap_limit=float(OVERLAPPING * max(critical, roughness_opening)),
-            force_error=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
+            rough_rate=float(max(critical, np.sqrt(source.m2 * self.wave)) / self.wave),
+            force_error=float(tolerance * critical**2),
             pinning=float(pinning),
         )
         self.model = FieldModel(
