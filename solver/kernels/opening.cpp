@@ -1,7 +1,5 @@
 #include "opening.hpp"
 
-#include <optional>
-
 #include "tolerances.hpp"
 
 namespace adhesis {
@@ -144,12 +142,10 @@ double work_of_gaps(const Field& field) {
   const Panels& panels = *field.model.panels;
   const Nodes& nodes = field.nodes;
   double total = 0;
-  std::optional<Circle> circle;
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const int m = nodes.size_of(k);
     const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, ENERGY_NODES);
-    if (!circle || circle->count != count + 1) circle.emplace(count + 1);
-    const FineOpening fine = fine_moments(nodes.gaps[k], *circle, panels);
+    const FineOpening fine = fine_moments(nodes.gaps[k], *circle_of(count + 1), panels);
     for (int n = m; n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);
   }
   return -pi / 2 * total +
@@ -159,12 +155,10 @@ double work_of_gaps(const Field& field) {
 std::vector<Minimum> find_minima(const Field& field, const Integers& gaps) {
   const int top = field.model.panels->top;
   std::vector<Minimum> out;
-  std::optional<Circle> circle;
   for (int k : gaps) {
     const Gap& gap = field.nodes.gaps[k];
     const int count = count_sine_nodes(gap, field.nodes.size_of(k), top, SHAPE_NODES);
-    if (!circle || circle->count != count + 1) circle.emplace(count + 1);
-    const FineOpening fine = open_gap(field, k, *circle);
+    const FineOpening fine = open_gap(field, k, *circle_of(count + 1));
     for (Candidate minimum : local_minima(fine.theta, fine.opening)) {
       const double low = MINIMUM_IS_LOW * minimum.half * minimum.width * minimum.width;
       if (minimum.opening < std::max(low, MINIMUM_DOUBT * minimum.error))

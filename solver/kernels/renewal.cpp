@@ -33,17 +33,15 @@ bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
   return true;
 }
 
-// Place the runs anew that hold gaps that have changed; returns whether they have enough charges.
+// Place the runs anew whose halves have moved; returns whether they have enough charges.
 bool replace_runs(LinearResponse& response, const Flags& changed, const Model& model) {
   Tree& tree = response.tree;
-  Flags renewed(changed);
-  renewed.resize(tree.run_count());
+  Flags moved(changed);
+  moved.resize(tree.run_count());
   for (int run = tree.count; run < tree.run_count(); ++run) {
     auto [one, two] = tree.runs[run].half;
-    if (renewed[one] || renewed[two]) {
-      renewed[run] = true;
-      if (!tree.replace(run, response.nodes.gaps, model.digits)) return false;
-    }
+    if (!(moved[one] || moved[two])) continue;
+    if (!tree.replace(run, response.nodes.gaps, model.digits, moved[run])) return false;
   }
   return true;
 }

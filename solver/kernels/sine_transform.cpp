@@ -1,5 +1,7 @@
 #include "sine_transform.hpp"
 
+#include <map>
+
 namespace adhesis {
 
 namespace {
@@ -12,7 +14,7 @@ struct Complex {
 };
 
 // Take `parts` butterflies of radix 2 for each of `stride`.
-void take_twos(int parts, int stride, const Circle& circle, const Complex& x, Complex& out) {
+WIDE void take_twos(int parts, int stride, const Circle& circle, const Complex& x, Complex& out) {
   const int far = stride * parts;
   for (int p = 0; p < parts; ++p) {
     const double c = circle.cosine[4 * p * stride], s = circle.sine[4 * p * stride];
@@ -29,7 +31,7 @@ void take_twos(int parts, int stride, const Circle& circle, const Complex& x, Co
   }
 }
 
-void take_fours(int parts, int stride, const Circle& circle, const Complex& x, Complex& out) {
+WIDE void take_fours(int parts, int stride, const Circle& circle, const Complex& x, Complex& out) {
   const int far = stride * parts;
   for (int p = 0; p < parts; ++p) {
     const int w = 4 * p * stride;
@@ -60,7 +62,7 @@ void take_fours(int parts, int stride, const Circle& circle, const Complex& x, C
 }
 
 // Take butterflies of an odd radix, of which there are few.
-void take_odd(int radix, int parts, int stride, const Circle& circle, const Complex& x,
+WIDE void take_odd(int radix, int parts, int stride, const Circle& circle, const Complex& x,
               Complex& out) {
   const int far = stride * parts, turn = 2 * circle.count;
   for (int p = 0; p < parts; ++p) {
@@ -129,6 +131,15 @@ Circle::Circle(int count) : count(count), cosine(2 * count), sine(2 * count) {
     cosine[j] = cosine[2 * count - j];
     sine[j] = -sine[2 * count - j];
   }
+}
+
+std::shared_ptr<const Circle> circle_of(int count) {
+  constexpr int most = 8192;
+  thread_local std::map<int, std::shared_ptr<const Circle>> kept;
+  if (count > most) return std::make_shared<const Circle>(count);
+  auto& circle = kept[count];
+  if (!circle) circle = std::make_shared<const Circle>(count);
+  return circle;
 }
 
 void sine_sums(const Vector& x, const Circle& circle, Vector& out) {

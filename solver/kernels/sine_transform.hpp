@@ -5,6 +5,8 @@
 // Numerical Recipes, section 12.4).
 #pragma once
 
+#include <memory>
+
 #include "arrays.hpp"
 
 namespace adhesis {
@@ -16,6 +18,9 @@ struct Circle {
 
   explicit Circle(int count);
 };
+
+// Return the circle of these points, which is kept unless it is large.
+std::shared_ptr<const Circle> circle_of(int count);
 
 // Set out_k to Σ_j x_j sin(π (j+1)(k+1)/N), both of N - 1 numbers.
 void sine_sums(const Vector& x, const Circle& circle, Vector& out);

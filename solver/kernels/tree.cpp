@@ -59,90 +59,122 @@ void fill_interpolation(const Gap& interval, const Vector& node, const Vector& s
   }
 }
 
-// out += a b, a of (rows, inner), b of (inner, columns).
-WIDE void add_product(const double* a, const double* __restrict b, int rows, int inner, int columns,
-                      double* __restrict out) {
-  for (int i = 0; i < rows; ++i) {
-    double* row = out + i * columns;
-    const double* c = a + i * inner;
-    int k = 0;
-    for (; k + 4 <= inner; k += 4) {
-      const double *b0 = b + k * columns, *b1 = b0 + columns, *b2 = b1 + columns;
-      const double* b3 = b2 + columns;
-      for (int j = 0; j < columns; ++j)
-        row[j] += (c[k] * b0[j] + c[k + 1] * b1[j]) + (c[k + 2] * b2[j] + c[k + 3] * b3[j]);
-    }
-    for (; k < inner; ++k) add_scaled(c[k], b + k * columns, row, columns);
-  }
-}
-
-// out += aᵀ b, a of (inner, rows), b of (inner, columns).
-WIDE void add_transposed_product(const double* a, const double* __restrict b, int inner, int rows,
-                                 int columns, double* __restrict out) {
+// Compute some rows and four columns of base + a b; without a base, of a b. The element of `a` in row i
+// and column k lies at i row_step + k inner_step.
+template <int rows>
+[[gnu::always_inline]] inline void multiply_tile(const double* a, int row_step, int inner_step,
+                                                 const double* b, int inner, int columns,
+                                                 const double* base, double* out) {
+  Four sum[rows] = {};
+  if (base)
+    for (int i = 0; i < rows; ++i) sum[i] = load_four(base + i * columns);
   int k = 0;
-  for (; k + 4 <= inner; k += 4) {
-    const double *b0 = b + k * columns, *b1 = b0 + columns, *b2 = b1 + columns;
-    const double* b3 = b2 + columns;
+  for (; k + 4 <= inner; k += 4, a += 4 * inner_step, b += 4 * columns) {
+    const Four b0 = load_four(b), b1 = load_four(b + columns);
+    const Four b2 = load_four(b + 2 * columns), b3 = load_four(b + 3 * columns);
     for (int i = 0; i < rows; ++i) {
-      const double c0 = a[k * rows + i], c1 = a[(k + 1) * rows + i];
-      const double c2 = a[(k + 2) * rows + i], c3 = a[(k + 3) * rows + i];
-      double* row = out + i * columns;
-      for (int j = 0; j < columns; ++j)
-        row[j] += (c0 * b0[j] + c1 * b1[j]) + (c2 * b2[j] + c3 * b3[j]);
+      const double* c = a + i * row_step;
+      sum[i] +=
+          (c[0] * b0 + c[inner_step] * b1) + (c[2 * inner_step] * b2 + c[3 * inner_step] * b3);
     }
   }
-  for (; k < inner; ++k)
-    for (int i = 0; i < rows; ++i)
-      add_scaled(a[k * rows + i], b + k * columns, out + i * columns, columns);
+  for (; k < inner; ++k, a += inner_step, b += columns)
+    for (int i = 0; i < rows; ++i) sum[i] += a[i * row_step] * load_four(b);
+  for (int i = 0; i < rows; ++i) store_four(sum[i], out + i * columns);
 }
 
-// out = (a x) and out = (aᵀ x), a of (rows, columns).
-void apply(const double* a, int rows, int columns, const double* x, double* out) {
-  for (int i = 0; i < rows; ++i) out[i] = dot(a + i * columns, x, columns);
+// Compute out = base + a b, or aᵀ b, by tiles; no matrix has fewer than four rows or columns. The
+// last tiles overlap those before them, where they compute the same again.
+WIDE void multiply(const double* a, int row_step, int inner_step, const double* b, int rows,
+                   int inner, int columns, const double* base, double* out) {
+  for (int i = 0; i < rows; i += 4) {
+    const int row = std::min(i, rows - 4);
+    for (int j = 0; j < columns; j += 4) {
+      const int column = std::min(j, columns - 4), at = row * columns + column;
+      multiply_tile<4>(a + row * row_step, row_step, inner_step, b + column, inner, columns,
+                    base ? base + at : nullptr, out + at);
+    }
+  }
 }
 
-void apply_transposed(const double* a, int rows, int columns, const double* x, double* out) {
-  std::fill_n(out, columns, 0.0);
-  for (int i = 0; i < rows; ++i) add_scaled(x[i], a + i * columns, out, columns);
+// out = base + a b, a of (rows, inner), b of (inner, columns).
+void multiply(const double* a, const double* b, int rows, int inner, int columns, double* out,
+              const double* base = nullptr) {
+  multiply(a, inner, 1, b, rows, inner, columns, base, out);
 }
 
-void add(const double* a, double* out, int count) {
-  for (int i = 0; i < count; ++i) out[i] += a[i];
+// out = aᵀ b, a of (inner, rows), b of (inner, columns).
+void multiply_transposed(const double* a, const double* b, int inner, int rows, int columns,
+                         double* out) {
+  multiply(a, 1, rows, b, rows, inner, columns, nullptr, out);
 }
 
-}  // namespace
+// Compute out = base + a x, a of (rows, columns), or of no columns; four rows at a time.
+[[gnu::always_inline]] inline void apply(const double* a, int rows, int columns, const double* x,
+                                         const double* base, double* out) {
+  const int last = columns - 4;
+  Four rest = {};  // the columns after the last whole four, behind some that count no more
+  for (int j = columns - columns % 4; j < columns; ++j) rest[j - last] = x[j];
+  for (int i = 0; i < rows; i += 4) {
+    const int row = std::min(i, rows - 4);
+    Four sum[4] = {};
+    for (int j = 0; j < columns; j += 4) {
+      const int at = std::min(j, last);
+      const Four here = at == j ? load_four(x + j) : rest;
+      for (int r = 0; r < 4; ++r) sum[r] += load_four(a + (row + r) * columns + at) * here;
+    }
+    for (int r = 0; r < 4; ++r)
+      out[row + r] = base[row + r] + ((sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]));
+  }
+}
 
-WIDE void eliminate(double* a, int n, double* x, int columns) {
+// Compute out = aᵀ x, a of (rows, columns).
+[[gnu::always_inline]] inline void apply_transposed(const double* a, int rows, int columns,
+                                                    const double* x, double* out) {
+  for (int j = 0; j < columns; j += 4) {
+    const int column = std::min(j, columns - 4);
+    multiply_tile<1>(x, 0, 1, a + column, rows, columns, nullptr, out + column);
+  }
+}
+
+// Invert a matrix of rows of `stride`, a multiple of four, which is overwritten; its inverse gets
+// rows of n. By elimination with the largest pivots of columns.
+WIDE void invert(double* a, int n, int stride, double* inverse) {
+  const int first = stride / 2;  // the inverse grows beside the matrix
   for (int k = 0; k < n; ++k) {
     int best = k;
     for (int i = k + 1; i < n; ++i)
-      if (std::abs(a[i * n + k]) > std::abs(a[best * n + k])) best = i;
-    if (best != k) {
-      std::swap_ranges(a + k * n + k, a + (k + 1) * n, a + best * n + k);
-      std::swap_ranges(x + k * columns, x + (k + 1) * columns, x + best * columns);
-    }
-    const double pivot = 1 / a[k * n + k];
+      if (std::abs(a[i * stride + k]) > std::abs(a[best * stride + k])) best = i;
+    if (best != k) std::swap_ranges(a + k * stride, a + (k + 1) * stride, a + best * stride);
+    double* pivot_row = a + k * stride;
+    const double pivot = 1 / pivot_row[k];
     for (int i = k + 1; i < n; ++i) {
-      const double factor = -(a[i * n + k] * pivot);
-      add_scaled(factor, a + k * n + k + 1, a + i * n + k + 1, n - k - 1);
-      add_scaled(factor, x + k * columns, x + i * columns, columns);
+      double* row = a + i * stride;
+      const double factor = -(row[k] * pivot);
+      for (int j = (k + 1) / 4 * 4; j < stride; j += 4)
+        store_four(load_four(row + j) + factor * load_four(pivot_row + j), row + j);
     }
   }
   for (int k = n - 1; k >= 0; --k) {
-    for (int i = k + 1; i < n; ++i)
-      add_scaled(-a[k * n + i], x + i * columns, x + k * columns, columns);
-    const double pivot = 1 / a[k * n + k];
-    for (int j = 0; j < columns; ++j) x[k * columns + j] *= pivot;
+    double* row = a + k * stride;
+    const double pivot = 1 / row[k];
+    for (int j = first; j < stride; j += 4) {
+      Four sum = load_four(row + j);
+      for (int i = k + 1; i < n; ++i) sum += -row[i] * load_four(a + i * stride + j);
+      store_four(sum * pivot, row + j);
+    }
+    std::copy_n(row + first, n, inverse + k * n);
   }
 }
-
-namespace {
 
 // Add up the squares of the eigenvalues of a matrix.
 double trace_of_square(const double* a, int n) {
   double total = 0;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) total += a[i * n + j] * a[j * n + i];
+  for (int i = 0; i < n; ++i) {
+    double row = 0;
+    for (int j = 0; j < i; ++j) row += a[i * n + j] * a[j * n + i];
+    total += 2 * row + a[i * n + i] * a[i * n + i];
+  }
   return total;
 }
 
@@ -332,10 +364,13 @@ WIDE void Tree::place_charges(int index) {
               two.rank, &kernel[run.kernel]);
 }
 
-bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits) {
+bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits, char& moved) {
   Run& run = runs[index];
+  moved = false;
   if (run.rank > 0) {
+    const Gap before = run.interval;
     run.interval = interval(gaps, run.range[0], run.range[1]);
+    moved = run.interval.end != before.end || run.interval.patch != before.patch;
     // one charge fewer than required: CHARGE_MARGIN covers it
     if (wanted_rank(run.interval, digits) > run.rank + 1) return false;
   }
@@ -350,21 +385,21 @@ void Tree::factor(int index) {
   const double *first = &response[one.response], *second = &response[two.response];
   const double* k12 = &kernel[run.kernel];
   // (1 - H R1)⁻¹, H = K12 R2 K21
-  Vector k21(m * n), half(n * m), reflected(n * n), matrix(n * n);
+  const int stride = (n + 3) / 4 * 8;
+  Vector k21(m * n), half(n * m), reflected(n * n), matrix(n * n), eliminated(n * stride);
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < m; ++j) k21[j * n + i] = k12[i * m + j];
-  add_product(k12, second, n, m, m, half.data());
-  add_product(half.data(), k21.data(), n, m, n, reflected.data());
-  add_product(reflected.data(), first, n, n, n, matrix.data());
+  multiply(k12, second, n, m, m, half.data());
+  multiply(half.data(), k21.data(), n, m, n, reflected.data());
+  multiply(reflected.data(), first, n, n, n, matrix.data());
   const double squares = trace_of_square(matrix.data(), n);
-  double* unit = &inverse[run.inverse];
   for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) {
-      unit[i * n + j] = i == j ? 1 : 0;
-      matrix[i * n + j] = unit[i * n + j] - matrix[i * n + j];
-    }
+    double* row = &eliminated[i * stride];
+    for (int j = 0; j < n; ++j) row[j] = (i == j ? 1 : 0) - matrix[i * n + j];
+    row[stride / 2 + i] = 1;
   }
-  eliminate(matrix.data(), n, unit, n);
+  double* unit = &inverse[run.inverse];
+  invert(eliminated.data(), n, stride, unit);
   // With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
   // than its halves: Haynsworth's formula, applied twice. These are none where the eigenvalues of
   // H R1, real if one of both is definite, are below one.
@@ -381,17 +416,14 @@ void Tree::factor(int index) {
   const double *e1 = &interpolation[run.interpolation], *e2 = e1 + n * r;
   double *d1 = &inner_potential[run.interpolation], *d2 = d1 + n * r;
   // D1 = (1 - H R1)⁻¹ (E1 + K12 R2 E2), D2 = E2 + K21 R1 D1
-  Vector drive(e1, e1 + n * r), charges((n + m) * r);  // by the potential, with the other sign
-  add_product(half.data(), e2, n, m, r, drive.data());
-  std::fill_n(d1, n * r, 0.0);
-  add_product(unit, drive.data(), n, n, r, d1);
-  add_product(first, d1, n, n, r, charges.data());
-  std::copy_n(e2, m * r, d2);
-  add_product(k21.data(), charges.data(), m, n, r, d2);
-  add_product(second, d2, m, m, r, charges.data() + n * r);
+  Vector drive(n * r), charges((n + m) * r);  // by the potential, with the other sign
+  multiply(half.data(), e2, n, m, r, drive.data(), e1);
+  multiply(unit, drive.data(), n, n, r, d1);
+  multiply(first, d1, n, n, r, charges.data());
+  multiply(k21.data(), charges.data(), m, n, r, d2, e2);
+  multiply(second, d2, m, m, r, charges.data() + n * r);
   double* own = &response[run.response];
-  std::fill_n(own, r * r, 0.0);
-  add_transposed_product(e1, charges.data(), n + m, r, r, own);
+  multiply_transposed(e1, charges.data(), n + m, r, r, own);
   for (int i = 0; i < r; ++i)
     for (int j = 0; j < i; ++j)
       own[i * r + j] = own[j * r + i] = 0.5 * (own[i * r + j] + own[j * r + i]);
@@ -405,26 +437,22 @@ WIDE void Tree::charge(int index, Charges& charges) const {
   const double* k12 = &kernel[run.kernel];
   double *g1 = &charges.potential_of_sibling[one.node],
          *g2 = &charges.potential_of_sibling[two.node];
-  const double *q1_alone = &charges.isolated[one.node], *q2_alone = &charges.isolated[two.node];
-  double q1[MOST_CHARGES], q2[MOST_CHARGES], g[MOST_CHARGES];
+  constexpr double none[MOST_CHARGES] = {};
+  double q1[MOST_CHARGES], q2[MOST_CHARGES], g[MOST_CHARGES], alone[2 * MOST_CHARGES];
+  std::copy_n(&charges.isolated[one.node], n, alone);
+  std::copy_n(&charges.isolated[two.node], m, alone + n);
   // g1 = -(1 - H R1)⁻¹ K12 (q2° + R2 K21 q1°);  g2 = -K21 q1
-  apply_transposed(k12, n, m, q1_alone, g2);
-  apply(second, m, m, g2, q2);
-  add(q2_alone, q2, m);
-  apply(k12, n, m, q2, g);
-  apply(&inverse[run.inverse], n, n, g, g1);  // still with the other sign
-  apply(first, n, n, g1, q1);
-  add(q1_alone, q1, n);
+  apply_transposed(k12, n, m, alone, g2);
+  apply(second, m, m, g2, alone + n, q2);
+  apply(k12, n, m, q2, none, g);
+  apply(&inverse[run.inverse], n, n, g, none, g1);  // still with the other sign
+  apply(first, n, n, g1, alone, q1);
   apply_transposed(k12, n, m, q1, g2);
-  apply(second, m, m, g2, q2);
-  add(q2_alone, q2, m);
   for (int i = 0; i < n; ++i) g1[i] = -g1[i];
   for (int i = 0; i < m; ++i) g2[i] = -g2[i];
-  if (r == 0) return;
-  double* q = &charges.isolated[run.node];
-  const double* up = &interpolation[run.interpolation];
-  apply_transposed(up, n, r, q1, q);
-  for (int i = 0; i < m; ++i) add_scaled(q2[i], up + (n + i) * r, q, r);
+  // q = D1ᵀ q1° + D2ᵀ q2°: the responses are symmetric
+  apply_transposed(&inner_potential[run.interpolation], n + m, r, alone,
+                   &charges.isolated[run.node]);
 }
 
 WIDE void Tree::pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const {
@@ -434,12 +462,9 @@ WIDE void Tree::pass_down(const Flags& wanted, const Charges& charges, Vector& p
     const double* inward = inner_potential.data() + run.interpolation;
     for (int half : run.half) {
       const Run& child = runs[half];
-      if (wanted[half]) {
-        for (int i = 0; i < child.rank; ++i)
-          potential[child.node + i] =
-              charges.potential_of_sibling[child.node + i] +
-              dot(inward + i * run.rank, potential.data() + run.node, run.rank);
-      }
+      if (wanted[half])
+        apply(inward, child.rank, run.rank, potential.data() + run.node,
+              charges.potential_of_sibling.data() + child.node, potential.data() + child.node);
       inward += child.rank * run.rank;
     }
   }

@@ -77,8 +77,9 @@ struct Tree {
   // Place the charges of a run, and compute its interpolation and kernel.
   void place_charges(int run);
 
-  // Place the charges of a run anew; returns whether it has enough.
-  bool replace(int run, const std::vector<Gap>& gaps, double digits);
+  // Place the charges of a run anew; returns whether it has enough. `moved` is set to whether they
+  // are elsewhere now: the interval of a run does not change by that of gaps inside.
+  bool replace(int run, const std::vector<Gap>& gaps, double digits, char& moved);
 
   // Compute the response of a run from those of its halves.
   void factor(int run);
@@ -103,9 +104,6 @@ struct PairedAgain {
 // -1. A gap that is not in the tree replaces one that is gone, if there is one between the same
 // neighbours; else it is paired with the gap before it.
 PairedAgain pair_again(const Halves& known, const Integers& source);
-
-// Solve a y = x for the columns of x, both overwritten.
-void eliminate(double* a, int n, double* x, int columns);
 
 // Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.
 //
