@@ -67,7 +67,8 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
 
 def test_every_file_that_the_design_page_names_is_there() -> None:
     page = (ROOT / "docs" / "design.md").read_text()
-    known = {path.name for top in ("solver", "ensemble") for path in (ROOT / top).rglob("*.py")}
+    tops = (ROOT / "adhesis" / "solver", ROOT / "adhesis" / "ensemble")
+    known = {path.name for top in tops for path in top.rglob("*.py")}
     assert set(re.findall(r"`(\w+\.py)`", page)) - known == set()
 
 
@@ -81,7 +82,7 @@ def test_what_a_benchmark_imports_is_there(path: Path) -> None:
 
 def test_tolerances_of_the_kernels_are_those_of_the_page_of_tolerances() -> None:
     """Each stands in both languages; units and reasons in Python alone."""
-    text = (ROOT / "solver" / "kernels" / "tolerances.hpp").read_text()
+    text = (ROOT / "adhesis" / "solver" / "kernels" / "tolerances.hpp").read_text()
     found = dict(re.findall(r"([A-Z][A-Z_]+) = ([-0-9.e]+)", text))
     assert len(found) > 40
     assert float(found.pop("MOST_RANK")) >= float(found["MOST_CHARGES"])
@@ -92,4 +93,4 @@ def test_tolerances_of_the_kernels_are_those_of_the_page_of_tolerances() -> None
 
 def test_the_types_of_the_kernels_are_those_of_the_module() -> None:
     """`python tools/stub.py` writes them."""
-    assert stub() == (ROOT / "solver" / "_kernels.pyi").read_text()
+    assert stub() == (ROOT / "adhesis" / "solver" / "_kernels.pyi").read_text()
