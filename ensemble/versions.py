@@ -70,7 +70,7 @@ def commit() -> str:
     """Return the commit that this code runs from or was built from; or "unknown"."""
     known = _checked_out()
     if known is None:
-        built = Path(__file__).with_name("commit.txt")  # setup.py writes it into what it builds
+        built = Path(__file__).with_name("commit.txt")  # CMake writes it into what it builds
         known = built.read_text().strip() if built.exists() else "unknown"
     return known
 

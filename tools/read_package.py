@@ -15,10 +15,9 @@ ROOT = Path(__file__).resolve().parent.parent
 def sources() -> set[str]:
     """Return what of the checkout belongs into a wheel."""
     found = {
-        str(Path("adhesis", path.relative_to(top)))
-        for top in (ROOT / "adhesis", ROOT)
-        for folder in ((top,) if top.name == "adhesis" else (ROOT / "solver", ROOT / "ensemble"))
-        for path in folder.rglob("*")
+        str(path.relative_to(ROOT))
+        for folder in ("adhesis", "adhesis/solver", "adhesis/ensemble")  # the latter two are links
+        for path in (ROOT / folder).rglob("*")
         if path.suffix in (".py", ".pyi", ".typed", ".mplstyle", ".csv")
     }
     return found | {"adhesis/ensemble/commit.txt"}
@@ -43,12 +42,10 @@ def main(wheel: str, sdist: str, commit: str) -> None:
     assert not any(line.startswith("mpi4py") for line in required)
     with tarfile.open(sdist) as archive:
         held = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
-    own = {re.sub("^adhesis/(?=solver|ensemble)", "", name) for name in sources()}
-    sources_of_kernels = {
-        str(path.relative_to(ROOT)) for path in (ROOT / "solver" / "kernels").iterdir()
-    }
+    folder = ROOT / "adhesis" / "solver" / "kernels"
+    sources_of_kernels = {str(path.relative_to(ROOT)) for path in folder.iterdir()}
     named = ("LICENSE", "CITATION.cff", "CHANGELOG.md", "CONTRIBUTING.md", "CMakeLists.txt")
-    for name in (*own, *sources_of_kernels, *named):
+    for name in (*sources(), *sources_of_kernels, *named):
         assert name in held, name
     for name in ("docs/theory.md", "tests/conftest.py", "jobs/paper.toml", "tools/setup.sh"):
         assert name in held, name

@@ -14,7 +14,7 @@ import numpy as np
 
 from adhesis import self_affine_profile
 
-PLACE = Path(__file__).resolve().parent.parent / "ensemble" / "command" / "sample.csv"
+PLACE = Path(__file__).resolve().parent.parent / "adhesis" / "ensemble" / "command" / "sample.csv"
 POINTS, STEP = 1001, 1e-6  # m
 
 

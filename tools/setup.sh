@@ -132,7 +132,7 @@ has_mpi() { command -v mpirun >/dev/null || command -v mpiexec >/dev/null; }
 has_compiler() { command -v "${CXX:-c++}" >/dev/null; }
 
 key() { # FILE…: what an installation depends on
-    cat pyproject.toml CMakeLists.txt solver/kernels/* tools/setup.sh tools/mpi.sh tools/parts.sh "$@"
+    cat pyproject.toml CMakeLists.txt adhesis/solver/kernels/* tools/setup.sh tools/mpi.sh tools/parts.sh "$@"
     # Another place, interpreter or MPI module is another installation.
     printf '%s\n' "$root" "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" \
         "$(command -v mpicc)" "${HDF5_DIR:-}"

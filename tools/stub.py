@@ -12,7 +12,7 @@ from nanobind.stubgen import StubGen
 
 from adhesis.solver import _kernels
 
-PATH = Path(__file__).resolve().parent.parent / "solver" / "_kernels.pyi"
+PATH = Path(__file__).resolve().parent.parent / "adhesis" / "solver" / "_kernels.pyi"
 
 
 def stub() -> str:

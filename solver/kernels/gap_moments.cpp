@@ -224,12 +224,12 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int field
   }
   // sin((n+1)t), cos t = η, by its recurrence; four nodes at a time, for all modes
   Vector total(8 * modes);  // four of each field
-  std::array<Four, 2> low = {}, high = {};
+  Four low[2] = {}, high[2] = {};
   for (int i = 0; i < nodes.count; i += 4) {
     const Four minus = load_four(&nodes.from_end[1][i]), plus = load_four(&nodes.from_end[0][i]);
     const Four product = minus * plus;
     Four now, previous = {}, twice;
-    std::array<Four, 2> source = {};
+    Four source[2] = {};
     for (int lane = 0; lane < 4; ++lane) {
       now[lane] = std::sqrt(product[lane]);
       twice[lane] = 2 * FromEnds{minus[lane], plus[lane]}.eta();

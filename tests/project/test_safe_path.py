@@ -43,12 +43,15 @@ def test_every_start_of_python_is_the_safe_one():
     """``sys.executable`` stands where the command is made, and in a hint for people."""
     users = {
         path.relative_to(ROOT).as_posix()
-        for package in ("adhesis", "solver", "ensemble")
+        for package in ("adhesis", "adhesis/solver", "adhesis/ensemble")
         for path in (ROOT / package).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Attribute) and node.attr == "executable"
     }
-    assert users == {"ensemble/run/launch.py", "ensemble/trace/reading/instrument.py"}
+    assert users == {
+        "adhesis/ensemble/run/launch.py",
+        "adhesis/ensemble/trace/reading/instrument.py",
+    }
     assert launch.python("-m", "x") == [sys.executable, "-P", "-m", "x"]
 
 

@@ -64,7 +64,7 @@ def test_batch_scripts_force_no_rules_on_a_cluster() -> None:
 def test_dependencies_are_what_is_imported() -> None:
     imported: set[str] = set()
     for package in ("solver", "ensemble"):
-        for path in (ROOT / package).rglob("*.py"):
+        for path in (ROOT / "adhesis" / package).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text())):
                 if isinstance(node, ast.Import):
                     imported |= {alias.name.split(".")[0] for alias in node.names}

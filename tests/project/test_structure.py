@@ -66,7 +66,8 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
 
 def test_every_file_that_the_design_page_names_is_there() -> None:
     page = (ROOT / "docs" / "design.md").read_text()
-    known = {path.name for top in ("solver", "ensemble") for path in (ROOT / top).rglob("*.py")}
+    tops = (ROOT / "adhesis" / "solver", ROOT / "adhesis" / "ensemble")
+    known = {path.name for top in tops for path in top.rglob("*.py")}
     assert set(re.findall(r"`(\w+\.py)`", page)) - known == set()
 
 
@@ -80,4 +81,4 @@ def test_what_a_benchmark_imports_is_there(path: Path) -> None:
 
 def test_the_types_of_the_kernels_are_those_of_the_module() -> None:
     """`python tools/stub.py` writes them."""
-    assert stub() == (ROOT / "solver" / "_kernels.pyi").read_text()
+    assert stub() == (ROOT / "adhesis" / "solver" / "_kernels.pyi").read_text()
