@@ -1,9 +1,9 @@
 """Method ``sharp``: contact edges are real numbers; no grid in the mechanics.
 
-The elastic field is solved by dense matrices for few gaps and on a tree of clusters for many
-(``mechanics``). Stable branches are followed by predictor and corrector (``continuation``); where
-no stable equilibrium is found within the largest correction, the step is reduced to the resolution
-of a jump, and the edges descend in energy at a fixed prescribed value (``descent``).
+The elastic field is solved on a tree of the gaps (``mechanics``). Stable branches are followed by
+predictor and corrector (``continuation``); where no stable equilibrium is found within the largest
+correction, the step is reduced to the resolution of a jump, and the edges descend in energy at a
+fixed prescribed value.
 """
 
 from __future__ import annotations

@@ -32,11 +32,15 @@ class PinnedEdges(NamedTuple):
     rate: Array
 
     def distance(self, step: float) -> float:
-        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
+        """Return the way in d, along ``step``, after which an edge begins to move; inf if none.
+
+        An edge that is at its opening already has begun to move, by less than Newton's iteration
+        tells: it limits no step.
+        """
         rate = self.rate * np.sign(step)
         left = np.where(rate > 0, 1 - self.share, self.share)
-        moving = np.isfinite(rate) & (rate != 0)
-        ways = np.maximum(left[moving], 0.0) / np.abs(rate[moving])
+        moving = np.isfinite(rate) & (rate != 0) & (left > 0)
+        ways = left[moving] / np.abs(rate[moving])
         return float(ways.min(initial=np.inf))
 
 

@@ -1,0 +1,63 @@
+"""The ledger of a path: every interval balances, and all losses are sums over it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import Control, HalfSpace, Problem, make_method, run_path, self_affine_profile
+from adhesis.solver.loading.ledger import Ledger
+from adhesis.solver.model.jump import Jump
+
+SOLID = HalfSpace(1e6, 0.5)
+ROUGH = self_affine_profile(0.8, period=2e-3, n0=2, ratio=6, seed=3, h_rms=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "opened"), [(np.inf, None), (np.inf, 0.004), (1e9, None), (0.0, None)]
+)
+def test_every_interval_of_a_path_balances(stiffness, opened):
+    """Work is rise and loss: to the error of the loss in jumps and between them."""
+    control = Control(stiffness)
+    problem = Problem(ROUGH, SOLID, 0.002, control, work_of_adhesion_open=opened)
+    points = [800.0, 0.0, 400.0] if control.is_load else [0.7, 0.2, 0.5]
+    path = run_path(make_method("sharp", problem), points, load_steps=10)
+    ledger = path.ledger
+    rest = ledger.works - np.diff(ledger.stored) - ledger.losses
+    assert np.abs(rest).max() < path.loss_error
+    assert (path.work, path.energy_change) == (ledger.work, ledger.rise)
+    assert path.loss_from_drops == ledger.loss
+    drops = sum(jump.energy_drop for jump in path.jumps)
+    assert ledger.losses[path.states_before_jumps()].sum() == pytest.approx(drops, rel=1e-12)
+    assert (path.friction > 0) == (opened is not None)
+    for minor in path.minor_loops:
+        assert minor.audit_residual == pytest.approx(0, abs=path.loss_error)
+
+
+def test_a_ledger_states_work_jump_and_friction_of_each_interval():
+    """p̄ = s³ is integrated exactly, by its slopes; of the friction a jump's is in its drop."""
+    problem = Problem(ROUGH, SOLID, 0.002, work_of_adhesion_open=0.003)
+    s = np.array([1.0, 0.6, 0.6, 0.9])
+    contact, none = np.array([0.1, 0.2, 0.4, 0.3]), np.zeros(4)
+    jump = Jump("loading", 0.6, 5.0, "spreading", 1, 1, 0.2, 0.4, 1e-3)
+    period = problem.profile.period
+    ledger = Ledger.of(
+        problem,
+        [jump],
+        branch=np.array(["loading"] * 4),
+        separation=s,
+        mean_stress=s**3,
+        tangent=3 * s**2,
+        contact_fraction=contact,
+        elastic_energy=period * s**4,
+        adhesion_energy=none,
+        receded=period * np.array([0.0, 1.0, 3.0, 6.0]),
+    )
+    np.testing.assert_allclose(ledger.works, -np.diff(s**4) / 4, atol=1e-15)
+    np.testing.assert_allclose(ledger.friction, 1e-3 * np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(ledger.losses, [1e-3, 5.0, 3e-3])
+    assert ledger.loss == pytest.approx(5.004)
+    assert ledger.rise == pytest.approx(0.9**4 - 1)
+    assert ledger.residual == pytest.approx(ledger.work - ledger.rise - ledger.loss)
+    part = ledger.part(1, 3)
+    assert (part.loss, part.rise, part.work) == (5.0, 0.0, 0.0)
