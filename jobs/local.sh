@@ -30,10 +30,10 @@ command=("$ADHESIS" run "$campaign" --out "$out/$name.h5" "${@:3}")
 if [ "$ranks" -gt 1 ] && [ -n "$MPIRUN" ]; then
     allow_ranks "$ranks" "$cores"
     command=("$MPIRUN" -n "$ranks" "${command[@]}")
+    set -m # Ctrl-C reaches mpirun through this script alone: it would end the ranks at once
 else
     command+=(--ranks "$ranks")
 fi
-set -m # Ctrl-C reaches the run through this script alone: mpirun would end the ranks at once
 follow "${command[@]}"
 trap - USR1 TERM INT HUP
 if [ "$code" = 75 ]; then

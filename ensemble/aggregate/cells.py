@@ -33,19 +33,6 @@ _NOT_AVERAGED = frozenset(
         *("largest_interior_tension", "interior_tension_position", "interior_tension_penetration"),
     )
 )
-_WITH_INTERVAL = (
-    "loss",
-    "loss_dimensionless",
-    "loss_small_scale",
-    "loss_large_scale",
-    "small_scale_share",
-    "pull_off_stress",
-    "pull_off_penetration",
-    "largest_contact_fraction",
-    "loss_per_contact",
-    "effective_work_of_approach",
-    "effective_work_of_separation",
-)
 # Energies that are also given per largest contact area, in J/m² of contact.
 _PER_CONTACT = {
     "loss_per_contact": "loss",
@@ -81,7 +68,7 @@ class Cell:
     # spent per largest contact area, in J/m²)
     values: dict[str, Array]
     # Means of these, but not of ranges of adhesion, the largest interior tension and its place, and
-    # ``opening_strength``. Only losses, pull-off and largest contact have an interval.
+    # ``opening_strength``
     estimates: dict[str, Estimate]
 
     @property
@@ -169,15 +156,13 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
 
 
 def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
-    with_interval = np.array([values[name] for name in _WITH_INTERVAL])
-    found = dict(zip(_WITH_INTERVAL, estimates(with_interval), strict=True))
+    names = [name for name in values if name not in _NOT_AVERAGED]
+    found = dict(zip(names, estimates(np.array([values[name] for name in names])), strict=True))
     for name in ("small_scale_share", "largest_contact_fraction"):
         share = found[name]
         low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave [0, 1]
         found[name] = replace(share, low=float(low), high=float(high))
-    rest = [name for name in values if name not in found and name not in _NOT_AVERAGED]
-    plain = estimates(np.array([values[name] for name in rest]), with_interval=False)
-    return found | dict(zip(rest, plain, strict=True))
+    return found
 
 
 def stress_scale(campaign: Campaign, h_max: Array) -> Array:

@@ -63,7 +63,7 @@ class Task:
         return f"{self.cell_name}, realisation {self.realisation}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tasks(Sequence[Task]):
     """Tasks of a campaign by number; each is made when it is asked for.
 
@@ -92,14 +92,6 @@ class Tasks(Sequence[Task]):
         hurst, gamma, *others = self.cells[cell]
         seed = task_seed(self.seed, realisation)
         return Task(hurst, gamma, realisation, seed, tuple(zip(self.names, others, strict=True)))
-
-    def __eq__(self, other: object) -> bool:
-        """Compare task by task, also with a list."""
-        if not isinstance(other, Sequence) or len(self) != len(other):
-            return NotImplemented if not isinstance(other, Sequence) else False
-        return all(one == two for one, two in zip(self, other, strict=True))
-
-    __hash__ = None  # type: ignore[assignment]
 
     def chosen(self, rows: NDArray[np.int64]) -> Tasks:
         """Return the tasks with these numbers in the whole campaign."""

@@ -143,6 +143,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
         args = parser_of(name).parse(words[1:])
     except SystemExit:  # --help
         return 0
+    args.words = list(words)
     if name not in _WITHOUT_NUMERICS:
         errors.check_memory()
     with errors.naming_options():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import h5py
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import kept_rows
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 
 Rows = NDArray[np.intp]
@@ -28,15 +28,16 @@ def rows_in(campaign: Campaign, file: Results) -> Rows:
     return rows
 
 
-@dataclass(frozen=True)
 class Source:
-    """A file to take rows from, and where they go."""
+    """A file to take rows from, and where they go in the file of a whole campaign."""
 
-    results: Results
-    target: Rows  # row in the merged file of each row, ascending
-    kept: Rows  # place among the merged file's kept rows of each kept row
-    kept_rows: Rows
-    taken: NDArray[np.bool_]  # rows that this file gives
+    def __init__(self, results: Results, campaign: Campaign, taken: NDArray[np.bool_]) -> None:
+        self.results = results
+        self.target = rows_in(campaign, results)  # row of each row, ascending
+        self.taken = taken  # rows that this file gives
+        self._kept_rows = results.column(KEPT)
+        # A task that kept its fields does so in a grown campaign: realisations are only added.
+        self._kept = np.searchsorted(kept_rows(campaign), self.target[self._kept_rows])
 
     def row_of(self, target: int) -> int:
         """Row of a task, by its row in the merged file."""
@@ -50,7 +51,7 @@ class Source:
     def places(self, dataset: Dataset) -> tuple[Rows, NDArray[np.bool_]]:
         """Return the places of the rows of a dataset, and which of them are given."""
         if dataset.dims[0] == KEPT:
-            return self.kept, self.taken[self.kept_rows]
+            return self._kept, self.taken[self._kept_rows]
         return self.target, self.taken
 
 

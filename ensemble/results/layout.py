@@ -29,12 +29,12 @@ from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.copy_rows import Source, copy_dataset, rows_in
+from adhesis.ensemble.results.copy_rows import Source, copy_dataset
 from adhesis.ensemble.results.disk_file import opened, refusal
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import reason
-from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
+from adhesis.ensemble.task.dataset import Dataset, sizes_of
 from adhesis.solver.runtime.uninterrupted import signals_held
 
 
@@ -165,10 +165,7 @@ def _set_attributes(of: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
 
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
     """Copy every row but those that are damaged: in the new file they are pending."""
-    target, rows = rows_in(campaign, old), old.column(KEPT)
-    # A task that kept its fields does so in the grown campaign: realisations are only added.
-    kept = np.searchsorted(file[KEPT][:], target[rows])
-    source = Source(old, target, kept, rows, old.status() != schema.DAMAGED)
+    source = Source(old, campaign, old.status() != schema.DAMAGED)
     for column in schema.DATASETS:
         if column not in schema.TASK_DATASETS:
             copy_dataset([source], file, column, 0, file[column.name].shape[0])

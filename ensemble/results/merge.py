@@ -20,7 +20,7 @@ from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.copy_rows import Source, copy_dataset, rows_in
+from adhesis.ensemble.results.copy_rows import Source, copy_dataset
 from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
@@ -115,14 +115,12 @@ def _assign(
     opened: Sequence[Results], campaign: Campaign, status: NDArray[np.uint8], there: Results | None
 ) -> list[Source]:
     """Decide which file gives which row; ``status`` becomes that of the merged file."""
-    kept = schema.kept_rows(campaign)
     sources: list[Source] = []
     giver = np.full(status.size, -1)  # source of each row that is not there yet
     for part in opened:
-        target = rows_in(campaign, part)
         own = part.status()
-        rows = part.column(KEPT)
-        source = Source(part, target, np.searchsorted(kept, target[rows]), rows, own == schema.DONE)
+        source = Source(part, campaign, own == schema.DONE)
+        target = source.target
         for row in np.flatnonzero((own == schema.DONE) & (status[target] == schema.DONE)).tolist():
             other = giver[target[row]]
             if other >= 0:

@@ -120,9 +120,10 @@ class Master:
         self._halted: float | None = None
         self._reason: str | None = None
         self._dismissed = False
-        # Time that the master was awake, and when each worker was last heard from by that clock.
+        # Time that the master was awake, and when each worker was last heard from by that clock; a
+        # process that starts is heard from when it has loaded what it takes.
         self._awake, self._looked, self._next_count = 0.0, self.clock(), 0.0
-        self._heard = dict.fromkeys(self._sent, 0.0)
+        self._heard: dict[int, float] = {}
 
     @property
     def in_flight(self) -> int:
@@ -195,6 +196,7 @@ class Master:
             self._answered(rank, content[0])
             self._hand_out()
         elif kind == "ended":
+            self._heard.pop(rank, None)
             for task in list(self._sent[rank]):
                 self._finish(rank, Outcome(task, rank, 0.0, error=content[0]))
         else:

@@ -22,7 +22,6 @@ from pathlib import Path
 from adhesis import _version
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.escape import one_line
-from adhesis.solver.checks import counted
 
 # Variables that a launcher sets for its ranks. A second launcher that inherits them passes for one
 # of those ranks: both wait for each other, or end without a message.
@@ -120,6 +119,8 @@ def check_ranks(name: str, ranks: int) -> None:
     """Refuse more ranks than this machine can hold; ``name`` is that of the option (InputError)."""
     most = _RANKS_PER_CORE * cores()
     if ranks > most:
+        from adhesis.solver.checks import counted  # here: it loads numpy
+
         raise InputError(
             f"{name} is {ranks}: at most {most} are started here, on {counted(cores(), 'core')}; "
             "more ranks than cores compute no faster"

@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -225,15 +227,11 @@ def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:
 
     The cheapest first, so that as many cells as possible are met.
     """
-    start = 0
-    while start < len(tasks):
-        near = tasks[start : start + len(tasks.cells)].column("realisation")
-        count = int(np.count_nonzero(near == near[0]))
+    for _, of_realisation in groupby(tasks, key=attrgetter("realisation")):
         found: dict[Hashable, list[Task]] = {}
-        for task in tasks[start : start + count]:
+        for task in of_realisation:
             found.setdefault(campaign.branch_of(task) or task, []).append(task)
         yield from sorted(found.values(), key=lambda unit: sum(prior(task) for task in unit))
-        start += count
 
 
 def _cells(

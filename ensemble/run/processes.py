@@ -37,6 +37,7 @@ class Processes:
         self._work = (compute, task_seconds, report_interval)
         self._inbox: queue.SimpleQueue[tuple[int, Message]] = queue.SimpleQueue()
         self._processes: dict[int, subprocess.Popen[bytes]] = {}
+        self._up: set[int] = set()  # ranks that have sent something
         self._dismissed: set[int] = set()
 
     @property
@@ -71,6 +72,8 @@ class Processes:
         """Send a message to a process."""
         if message[0] == "dismissed":
             self._dismissed.add(to)
+            if to not in self._up:  # it still starts, and nothing of it is waited for
+                self._inbox.put((to, ("goodbye",)))
         self._write(to, (urgent, message))
 
     def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
@@ -79,7 +82,9 @@ class Processes:
             rank, message = self._inbox.get_nowait()
         except queue.Empty:
             return None
+        self._up.add(rank)
         if message[0] == "ended" and rank not in self._dismissed:
+            self._up.discard(rank)
             self._start(rank)
         return rank, message
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TextIO
 
+from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.reporter import StatusLine
 
@@ -15,8 +16,8 @@ _MOST_FAILURES_SHOWN = 5
 
 
 @dataclass
-class Counts:
-    """Numbers of tasks of a run."""
+class Summary:
+    """Numbers of tasks of a run, kept up to date, and at the end how it ended."""
 
     # total, done, failed: in the results file, or the part of it that is asked for
     total: int
@@ -31,11 +32,20 @@ class Counts:
     # Losses of those computed now that are those of the zero-range limit alone
     # (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`)
     beyond_limit: int = 0
+    seconds: float = 0.0
+    stopped: str | None = None  # why it stopped before the last task
+    # With ``[stop]``: name of every cell, and how well the mean of its quantity is known
+    precisions: tuple[tuple[str, Precision], ...] = ()
 
     @property
     def pending(self) -> int:
         """Tasks still to do."""
         return self.total - self.done - self.failed
+
+    def __str__(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        now = f"{self.computed} computed in {duration(self.seconds)}"
+        return f"{self.done} of {self.total} tasks done{failed}; {now}"
 
 
 def _interval(elapsed: float) -> float:
@@ -52,7 +62,7 @@ class ProgressLine(StatusLine):
 
     def __init__(
         self,
-        counts: Counts,
+        counts: Summary,
         time_left: Callable[[], float | None],
         stream: TextIO | None = None,
     ) -> None:

@@ -12,12 +12,11 @@ from typing import Any, TextIO
 
 import h5py
 
-from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
-from adhesis.ensemble.quantities import duration, percent
+from adhesis.ensemble.quantities import percent
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
@@ -34,7 +33,7 @@ from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
-from adhesis.ensemble.run.progress import Counts, ProgressLine
+from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.task.compute import Runner, check_task
@@ -73,21 +72,6 @@ class Options:
     patience: float = 10.0  # how long to wait for another run to let go of the results file, in s
     # Processes that compute beside this one where there are no ranks; 0 computes here
     processes: int = 0
-
-
-@dataclass
-class Summary(Counts):
-    """Result of a run: its counts, and how it ended."""
-
-    seconds: float = 0.0
-    stopped: str | None = None  # why it stopped before the last task
-    # With ``[stop]``: name of every cell, and how well the mean of its quantity is known
-    precisions: tuple[tuple[str, Precision], ...] = ()
-
-    def __str__(self) -> str:
-        failed = f", {self.failed} failed" if self.failed else ""
-        now = f"{self.computed} computed in {duration(self.seconds)}"
-        return f"{self.done} of {self.total} tasks done{failed}; {now}"
 
 
 def run_campaign(
@@ -191,7 +175,7 @@ class _Session:
         deadline = options.deadline
         self._ends = None if deadline is None else deadline.at - time.time() + self._started
         total = plan.done + plan.failed + len(plan.rows)
-        self._counts = Counts(total, plan.done, plan.failed)
+        self._counts = Summary(total, plan.done, plan.failed)
         self._groups: Mapping[int, Group] = {
             row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
         }
@@ -224,8 +208,7 @@ class _Session:
                     )
                 )
             else:
-                channel = OwnWorker(self._compute_here, self._write, self._limits)
-                own_rows = True
+                channel = OwnWorker(self._compute_here, lambda outcome: outcome, limits)
             return self._hand_out(channel, own_rows)
 
     def _hand_out(self, channel: Channel, own_rows: bool) -> str | None:
@@ -246,13 +229,12 @@ class _Session:
             progress.end()
 
     def summary(self, stopped: str | None) -> Summary:
-        batches = self.plan.batches
-        return Summary(
-            **vars(self._counts),
-            seconds=time.monotonic() - self._started,
-            stopped=stopped if self._counts.pending else None,
-            precisions=() if batches is None else tuple(batches.precisions),
-        )
+        """Return the counts, and how the run has ended."""
+        summary, batches = self._counts, self.plan.batches
+        summary.seconds = time.monotonic() - self._started
+        summary.stopped = stopped if summary.pending else None
+        summary.precisions = () if batches is None else tuple(batches.precisions)
+        return summary
 
     def _compute_here(self, row: int, check: StopCheck) -> Row:
         """Compute in the process that shows the progress."""

@@ -6,6 +6,8 @@ import heapq
 import os
 import random
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -510,6 +512,23 @@ def test_processes_end_where_the_system_does_not_grant_all_of_them(monkeypatch):
     with pytest.raises(BlockingIOError):
         Processes(2, half).__enter__()
     assert started[0].returncode is not None
+
+
+def test_a_process_that_still_starts_is_not_waited_for_at_the_end(monkeypatch):
+    """Of more processes than tasks the last may come up when all is done."""
+
+    def start(self, rank):
+        if rank == 1:
+            return started(self, rank)
+        words = [sys.executable, "-c", "import sys; sys.stdin.read()"]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self._processes[rank] = subprocess.Popen(words, **pipes)
+
+    started = Processes._start
+    monkeypatch.setattr(Processes, "_start", start)
+    with Processes(2, half) as channel:
+        outcomes, reason = hand_out(channel, 1, Limits(grace=5.0))
+    assert ([outcome.result for outcome in outcomes], reason) == ([0.0], None)
 
 
 def test_tasks_that_would_not_end_in_time_stay_behind():

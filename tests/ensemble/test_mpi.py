@@ -20,7 +20,8 @@ from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.session import Options, Summary, run_campaign
+from adhesis.ensemble.run.progress import Summary
+from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     adhesis,
     adhesis_here,

@@ -873,7 +873,7 @@ def test_texts_of_a_results_file_are_shown_as_texts(data, tmp_path):
         attributes={"adhesis_version": hostile, "mpi": hostile},
         campaign=replace(data.campaign, text=text),
     )
-    page = write_page(evil, [])
+    page = write_page(evil, {})
     assert "\x1b" not in page
     (tmp_path / "report").mkdir()
     for folder in (tmp_path / "report", tmp_path):  # also where the image is the report's own

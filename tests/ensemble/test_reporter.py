@@ -7,7 +7,7 @@ import sys
 import time
 
 from adhesis.ensemble.reporter import following, ticking
-from adhesis.ensemble.run.progress import Counts, ProgressLine
+from adhesis.ensemble.run.progress import ProgressLine, Summary
 
 
 def test_what_takes_long_is_told_and_what_is_over_is_not() -> None:
@@ -51,7 +51,7 @@ def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(mo
 
     now, log = [0.0], Log()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    progress = ProgressLine(Counts(total=10), lambda: None, log)
+    progress = ProgressLine(Summary(total=10), lambda: None, log)
     while now[0] < 36000.0:
         progress.tick()
         now[0] += 0.5
@@ -69,7 +69,7 @@ class _Terminal(io.StringIO):
 def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> None:
     now, stream = [0.0], _Terminal()
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    counts = Counts(total=3, done=1)
+    counts = Summary(total=3, done=1)
     progress = ProgressLine(counts, lambda: None, stream)
     progress.tick()
     progress.tick()  # too early

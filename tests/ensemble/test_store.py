@@ -62,7 +62,7 @@ def test_the_documentation_describes_every_dataset_and_no_other():
 def test_a_new_file_is_whole_and_pending(path, campaign):
     with Results(path) as results:
         assert results.campaign == campaign
-        assert results.tasks() == campaign.tasks()
+        assert list(results.tasks()) == list(campaign.tasks())
         assert not results.status().any()
         for column in RESULT_DATASETS:
             values = results.column(column.name)
@@ -165,7 +165,7 @@ def test_growing_keeps_every_row_in_its_place(path, campaign):
         create(path, larger, grown_from=old)
     with Results(path) as results:
         assert results.campaign == larger
-        assert results.tasks() == larger.tasks()
+        assert list(results.tasks()) == list(larger.tasks())
         assert results.attributes["created"] == created
         for row, task in enumerate(results.tasks()):
             assert results.status()[row] == (DONE if task in place else PENDING)

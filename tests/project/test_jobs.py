@@ -255,9 +255,10 @@ def test_names_that_begin_with_a_dash_are_no_options(cluster: Cluster) -> None:
     done = cluster.run("bash", cluster.folder / "calls.submitted")
     assert done.returncode == 0, done.stderr
     assert cluster.calls("adhesis")[-1] == ["report", "./-dash.h5", "--to", "./-dash"]
-    done = cluster.run(JOBS / "local.sh", "-dash.toml", "3", OUT="-out")
+    done = cluster.run(JOBS / "local.sh", "-dash.toml", "3", OUT="-out", MPIRUN="mpirun")
     assert (done.returncode, done.stderr) == (0, "")
-    names = "./-dash.toml --out ./-dash.h5", "./-dash.toml --out ./-out/-dash.h5 --ranks 3"
+    assert cluster.calls("mpirun")[-1][:2] == ["-n", "3"]
+    names = "./-dash.toml --out ./-dash.h5", "./-dash.toml --out ./-out/-dash.h5"
     runs = [words[1:] for words in cluster.calls("adhesis") if words[0] == "run"]
     assert runs == [name.split() for name in names]
 

@@ -35,7 +35,8 @@ from adhesis.ensemble.reporter import log
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
     from adhesis.ensemble.campaign.tasks import Task, Tasks
-    from adhesis.ensemble.run.session import Engine, Options, Summary
+    from adhesis.ensemble.run.progress import Summary
+    from adhesis.ensemble.run.session import Engine, Options
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
