@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, 
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.reporter import following
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -82,6 +80,7 @@ def execute(args: argparse.Namespace) -> int:
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
+    loops = (results,) if isinstance(results, PathResult) else results
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
@@ -102,8 +101,7 @@ def execute(args: argparse.Namespace) -> int:
             _draw(results, args.figure)
     if args.film is not None:
         with writing.output("--film", args.film):
-            _film(results, args.film, args.quiet)
-    loops = (results,) if isinstance(results, PathResult) else results
+            loops[0].film(args.film, progress=not args.quiet)
     print("\n\n".join(map(record.summary, loops)))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
@@ -308,11 +306,3 @@ def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
     figure = draw_loops(results)
     with whole_file(path) as stream:
         figure.savefig(stream, format=path.suffix[1:].lower(), dpi=200)
-
-
-def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool) -> None:
-    from adhesis.ensemble.loop.film import film_of
-
-    result = results if isinstance(results, PathResult) else results[0]
-    with nullcontext() if quiet else following("frames of the film") as show:
-        film_of(result, progress=show).save(path, progress=show)

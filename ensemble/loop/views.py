@@ -55,13 +55,10 @@ def film(
 
     if path is not None:
         path = check_film("path", path)
-    if isinstance(progress, bool):
-        with bar("frames") if progress else nullcontext() as shown:
-            made = film_of(result, frames=frames, progress=shown)
-    else:
-        made = film_of(result, frames=frames, progress=progress)
-    if path is not None:
-        made.save(path)
+    with bar("frames") if progress is True else nullcontext(progress or None) as shown:
+        made = film_of(result, frames=frames, progress=shown)
+        if path is not None:
+            made.save(path, progress=shown if progress is True else None)
     return made
 
 
