@@ -189,7 +189,7 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
 
 def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     """Return the profile of the one source that is given, and what is doubtful about it."""
-    sources = [f"--{n}" for n in ("hurst", "heights", "trace") if getattr(args, n) is not None]
+    sources = given(args, "hurst", "heights", "trace")
     if len(sources) != 1:
         found = f"{' and '.join(sources)} are" if sources else "no profile is"
         raise InputError(f"{found} given: give one of --hurst, --heights and --trace")
@@ -211,10 +211,8 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
 
 
 def _refuse_options_of_hurst(args: argparse.Namespace, *more: str) -> None:
-    for name in ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes", *more):
-        if getattr(args, name) is not None:
-            option = "--" + name.replace("_", "-")
-            raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
+    for option in given(args, "seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes", *more):
+        raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
 
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
@@ -233,7 +231,7 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
 
 def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
-    several = [f"--{n.replace('_', '-')}" for n, value in norms.items() if value is not None]
+    several = given(args, *norms)
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)} are given: give one of --h-rms, --m2 and --c0")
     return self_affine_profile(
@@ -250,10 +248,8 @@ def _self_affine(args: argparse.Namespace) -> Profile:
 def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float], bool]:
     """Return where fields are wanted, and whether these are mean stresses in Pa; else Δ/h_max."""
     if args.fields is None:
-        for name in ("field_penetrations", "field_stresses", "field_nodes"):
-            if getattr(args, name) is not None:
-                option = "--" + name.replace("_", "-")
-                raise InputError(f"{option} needs --fields, the file to which fields are written")
+        for option in given(args, "field_penetrations", "field_stresses", "field_nodes"):
+            raise InputError(f"{option} needs --fields, the file to which fields are written")
         return [], False
     if cycle.is_path or len(cycle.points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")

@@ -73,7 +73,11 @@ def what_was_read(prepared: Prepared) -> str:
     return printable("\n".join(lines))
 
 
-def given(args: argparse.Namespace) -> list[str]:
-    """Return the given options of reading and preparation."""
-    names = [name for name in _NAMES if getattr(args, name) not in (None, False)]
-    return [f"--{name.replace('_', '-')}" for name in names]
+def given(args: argparse.Namespace, *names: str) -> list[str]:
+    """Return which of these options are given; without names, of reading and preparation."""
+    found = {name: getattr(args, name) for name in names or _NAMES}
+    return [
+        f"--{name.replace('_', '-')}"
+        for name, value in found.items()
+        if value is not None and value is not False
+    ]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, reason
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
 
@@ -110,7 +110,7 @@ class Source:
         except FileNotFoundError:
             raise InputError(f"cannot read {self}: there is no such file") from None
         except OSError as error:
-            raise InputError(f"cannot read {self}: {error.strerror or error}") from None
+            raise InputError(f"cannot read {self}: {reason(error)}") from None
 
     def read(self) -> bytes:
         """Return its whole content; InputError if it cannot be read, or is too large for a text."""
