@@ -205,8 +205,6 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     _refuse_options_of_hurst(args, "period")
     prepared = prepared_of(args, trace_of(args, args.trace))
     print(what_was_read(prepared))
-    for warning in prepared.warnings:
-        print(f"WARNING     {warning}")
     return prepared.profile(), []
 
 

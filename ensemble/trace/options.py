@@ -63,12 +63,13 @@ def _range(text: str) -> tuple[float, float]:
 
 
 def what_was_read(prepared: Prepared) -> str:
-    """Describe reading and preparation, line by line, for the terminal."""
+    """Describe reading and preparation, and what is doubtful, line by line, for the terminal."""
     trace = prepared.trace
     lines = [
         f"read        {trace.source}: {trace.summary}",
         *(f"            {note}" for note in trace.notes),
         *(f"{step.name:<11} {step.description}" for step in prepared.steps),
+        *(f"WARNING     {warning}" for warning in prepared.warnings),
     ]
     return printable("\n".join(lines))
 
