@@ -1,4 +1,4 @@
-"""The door to results files; what it loads, it loads when it is called."""
+"""Open results files; what that takes is loaded when it is called."""
 
 from __future__ import annotations
 

@@ -28,6 +28,11 @@ def quoted(text: str) -> str:
     return repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…")
 
 
+def reason(error: Exception) -> str:
+    """Return in one line what the system or a library says of an error."""
+    return getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
+
+
 def one_of(names: Sequence[str]) -> str:
     """Join alternatives: ".png, .pdf or .svg"."""
     return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))

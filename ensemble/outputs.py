@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, reason
 from adhesis.ensemble.regular_file import irregular
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _refusing(option: str, path: Path) -> Iterator[None]:
     except InputError:
         raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise InputError(f"{option} is {path}: it cannot be written ({_reason(error)})") from None
+        raise InputError(f"{option} is {path}: it cannot be written ({reason(error)})") from None
 
 
 def _check_file(option: str, path: Path) -> None:
@@ -181,7 +181,7 @@ class Writing:
         try:
             yield
         except OSError as error:
-            self.failures.append(f"{option} {path} could not be written ({_reason(error)})")
+            self.failures.append(f"{option} {path} could not be written ({reason(error)})")
         else:
             self.written.append(path)
 
@@ -307,7 +307,3 @@ def _descriptor(path: Path) -> int | None:
     if found is None:
         return None
     return _STANDARD[found[1]] if found[1] else int(found[2] or found[3])
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__

@@ -5,14 +5,16 @@ from __future__ import annotations
 import multiprocessing as mp
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 _PATIENCE = 20  # times as many seconds of the clock, should a process only sleep
 
 
 def _serve(work: Callable[..., Any], pipe: Any) -> None:
-    while True:
-        pipe.send(work(*pipe.recv()))
+    with suppress(EOFError):  # the program has ended
+        while True:
+            pipe.send(work(*pipe.recv()))
 
 
 class Isolated:

@@ -39,7 +39,7 @@ _TOKEN = re.compile(
     re.MULTILINE,
 )
 # Lines that report progress: how many there are depends on the machine.
-_PROGRESS = re.compile(r"^((un)?loading( +(Δ/h_max|p̄) .*)?|frames of the film: .*)\n", re.MULTILINE)
+_PROGRESS = re.compile(r"^((un)?loading( +(Δ/h_max|p̄) .*)?|frames( .*)?)\n", re.MULTILINE)
 _FACTOR = 3.0
 
 

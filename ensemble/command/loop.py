@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, 
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.reporter import following
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -81,6 +79,7 @@ def execute(args: argparse.Namespace) -> int:
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
+    loops = (results,) if isinstance(results, PathResult) else results
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
@@ -101,8 +100,7 @@ def execute(args: argparse.Namespace) -> int:
             _draw(results, args.figure)
     if args.film is not None:
         with writing.output("--film", args.film):
-            _film(results, args.film, args.quiet)
-    loops = (results,) if isinstance(results, PathResult) else results
+            loops[0].film(args.film, progress=not args.quiet)
     print("\n\n".join(map(record.summary, loops)))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
@@ -190,7 +188,7 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
 
 def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     """Return the profile of the one source that is given, and what is doubtful about it."""
-    sources = [f"--{n}" for n in ("hurst", "heights", "trace") if getattr(args, n) is not None]
+    sources = given(args, "hurst", "heights", "trace")
     if len(sources) != 1:
         found = f"{' and '.join(sources)} are" if sources else "no profile is"
         raise InputError(f"{found} given: give one of --hurst, --heights and --trace")
@@ -206,16 +204,12 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     _refuse_options_of_hurst(args, "period")
     prepared = prepared_of(args, trace_of(args, args.trace))
     print(what_was_read(prepared))
-    for warning in prepared.warnings:
-        print(f"WARNING     {warning}")
     return prepared.profile(), []
 
 
 def _refuse_options_of_hurst(args: argparse.Namespace, *more: str) -> None:
-    for name in ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes", *more):
-        if getattr(args, name) is not None:
-            option = "--" + name.replace("_", "-")
-            raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
+    for option in given(args, "seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes", *more):
+        raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
 
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
@@ -234,7 +228,7 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
 
 def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
-    several = [f"--{n.replace('_', '-')}" for n, value in norms.items() if value is not None]
+    several = given(args, *norms)
     if len(several) > 1:
         raise InputError(f"{' and '.join(several)} are given: give one of --h-rms, --m2 and --c0")
     return self_affine_profile(
@@ -251,10 +245,8 @@ def _self_affine(args: argparse.Namespace) -> Profile:
 def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float], bool]:
     """Return where fields are wanted, and whether these are mean stresses in Pa; else Δ/h_max."""
     if args.fields is None:
-        for name in ("field_penetrations", "field_stresses", "field_nodes"):
-            if getattr(args, name) is not None:
-                option = "--" + name.replace("_", "-")
-                raise InputError(f"{option} needs --fields, the file to which fields are written")
+        for option in given(args, "field_penetrations", "field_stresses", "field_nodes"):
+            raise InputError(f"{option} needs --fields, the file to which fields are written")
         return [], False
     if cycle.is_path or len(cycle.points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
@@ -307,11 +299,3 @@ def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
     figure = draw_loops(results)
     with whole_file(path) as stream:
         figure.savefig(stream, format=path.suffix[1:].lower(), dpi=200)
-
-
-def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool) -> None:
-    from adhesis.ensemble.loop.film import film_of
-
-    result = results if isinstance(results, PathResult) else results[0]
-    with nullcontext() if quiet else following("frames of the film") as show:
-        film_of(result, progress=show).save(path, progress=show)

@@ -62,8 +62,6 @@ def execute(args: argparse.Namespace) -> int:
         check(prepared, cycle)
     plan = make_plan(prepared, cycle, quick=args.quick, processes=args.processes)
     print(what_was_read(prepared))
-    for warning in prepared.warnings:
-        print(f"WARNING     {warning}")
     print(plan.text, flush=True)
     if args.plan:
         return 0

@@ -10,6 +10,7 @@ from typing import Any
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import STRESS, read_words, words_of
+from adhesis.ensemble.trace.options import given
 from adhesis.solver.loading.cycle import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
@@ -155,6 +156,6 @@ def in_options(text: str, args: argparse.Namespace) -> str:
 
 
 def _refuse_several(args: argparse.Namespace, *names: str) -> None:
-    given = [f"--{n.replace('_', '-')}" for n in names if getattr(args, n) is not None]
-    if len(given) > 1:
-        raise InputError(f"{' and '.join(given)} are given: a loop has one of them")
+    found = given(args, *names)
+    if len(found) > 1:
+        raise InputError(f"{' and '.join(found)} are given: a loop has one of them")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from adhesis.solver.loading.loop_state import LoopState
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import Fields, Opening
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Array, Profile
+from adhesis.solver.model.profile import Profile
 
 
 def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) -> Figure:
@@ -42,10 +42,10 @@ def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) ->
 
 def _draw(results: Sequence[LoopResult] | PathResult, panels: Sequence[Axes]) -> None:
     """Draw the mean stress into the first of the panels, and the contact fraction into a second."""
-    if isinstance(results, PathResult):
-        _draw_path(panels, results)
-    else:
-        _draw_each(panels, results)
+    for result, rows, options in _lines(results):
+        columns = (result.mean_stress[rows] / 1e3, result.contact_fraction[rows])
+        for panel, y in zip(panels, columns, strict=False):
+            panel.plot(result.penetration[rows], y, **options)
     stress, depth = panels[0], r"penetration $\Delta/h_{\max}$"
     stress.axhline(0, color="0.7", lw=0.5, zorder=0)
     stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
@@ -55,34 +55,23 @@ def _draw(results: Sequence[LoopResult] | PathResult, panels: Sequence[Axes]) ->
         panels[-1].legend()
 
 
-def _plot(panels: Sequence[Axes], x: Array, stress: Array, contact: Array, **options: Any) -> None:
-    for panel, y in zip(panels, (stress / 1e3, contact), strict=False):
-        panel.plot(x, y, **options)
-
-
-def _draw_path(panels: Sequence[Axes], path: PathResult) -> None:
-    for leg in range(int(path.leg.max()) + 1):
-        rows = path.leg == leg
-        branch = str(path.branch[rows][0])
-        label = f"leg {leg + 1}, {branch}"
-        options = {"color": colour(leg), "ls": LINE_OF_BRANCH[branch], "label": label}
-        _plot(panels, *_curve(path, rows), **options)
-
-
-def _curve(path: LoopResult | PathResult, rows: Any) -> tuple[Array, Array, Array]:
-    return path.penetration[rows], path.mean_stress[rows], path.contact_fraction[rows]
-
-
-def _draw_each(panels: Sequence[Axes], loops: Sequence[LoopResult]) -> None:
-    deepest = loops[-1]
-    for k, loop in enumerate(loops):
+def _lines(
+    results: Sequence[LoopResult] | PathResult,
+) -> Iterator[tuple[LoopResult | PathResult, Any, dict[str, Any]]]:
+    """Return what is drawn: a result, the rows of its states, and the look of their line."""
+    if isinstance(results, PathResult):
+        for leg in range(int(results.leg.max()) + 1):
+            rows = results.leg == leg
+            branch = str(results.branch[rows][0])
+            options = {"color": colour(leg), "ls": LINE_OF_BRANCH[branch]}
+            yield results, rows, options | {"label": f"leg {leg + 1}, {branch}"}
+        return
+    for k, loop in enumerate(results):
         rows = loop.states("unloading")
-        label = f"unloading from {loop.penetration[rows[0]]:.3g}"
-        options = {"color": colour(k), "ls": LINE_OF_BRANCH["unloading"], "label": label}
-        _plot(panels, *_curve(loop, rows), **options)
-    rows = deepest.states("loading")
+        options = {"color": colour(k), "ls": LINE_OF_BRANCH["unloading"]}
+        yield loop, rows, options | {"label": f"unloading from {loop.penetration[rows[0]]:.3g}"}
     options = {"color": "k", "ls": LINE_OF_BRANCH["loading"], "label": "loading"}
-    _plot(panels, *_curve(deepest, rows), **options)
+    yield results[-1], results[-1].states("loading"), options
 
 
 _POINTS = 2000  # of a drawn profile

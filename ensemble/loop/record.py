@@ -18,7 +18,7 @@ from adhesis.ensemble.outputs import whole_file
 from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.loading.path import PathResult
+from adhesis.solver.loading.path import MinorLoop, PathResult
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
 
 
@@ -81,92 +81,96 @@ def _displacement(result: LoopResult | PathResult) -> dict[str, Any]:
 
 def summary(result: LoopResult | PathResult) -> str:
     """Return a loop or path in a few lines for the terminal."""
-    return path_summary(result) if isinstance(result, PathResult) else loop_summary(result)
+    return "\n".join(f"{name:<12}{text}" for name, text in summary_rows(result))
 
 
-def path_summary(result: PathResult) -> str:
-    """Return a path in a few lines for the terminal."""
-    way = ", ".join(f"{point:g}" for point in result.turning_points)
-    lines = [
-        f"path        {way}{', out' if result.ends_out else ''} in {result.load_steps} load steps "
-        "to the largest",
-        f"work        {result.work:.6g} J/m²"
-        f"{in_works_of_adhesion(result.work, result.problem.work_of_adhesion)}, of which "
-        f"{result.energy_change:.6g} J/m² are stored"
-        f"{f'; {result.loss_note}' if result.loss_note else ''}",
-        *_friction(result),
-        _audit(result),
-        _range(result),
-    ]
-    for part in result.minor_loops:
-        end = (
-            "comes back to the same state"
-            if part.closes
-            else (f"ends {part.stress_change:+.3g} Pa and {part.contact_change:+.3g} A/A0 away")
-        )
-        lines.append(
-            f"minor loop  {part.start:g}, {part.turn:g}, {part.start:g}: {part.loss:.6g} J/m² "
-            f"(drops {part.loss_from_drops:.6g}), {end}"
-        )
-    lines.append(_method(result))
-    return "\n".join(lines)
-
-
-def loop_summary(result: LoopResult) -> str:
-    """Return the loop in a few lines for the terminal."""
+def summary_rows(result: LoopResult | PathResult) -> list[tuple[str, str]]:
+    """Return the main numbers of a loop or path, each with its name."""
     problem, profile, half_space = result.problem, result.problem.profile, result.problem.half_space
     present = np.flatnonzero(profile.coefficients)
     counts = Counter(jump.kind for jump in result.jumps)
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.most_common()) or "none"
-    return "\n".join(
+    measure = "" if problem.measure == "arc" else f"{problem.measure} measure, "
+    note = f"; {result.loss_note}" if result.loss_note else ""
+    contact = (
+        f"largest contact fraction {result.contact_fraction.max():.4g}, most patches "
+        f"{result.patches.max()}"
+    )
+    rows = [
         (
-            f"profile     period {profile.period:.6g} m, harmonics {present[0]} to {present[-1]}, "
+            "profile",
+            f"period {profile.period:.6g} m, harmonics {present[0]} to {present[-1]}, "
             f"h_rms {profile.h_rms:.4g} m, h_max {profile.h_max:.4g} m, m2 {profile.m2:.4g}",
-            f"contact     E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
+        ),
+        (
+            "contact",
+            f"E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
             f"work of adhesion {problem.work_of_adhesion:.4g} J/m²",
-            f"cycle       {_turn(result)} in {result.load_steps} load steps, detached by "
-            f"{result.pull_off_penetration:.4g} h_max; largest contact fraction "
-            f"{result.contact_fraction.max():.4g}, most patches {result.patches.max()}",
-            f"loss        {result.loss:.6g} J/m²"
-            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)} "
-            f"(dimensionless {result.loss_dimensionless:.6g})"
-            f"{f'; {result.loss_note}' if result.loss_note else ''}",
-            *_friction(result),
-            *(f"sticking    {text}" for text in (result.sticking_note,) if text),
-            _range(result),
-            _audit(result),
-            f"error       {result.loss_error:.2g} J/m² (numerical); "
-            f"{counted(result.races, 'jump')} raced, {result.energy_at_stake:.3g} J/m² at stake",
-            f"jumps       {kinds}",
-            f"pull-off    mean tension {result.pull_off_stress + 0.0:.6g} Pa",
-            _method(result),
-        )
+        ),
+    ]
+    if isinstance(result, PathResult):
+        way = ", ".join(f"{point:g}" for point in result.turning_points)
+        out = ", out" if result.ends_out else ""
+        share = in_works_of_adhesion(result.work, problem.work_of_adhesion)
+        stored = f"of which {result.energy_change:.6g} J/m² are stored"
+        rows += [
+            ("path", f"{way}{out} in {result.load_steps} load steps to the largest; {contact}"),
+            ("work", f"{result.work:.6g} J/m²{share}, {stored}{note}"),
+        ]
+    else:
+        share = in_works_of_adhesion(result.loss, problem.work_of_adhesion)
+        rows += [
+            (
+                "cycle",
+                f"{_turn(result)} in {result.load_steps} load steps, detached by "
+                f"{result.pull_off_penetration:.4g} h_max; {contact}",
+            ),
+            (
+                "loss",
+                f"{result.loss:.6g} J/m²{share} (dimensionless {result.loss_dimensionless:.6g})"
+                f"{note}",
+            ),
+        ]
+    rows += [
+        ("friction", result.friction_summary()),
+        ("sticking", result.sticking_note),
+        ("range", result.range_summary()),
+        ("audit", _audit(result)),
+        (
+            "error",
+            f"{result.loss_error:.2g} J/m² (numerical); {counted(result.races, 'jump')} raced, "
+            f"{result.energy_at_stake:.3g} J/m² at stake",
+        ),
+        ("jumps", kinds),
+    ]
+    if isinstance(result, PathResult):
+        rows += [("minor loop", _minor_loop(part)) for part in result.minor_loops]
+    else:
+        rows.append(("pull-off", f"mean tension {result.pull_off_stress + 0.0:.6g} Pa"))
+    rows.append(("method", f"{result.method.name}, {measure}{result.seconds:.1f} s"))
+    return [(name, text) for name, text in rows if text]
+
+
+def _minor_loop(part: MinorLoop) -> str:
+    end = (
+        "comes back to the same state"
+        if part.closes
+        else f"ends {part.stress_change:+.3g} Pa and {part.contact_change:+.3g} A/A0 away"
+    )
+    return (
+        f"{part.start:g}, {part.turn:g}, {part.start:g}: {part.loss:.6g} J/m² "
+        f"(drops {part.loss_from_drops:.6g}), {end}"
     )
 
 
-def _friction(result: LoopResult | PathResult) -> list[str]:
-    """The line on the friction of edges; none with one work of adhesion."""
-    text = result.friction_summary()
-    return [f"friction    {text}"] if text else []
-
-
-def _method(result: LoopResult | PathResult) -> str:
-    measure = "" if result.problem.measure == "arc" else f"{result.problem.measure} measure, "
-    return f"method      {result.method.name}, {measure}{result.seconds:.1f} s"
-
-
-def _range(result: LoopResult | PathResult) -> str:
-    return f"range       {result.range_summary()}"
-
-
 def _audit(result: LoopResult | PathResult) -> str:
-    """The line of the audit; without adhesion there is no loss that a residual could refer to."""
+    """Return the audit; without adhesion there is no loss that a residual could refer to."""
     friction = " and the friction between them" if result.problem.pinning > 0 else ""
     jumps = f"{counted(len(result.jumps), 'jump')}{friction}"
     drops = f"{result.loss_from_drops:.6g} J/m² in {jumps}"
     if result.problem.work_of_adhesion == 0:
-        return f"audit       {drops}; without adhesion nothing is lost"
-    return f"audit       {drops}, residual {result.audit_residual:.2e}"
+        return f"{drops}; without adhesion nothing is lost"
+    return f"{drops}, residual {result.audit_residual:.2e}"
 
 
 def _turn(result: LoopResult) -> str:

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adhesis.ensemble.loop.record import summary
+from adhesis.ensemble.loop.record import summary_rows
 from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.quantities import (
     UNITS,
@@ -55,13 +55,10 @@ def film(
 
     if path is not None:
         path = check_film("path", path)
-    if isinstance(progress, bool):
-        with bar("frames") if progress else nullcontext() as shown:
-            made = film_of(result, frames=frames, progress=shown)
-    else:
-        made = film_of(result, frames=frames, progress=progress)
-    if path is not None:
-        made.save(path)
+    with bar("frames") if progress is True else nullcontext(progress or None) as shown:
+        made = film_of(result, frames=frames, progress=shown)
+        if path is not None:
+            made.save(path, progress=shown if progress is True else None)
     return made
 
 
@@ -84,7 +81,7 @@ def page(shown: Any) -> str:
     from adhesis.ensemble.report.html import picture_of, table_of
 
     if isinstance(shown, LoopResult | PathResult):
-        rows = _rows_of_summary(summary(shown)) + [("warning", text) for text in shown.warnings]
+        rows = summary_rows(shown) + [("warning", text) for text in shown.warnings]
         return table_of(rows) + picture_of(plot(shown))
     figure = draw_shape(shown)
     return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))
@@ -102,7 +99,8 @@ def trace_page(answer: Answer) -> str:
     from adhesis.ensemble.report.html import picture_of, table_of
     from adhesis.ensemble.trace.figures import draw_loop
 
-    return table_of(_rows_of_summary(str(answer))) + picture_of(draw_loop(answer))
+    rows = [line.split(maxsplit=1) for line in str(answer).splitlines()]
+    return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
 
 
 def write_trace_page(answer: Answer, folder: str | os.PathLike[str]) -> Path:
@@ -125,11 +123,6 @@ def table_of_runs(answer: Answer) -> Any:
     )
     rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
     return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
-
-
-def _rows_of_summary(text: str) -> list[tuple[str, str]]:
-    """Return the lines of a summary for the terminal as rows."""
-    return [(line[:12].strip(), line[12:]) for line in text.splitlines()]
 
 
 # By class: what the figure shows, and what is shown beside the fields.

@@ -27,10 +27,8 @@ from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.model.measured_profile import trace_spectrum
-from adhesis.solver.model.profile import Array
 
 _GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
-_MAX_POINTS = 4000  # of a curve; of more, lowest and highest of each interval are drawn
 
 
 @dataclass(frozen=True)
@@ -64,18 +62,6 @@ def _scale(name: str, size: float) -> tuple[float, str]:
     return 1 / in_si, unit
 
 
-def _thinned(x: Any, y: Any) -> tuple[Array, Array]:
-    """Reduce a curve to the lowest and highest points of each interval, in order."""
-    if x.size <= _MAX_POINTS:
-        return x, y
-    each = int(np.ceil(x.size / (_MAX_POINTS // 2)))
-    whole = (x.size // each) * each
-    rows = np.where(np.isfinite(y[:whole]), y[:whole], 0.0).reshape(-1, each)
-    base = np.arange(rows.shape[0]) * each
-    picked = np.sort(np.concatenate([base + rows.argmin(axis=1), base + rows.argmax(axis=1)]))
-    return x[picked], y[picked]
-
-
 def _trace(answer: Answer) -> tuple[Figure, str]:
     prepared = answer.prepared
     heights = prepared.trace.heights
@@ -104,11 +90,11 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     above.set(ylabel=f"measured ({unit_z})")
     above.legend(loc="best")
     by_z, unit_z = _scale("height_range", float(np.ptp(level)))
-    below.plot(*_thinned(by_x * x, by_z * level), color=_GREY, lw=0.7, label="level")
+    below.plot(by_x * x, by_z * level, color=_GREY, lw=0.7, label="level")
     n = max(4 * profile.highest_harmonic, 2000) + 1
     used = profile.heights(n)
     at = prepared.start + profile.period * np.arange(n) / n
-    below.plot(*_thinned(by_x * at, by_z * used), color=_BLUE, lw=0.8, label="used, one period")
+    below.plot(by_x * at, by_z * used, color=_BLUE, lw=0.8, label="used, one period")
     below.set(xlabel=f"position ({unit_x})", ylabel=f"height ({unit_z})")
     below.legend(loc="best", ncols=2)
     return figure, (

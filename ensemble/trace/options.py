@@ -63,17 +63,22 @@ def _range(text: str) -> tuple[float, float]:
 
 
 def what_was_read(prepared: Prepared) -> str:
-    """Describe reading and preparation, line by line, for the terminal."""
+    """Describe reading and preparation, and what is doubtful, line by line, for the terminal."""
     trace = prepared.trace
     lines = [
         f"read        {trace.source}: {trace.summary}",
         *(f"            {note}" for note in trace.notes),
         *(f"{step.name:<11} {step.description}" for step in prepared.steps),
+        *(f"WARNING     {warning}" for warning in prepared.warnings),
     ]
     return printable("\n".join(lines))
 
 
-def given(args: argparse.Namespace) -> list[str]:
-    """Return the given options of reading and preparation."""
-    names = [name for name in _NAMES if getattr(args, name) not in (None, False)]
-    return [f"--{name.replace('_', '-')}" for name in names]
+def given(args: argparse.Namespace, *names: str) -> list[str]:
+    """Return which of these options are given; without names, of reading and preparation."""
+    found = {name: getattr(args, name) for name in names or _NAMES}
+    return [
+        f"--{name.replace('_', '-')}"
+        for name, value in found.items()
+        if value is not None and value is not False
+    ]

@@ -92,6 +92,26 @@ def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeyp
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)
 
 
+def test_names_of_files_are_printed_without_control_characters(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    name = "a\x1b[31m\x07"
+    contact = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
+    small = ["--hurst", "0.8", "--n0", "1", "--ratio", "2", "--load-steps", "2", "--quiet"]
+    (tmp_path / f"{name}.txt").write_text("\n".join(str(1e-6 * (k % 3)) for k in range(7)))
+    for words in (
+        ["new", f"{name}.toml"],
+        ["sample", f"{name}.csv"],
+        ["trace", f"{name}.csv", *contact, "--plan"],
+        ["loop", *small, "--json", f"{name}.json", "--csv", f"{name}2.csv"],
+        ["loop", "--heights", f"{name}.txt", "--period", "1mm", *contact, "--load-steps", "1"],
+    ):
+        assert main(words) == 0
+        shown = "".join(capsys.readouterr())
+        assert r"a\x1b[31m\x07" in shown
+        assert not {"\x1b", "\x07"} & set(shown)
+    assert (tmp_path / f"{name}.json").exists()
+
+
 def test_images_come_from_the_folder_of_the_page_alone(tmp_path):
     report = tmp_path / "report"
     (report / "below").mkdir(parents=True)

@@ -103,6 +103,7 @@ LOOP --method magic -> --method is 'magic': it must be one of grid
 LOOP --decimal x -> --decimal is 'x': it must be one of ',', '.'
 LOOP --unit um -> --unit belongs to --trace
 LOOP --cut-off 1um -> --cut-off belongs to --trace
+LOOP --degree 0 -> --degree belongs to --trace
 LOOP --exclude 1mm:2mm -> --exclude belongs to --trace
 LOOP --period 1e300 -> --period is 1e+300, which would be 1e+300 m: give
 LOOP --period 1e-300 -> --period is 1e-300:

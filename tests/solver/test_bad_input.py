@@ -42,7 +42,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.ensemble.errors import naming_options
-from adhesis.ensemble.loop.record import loop_summary, path_summary
+from adhesis.ensemble.loop.record import summary
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks
@@ -648,9 +648,9 @@ def test_one_is_not_several() -> None:
     assert [counted(n, "jump") for n in (0, 1, 2)] == ["0 jumps", "1 jump", "2 jumps"]
     single = replace(one_loop(), jumps=one_loop().jumps[:1])
     assert ", 1 jump, " in repr(single)
-    assert "J/m² in 1 jump, residual" in loop_summary(single)
+    assert "J/m² in 1 jump, residual" in summary(single)
     one_left = replace(one_path(), jumps=one_path().jumps[:1])
-    assert "J/m² in 1 jump, residual" in path_summary(one_left)
+    assert "J/m² in 1 jump, residual" in summary(one_left)
 
 
 def test_bounds_are_spelt_as_one_would_write_them() -> None:

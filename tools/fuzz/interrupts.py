@@ -23,6 +23,8 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -107,57 +109,48 @@ class Loops:
         return ended
 
 
-class First:
-    """The first loops of a process."""
+@dataclass(frozen=True)
+class Once:
+    """Work that is interrupted as a whole, and what is looked at afterwards."""
 
-    def __init__(self, longest: float) -> None:
-        self._longest = longest
-
-    def once(self, rng: np.random.Generator) -> str:
-        """Interrupt once; then the loop runs to its end."""
-        from adhesis.solver.loading.loop import run_loop
-
-        def loop() -> str:
-            found = run_loop(make("sharp", 0.04, 4), max_penetration=0.8, load_steps=4)
-            return found.loss.hex()
-
-        ended = interrupted(loop, float(rng.uniform(0.0, self._longest)) + 1e-6)
-        return f"{ended} {loop()}"
-
-
-class Traces:
-    """``loss_of_trace`` of a small trace."""
-
-    def __init__(self, processes: int, longest: float) -> None:
-        from adhesis.ensemble.trace.prepare import prepare_trace
-        from adhesis.ensemble.trace.reading.measured_trace import Trace
-        from adhesis.solver.model.half_space import HalfSpace
-        from adhesis.solver.model.profile import self_affine_profile
-
-        profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=6, seed=2, h_rms=1e-6)
-        x = np.linspace(0.0, 1e-3, 400, endpoint=False, dtype=np.float64)
-        heights = profile.at(x) + 5e-9 * np.random.default_rng(0).standard_normal(400)
-        self._prepared = prepare_trace(Trace(heights, 1e-3 / 400, "t.txt"))
-        self._half_space = HalfSpace(young=1e6, poisson=0.5)
-        self._processes, self._longest = processes, longest
-
-    def _work(self) -> None:
-        from adhesis.ensemble.trace.answer import loss_of_trace
-
-        loss_of_trace(
-            self._prepared,
-            half_space=self._half_space,
-            work_of_adhesion=0.04,
-            processes=self._processes,
-        )
+    work: Callable[[], object]
+    longest: float  # s within which it is interrupted
+    check: Callable[[str], str] = str  # what it ended in, with what else is wrong
 
     def once(self, rng: np.random.Generator) -> str:
-        """Interrupt once; processes that were started must be gone."""
-        ended = interrupted(self._work, float(rng.uniform(0.0, self._longest)) + 1e-6)
-        end = time.monotonic() + 20
-        while children() and time.monotonic() < end:
-            time.sleep(0.02)  # one whose start was interrupted ends when its input does
-        return f"PROCESSES LEFT after {ended}" if children() else ended
+        """Interrupt once."""
+        return self.check(interrupted(self.work, float(rng.uniform(0.0, self.longest)) + 1e-6))
+
+
+def first_loop() -> str:
+    """Return the bits of a loop; its first is that of a process."""
+    from adhesis.solver.loading.loop import run_loop
+
+    return run_loop(make("sharp", 0.04, 4), max_penetration=0.8, load_steps=4).loss.hex()
+
+
+def trace(processes: int) -> Callable[[], object]:
+    """Return ``loss_of_trace`` of a small trace."""
+    from adhesis.ensemble.trace.answer import loss_of_trace
+    from adhesis.ensemble.trace.prepare import prepare_trace
+    from adhesis.ensemble.trace.reading.measured_trace import Trace
+    from adhesis.solver.model.half_space import HalfSpace
+    from adhesis.solver.model.profile import self_affine_profile
+
+    profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=6, seed=2, h_rms=1e-6)
+    x = np.linspace(0.0, 1e-3, 400, endpoint=False, dtype=np.float64)
+    heights = profile.at(x) + 5e-9 * np.random.default_rng(0).standard_normal(400)
+    prepared = prepare_trace(Trace(heights, 1e-3 / 400, "t.txt"))
+    contact: dict[str, Any] = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.04}
+    return lambda: loss_of_trace(prepared, processes=processes, **contact)
+
+
+def without_children(ended: str) -> str:
+    """Processes that were started must be gone."""
+    end = time.monotonic() + 20
+    while children() and time.monotonic() < end:
+        time.sleep(0.02)  # one whose start was interrupted ends when its input does
+    return f"PROCESSES LEFT after {ended}" if children() else ended
 
 
 def children() -> list[int]:
@@ -174,54 +167,45 @@ def _state(pid: str) -> str:
         return ""
 
 
-class Campaigns:
-    """A campaign in this process; the file must be sound, and go on to its end at last."""
+CAMPAIGN = """
+profile = { period = 1e-3, n0 = 1, ratio = 16, h_rms = 1e-6 }
+material = { young = 1e6, poisson = 0.5 }
+sweep = { hurst = [0.7, 0.8], work_of_adhesion = [0.01, 0.04], realisations = 20, seed = 5 }
+cycle = { max_penetration = 0.6, load_steps = 8, unloading_until = -3 }
+"""
 
-    TEXT = """
-        profile = { period = 1e-3, n0 = 1, ratio = 16, h_rms = 1e-6 }
-        material = { young = 1e6, poisson = 0.5 }
-        sweep = { hurst = [0.7, 0.8], work_of_adhesion = [0.01, 0.04], realisations = 20, seed = 5 }
-        cycle = { max_penetration = 0.6, load_steps = 8, unloading_until = -3 }
-    """
 
-    def __init__(self, longest: float) -> None:
-        from adhesis.ensemble.campaign.file import parse_campaign
+def campaign() -> Once:
+    """Return a campaign in this process; its file must be sound and have no failed task."""
+    from adhesis.ensemble.campaign.file import parse_campaign
+    from adhesis.ensemble.results.status import read_status
+    from adhesis.ensemble.run.session import run_campaign
 
-        text = "\n".join(line.strip() for line in self.TEXT.splitlines())
-        self._campaign = parse_campaign(text)
-        self._longest = longest
+    read = parse_campaign(CAMPAIGN)
+    path = Path(tempfile.gettempdir(), f"interrupts-{os.getpid()}.h5")
 
-    def once(self, rng: np.random.Generator) -> str:
-        """Interrupt once, in a results file of its own."""
-        from adhesis.ensemble.results.status import read_status
-        from adhesis.ensemble.run.session import run_campaign
-
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "r.h5"
-            ended = interrupted(
-                lambda: run_campaign(self._campaign, path),
-                float(rng.uniform(0.0, self._longest)) + 1e-6,
-            )
-            failed = read_status(path)["failed"] if path.exists() else 0
+    def check(ended: str) -> str:
+        failed = read_status(path)["failed"] if path.exists() else 0
+        for file in path.parent.glob(f"{path.name}*"):
+            file.unlink()
         return f"{failed} FAILED TASKS, {ended}" if failed else ended
+
+    return Once(lambda: run_campaign(read, path), 3.0, check)
 
 
 @cache
 def kind_of(name: str) -> Any:
     """Set up what is interrupted."""
-    if name == "strong":
-        return Loops("sharp", 0.04, 100)
-    if name == "weak":
-        return Loops("sharp", 0.0025, 100)
-    if name == "grid":
-        return Loops("grid", 0.04, 8)
-    if name == "first":
-        return First(3.0)
-    if name == "trace":
-        return Traces(0, 2.0)
-    if name == "pool":
-        return Traces(2, 8.0)
-    return Campaigns(3.0)
+    kinds: dict[str, Callable[[], Any]] = {
+        "strong": lambda: Loops("sharp", 0.04, 100),
+        "weak": lambda: Loops("sharp", 0.0025, 100),
+        "grid": lambda: Loops("grid", 0.04, 8),
+        "first": lambda: Once(first_loop, 3.0, lambda ended: f"{ended} {first_loop()}"),
+        "trace": lambda: Once(trace(0), 2.0, without_children),
+        "pool": lambda: Once(trace(2), 8.0, without_children),
+        "campaign": campaign,
+    }
+    return kinds[name]()
 
 
 def once(name: str, seed: int, number: int) -> str:

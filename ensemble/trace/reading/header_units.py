@@ -46,20 +46,13 @@ _VALUE = re.compile(
 _HAS_NUMBER = re.compile(r"(?<![^\W_])\d|[:=]")
 
 # The step is named by words for the distance of two points, and by nothing else: a "step height" or
-# a "sampling length" is another length.
+# a "sampling length" is another length. Of two words it has both together.
 _STEP = frozenset(
-    ("step", "stepsize", "spacing", "increment", "pitch", "dx", "δx", "deltax",
+    ("step", "stepsize", "spacing", "increment", "pitch", "interval", "dx", "δx", "deltax",
      "xstep", "xspacing", "xpitch", "xincrement", "xscale", "pixelsize", "schrittweite",
-     "punktabstand", "messpunktabstand", "samplinginterval", "sampleinterval",
-     "pointinterval", "datainterval")
+     "punktabstand", "messpunktabstand", "samplinginterval", "sampleinterval", "pointinterval",
+     "datainterval", "samplespacing", "sampledistance", "samplingdistance", "pointdistance")
 )  # fmt: skip
-_STEP_IN_WORDS = (
-    *(("interval",), ("sampling", "interval"), ("sample", "interval"), ("point", "interval")),
-    *(("sample", "spacing"), ("sample", "distance")),
-    *(("pixel", "size"), ("delta", "x"), ("x", "scale"), ("point", "distance")),
-    *(("sampling", "distance"), ("data", "interval")),
-)
-_PHRASES = (*((word,) for word in _STEP), *_STEP_IN_WORDS)
 _BESIDE_STEP = frozenset(
     ("x", "in", "of", "the", "size", "sampling", "measuring", "measurement",
      "lateral", "horizontal", "point", "points", "data", "between", "scan", "axis", "direction")
@@ -169,8 +162,7 @@ def _step(text: str, decimal: str) -> float | None:
         return None
     within = _units_in(label.strip(" :=\t"))
     units = [unit[1]] if unit[1] else within
-    words = _words(label, within)
-    if len(set(units)) != 1 or not any(_names_step(words, phrase) for phrase in _PHRASES):
+    if len(set(units)) != 1 or not _names_step(_words(label, within)):
         return None
     try:
         metres = LENGTH.units[LENGTH.unit_named(units[0])]
@@ -189,10 +181,10 @@ def _words(label: str, units: Sequence[str]) -> list[str]:
     return [word for word in words if word not in names]
 
 
-def _names_step(words: Sequence[str], phrase: tuple[str, ...]) -> bool:
-    """Return whether a label holds this phrase, and nothing that gives it another meaning."""
-    n = len(phrase)
+def _names_step(words: Sequence[str]) -> bool:
+    """Return whether a label names the step, and nothing that gives it another meaning."""
     return any(
-        tuple(words[k : k + n]) == phrase and {*words[:k], *words[k + n :]} <= _BESIDE_STEP
-        for k in range(len(words) - n + 1)
+        "".join(words[k : k + n]) in _STEP and {*words[:k], *words[k + n :]} <= _BESIDE_STEP
+        for n in (1, 2)
+        for k in range(len(words))
     )

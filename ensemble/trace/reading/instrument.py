@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.errors import InputError, parameter, reason
 from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.reading.source import Source
 from adhesis.solver.model.profile import Array
@@ -158,10 +158,10 @@ def _tip_radius(topography: Any) -> float | None:
 
 
 def _unknown(source: Source, error: Exception) -> str:
-    reason = _one_line(error)
-    if reason.startswith("tried "):  # and then lists every reader
+    text = _one_line(error)
+    if text.startswith("tried "):  # and then lists every reader
         return _neither(source)
-    return f"{source} is no instrument format that can be read: {reason}"
+    return f"{source} is no instrument format that can be read: {text}"
 
 
 def _neither(source: Source) -> str:
@@ -173,5 +173,5 @@ def _neither(source: Source) -> str:
 
 
 def _one_line(error: Exception) -> str:
-    text = " ".join(str(error).split()) or type(error).__name__
+    text = reason(error)
     return text if len(text) < 160 else text[:157] + "..."

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, parameter, refused_as_input
+from adhesis.ensemble.errors import InputError, parameter, reason, refused_as_input
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
@@ -302,8 +302,7 @@ def load_array(source: Source) -> Array:
             table: Any = np.load(stream, allow_pickle=False)
             is_array = isinstance(table, np.ndarray)
     except (OSError, ValueError, EOFError, MemoryError, SyntaxError, TypeError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{source} is no .npy of numbers: {reason}") from None
+        raise InputError(f"{source} is no .npy of numbers: {reason(error)}") from None
     if not is_array:
         raise InputError(f"{source} is an archive of arrays: save the one of the heights as .npy")
     return _numbers(source.name, table)

@@ -9,11 +9,13 @@ import io
 import os
 import re
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, reason
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
 
@@ -92,28 +94,34 @@ class Source:
 
     def holds_zero_bytes(self) -> bool:
         """Return whether there is a zero byte anywhere: a text has none (InputError)."""
-        try:
-            with self.open() as stream:
-                return any(b"\0" in block for block in iter(lambda: stream.read(_BLOCK), b""))
-        except OSError as error:
-            raise InputError(f"cannot read {self}: {error.strerror or error}") from None
+        with self._reading() as stream:
+            return any(b"\0" in block for block in iter(lambda: stream.read(_BLOCK), b""))
 
     def open(self) -> BinaryIO:
         """Open it to read (OSError)."""
         return open_regular(self.name) if self.content is None else io.BytesIO(self.content)
 
+    @contextmanager
+    def _reading(self) -> Iterator[BinaryIO]:
+        """Open it to read; InputError if anything fails."""
+        try:
+            with self.open() as stream:
+                yield stream
+        except FileNotFoundError:
+            raise InputError(f"cannot read {self}: there is no such file") from None
+        except OSError as error:
+            raise InputError(f"cannot read {self}: {reason(error)}") from None
+
     def read(self) -> bytes:
         """Return its whole content; InputError if it cannot be read, or is too large for a text."""
-        try:
-            size = os.stat(self.name).st_size if self.content is None else len(self.content)
+        with self._reading() as stream:
+            size = stream.seek(0, os.SEEK_END)
             if size > MOST_BYTES:
                 raise InputError(
                     f"{self} holds {size / 1e6:.0f} MB: at most {MOST_BYTES // 10**6} MB"
                 )
-            with self.open() as stream:
-                return stream.read()
-        except OSError as error:
-            raise InputError(f"cannot read {self}: {error.strerror or error}") from None
+            stream.seek(0)
+            return stream.read()
 
     def beginning(self) -> bytes:
         """Return its first bytes.
@@ -121,11 +129,8 @@ class Source:
         InputError if it is missing, no regular file, unreadable, empty, or has to be unpacked or
         exported first.
         """
-        try:
-            with self.open() as stream:
-                begin = stream.read(_BEGIN)
-        except OSError as error:
-            raise InputError(f"cannot read {self}: {error.strerror or error}") from None
+        with self._reading() as stream:
+            begin = stream.read(_BEGIN)
         if not begin.strip():
             raise InputError(f"{self} is empty")
         for magic, (name, program) in _COMPRESSED.items():
