@@ -164,7 +164,7 @@ def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded
 
 
 @pytest.fixture
-def hierarchical(loaded):
+def many_gaps(loaded):
     """Edges of many gaps, and a point of theirs."""
     method, state = loaded
     edges = method.edges
@@ -178,10 +178,10 @@ def relaxed(edges, gaps, at):
     return gaps
 
 
-def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, hierarchical):
+def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, many_gaps):
     """Edges and rates against a field a hundred times as accurate, where dense edges balance."""
     method, _ = loaded
-    edges, point = hierarchical
+    edges, point = many_gaps
     exact = SharpMethod(method.problem, accuracy=1e-6).edges
     dense = exact.equilibrium(point.gaps, point.at, exact.wave)
     assert len(point.gaps) >= 10
@@ -193,12 +193,12 @@ def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, hierarchical):
 
 
 @pytest.mark.parametrize("motion", [1e-5, 1e-3, 1e-2, 0.1, 0.3])
-def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(hierarchical, motion):
+def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps, motion):
     """References move with edges that go near and far, are passed on, and come back: one state.
 
     Openings, rates and pressure are those of a response set up there from nothing.
     """
-    edges, point = hierarchical
+    edges, point = many_gaps
     at = point.at
     edges.forget()
     anew = edges.equilibrium(point.gaps, at, edges.wave)
@@ -214,9 +214,9 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(hierarchi
     assert np.abs(back.field.opening - anew.field.opening).max() < 1e-5 * scale
 
 
-def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(hierarchical):
+def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):
     """A patch less, and one more: that of the other gaps is taken over, with the same result."""
-    edges, point = hierarchical
+    edges, point = many_gaps
     gaps, at = point.gaps, point.at
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
     end = relaxed(edges, fewer, at)
@@ -365,9 +365,9 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
     assert edges.count.fields < 2000
 
 
-def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(hierarchical, monkeypatch):
+def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(many_gaps, monkeypatch):
     """A response is found by the number of gaps; where it does not serve, nor do its orders."""
-    edges, point = hierarchical
+    edges, point = many_gaps
     known = edges.responses.at(point.gaps, point.at)
     asked = []
 
