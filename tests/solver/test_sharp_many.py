@@ -392,11 +392,3 @@ def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
         state = method.follow(state, profile.h_max * (1 - 0.0225 * step)).states[-1]
     assert method.report().descent_steps < 50_000
     assert state.patches > 40
-
-
-def test_edges_without_a_field_have_no_response():
-    gaps = np.array([[1.0, 2.0], [np.nan, 5.0]])
-    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=2, h_rms=1e-6, seed=1)
-    model = FieldModel(FIXED_SEPARATION, 10.0, StressSource(profile).panels)
-    with pytest.raises(FloatingPointError, match="not positive definite"):
-        respond_at_fixed_edges(solve_field(gaps, 1e-3, model))
