@@ -43,7 +43,6 @@ from adhesis import (
 )
 from adhesis.ensemble.errors import naming_options
 from adhesis.ensemble.loop.record import loop_summary, path_summary
-from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, plain, real, shown, whole

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import ContactState, Control, HalfSpace, Path, Problem, run_loop, single_wave
+from adhesis import ContactState, Control, Path, Problem, run_loop, single_wave
 from adhesis.solver.loading.loop_result import estimated_error
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError

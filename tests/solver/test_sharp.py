@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 
 from adhesis import (
-    HalfSpace,
     Problem,
     Profile,
     make_method,
     run_loop,
     self_affine_profile,
-    single_wave,
 )
-from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE
 
