@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from adhesis.ensemble.command import main as command_line
-from adhesis.ensemble.command.main import _WITHOUT_NUMERICS, COMMANDS, main
+from adhesis.ensemble.command.main import _WITHOUT_NUMERICS, main
 from tests.support.campaign_support import (
     adhesis_here,
     command,
@@ -141,10 +141,6 @@ def test_a_command_under_a_limit_ends_in_one_sentence_and_leaves_nothing_half_wr
     # without the lines that tell every ten seconds how far it is
     sentences = [line for line in done.stderr.splitlines() if not line.endswith(" s)")]
     assert began or (len(sentences) == 1 and sentences[0].startswith(f"adhesis {name}: "))
-
-
-def test_every_command_is_run_under_limits() -> None:
-    assert list(WORDS) == list(COMMANDS)
 
 
 def test_ranks_are_refused_where_they_cannot_share_memory(finished: Path, tmp_path: Path) -> None:
