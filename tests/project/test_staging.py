@@ -55,7 +55,7 @@ declare -A done
 while read -r row; do done[$row]=yes; done <"$file"
 for ((row = 1; row <= {ROWS}; row++)); do
     if [ -n "${{done[$row]:-}}" ]; then continue; fi
-    read -rt 0.004 <>pause  # as sleep, which would be a process each
+    sleep 0.004
     echo "$row" >&7
     echo "$row" >>ledger
 done
@@ -139,7 +139,6 @@ def site(folder: Path) -> Iterator[Site]:
     for name, text in {"adhesis": ADHESIS, "scontrol": SCONTROL}.items():
         (folder / "bin" / name).write_text(text)
         (folder / "bin" / name).chmod(0o755)
-    os.mkfifo(folder / "pause")
     made = Site(folder)
     try:
         yield made
@@ -237,11 +236,11 @@ def interleave(folder: Path, seed: int) -> None:
             assert [*(folder / "disk1").iterdir(), *folder.glob("s.h5.*")] == [], at_work
 
 
-@pytest.mark.parametrize("first", range(0, 60, 20))
+@pytest.mark.parametrize("first", range(0, 24, 8))
 def test_no_interleaving_of_jobs_loses_a_row(tmp_path: Path, first: int) -> None:
     with ThreadPoolExecutor(8) as pool:
         for done in [
-            pool.submit(interleave, tmp_path / f"{seed}", seed) for seed in range(first, first + 20)
+            pool.submit(interleave, tmp_path / f"{seed}", seed) for seed in range(first, first + 8)
         ]:
             done.result()
 
