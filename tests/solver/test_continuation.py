@@ -22,6 +22,7 @@ from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
+from adhesis.solver.sharp.continuation.trail import Trail
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.nucleation.location import locate
 
@@ -356,3 +357,14 @@ def test_a_touch_where_the_clearance_leaps_is_at_the_last_clear_point():
     assert found is not None
     assert 0 < found.point.at - 0.6 < 1e-15
     assert (found.seeds, found.late) == ([0.6], 0.0)
+
+
+def test_a_trail_begins_anew_at_its_last_point():
+    curve = Curve()
+    trail = Trail(curve.point(0.9, clearance=0.5))
+    trail.add(curve.point(0.8), 0.1)
+    trail.add(curve.point(0.7), 0.2)
+    assert ([p.at for p in trail.points], trail.clearance) == ([0.9, 0.8, 0.7], 0.5)
+    assert trail.closed == pytest.approx(0.3)
+    trail.restart(0.4)
+    assert ([p.at for p in trail.points], trail.clearance, trail.closed) == ([0.7], 0.4, 0.0)

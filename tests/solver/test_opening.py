@@ -61,7 +61,7 @@ def loop_of(
     problem = Problem(profile, HalfSpace(1e9, 0.5), gamma, strength=strength)
     states: list[ContactState] = []
     loop = run_loop(
-        make_method(name, problem),
+        make_method(name, problem, nodes_per_wave=64 if name == "grid" else None),
         max_penetration=0.9,
         load_steps=20,
         on_state=lambda branch, state: states.append(state),

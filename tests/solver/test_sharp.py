@@ -32,17 +32,17 @@ def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, s
 
 def test_grid_converges_to_sharp():
     """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
-    problem = Problem(rough(), HALF_SPACE, 0.01)
-    sharp = run_loop(make_method("sharp", problem), max_penetration=0.9, load_steps=20).loss
+    problem = Problem(rough(n0=2, ratio=6), HALF_SPACE, 0.01)
+    sharp = run_loop(make_method("sharp", problem), max_penetration=0.9, load_steps=10).loss
     errors = []
     for nodes in (8, 64):
         grid = make_method("grid", problem, nodes_per_wave=nodes)
-        errors.append(abs(run_loop(grid, max_penetration=0.9, load_steps=20).loss / sharp - 1))
+        errors.append(abs(run_loop(grid, max_penetration=0.9, load_steps=10).loss / sharp - 1))
     assert errors[1] < errors[0]
     assert errors[1] < 2e-3
 
 
-@pytest.mark.parametrize("gamma", [1e-4, 1e-3, 1e-2, 1.0])
+@pytest.mark.parametrize("gamma", [1e-3, 1e-2, 1.0])
 def test_loop_integral_equals_the_sum_of_drops(gamma):
     result = loop(rough(), gamma, accuracy=1e-4)
     # For weak adhesion the loss is a small difference of two works: jumps located to 2e-6 h_max,
@@ -65,7 +65,7 @@ def test_loss_does_not_depend_on_the_load_steps():
 
 
 @pytest.mark.parametrize("gamma", [0.02, 0.1])
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     """Edges that race make a path sensitive; steps that are minima in their box decide it."""
     profile = rough(seed)
