@@ -17,7 +17,7 @@ from tests.support import one_thread  # noqa: F401  # before what loads numpy
 from tests.support.launcher_crash import pytest_runtest_protocol  # noqa: F401  # a hook
 from tests.support.launchers import without_mpi, without_slurm
 from tests.support.progress import Waiting
-from tests.support.two_processes import rank_of, scheduler
+from tests.support.scheduling import rank_of, scheduler
 
 # Nothing that is imported and collected is garbage: until all is, looking for some is in vain.
 gc.disable()
@@ -58,7 +58,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Hand out tests of several processes by groups (tests/support/two_processes.py)."""
+    """Hand out tests of several processes by groups (tests/support/scheduling.py)."""
     return scheduler(config, log)
 
 

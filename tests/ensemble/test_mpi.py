@@ -95,18 +95,8 @@ def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
     assert 8 - kept - 2 <= len(log.read_text().splitlines()) <= 8 - kept
 
 
-@pytest.fixture
-def hangup_counts():
-    """SIGHUP as from a terminal, even if the tests run under nohup."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    yield
-    signal.signal(signal.SIGHUP, before)
-
-
-@pytest.mark.parametrize(
-    ("number", "ranks"), [(signal.SIGTERM, 3), (signal.SIGINT, 2), (signal.SIGHUP, 2)]
-)
-def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number, ranks, hangup_counts):
+@pytest.mark.parametrize(("number", "ranks"), [(signal.SIGTERM, 3), (signal.SIGINT, 2)])
+def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number, ranks):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = start("run", path, "--out", out, "--ranks", ranks, fake="hold=1")
     wait_until(lambda: done_rows(out) >= 1)

@@ -133,11 +133,15 @@ def test_every_figure_is_drawn_into_axes_that_are_given(results):
             ), name
             assert panel.get_xlabel(), name
         assert given[0, 0].get_legend() is not None, name
-        first = Figure(layout="constrained").subplots()
-        draw(ax=first)
-        assert len(first.collections) == len(alone.axes[0].collections), name
-        assert first.get_xlabel(), name
-        with pytest.raises(ValueError, match=rf"ax holds {len(alone.axes) + 1} Axes: this figure"):
-            draw(ax=Figure().subplots(1, len(alone.axes) + 1))
-        with pytest.raises(TypeError, match="ax is 3: it must be one Axes of matplotlib"):
-            draw(ax=3)
+
+
+def test_one_axes_takes_the_first_panel_and_wrong_ones_are_refused(results):
+    draw = results.plot.loss_against_hurst
+    alone, first = draw(), Figure(layout="constrained").subplots()
+    draw(ax=first)
+    assert len(first.collections) == len(alone.axes[0].collections)
+    assert first.get_xlabel()
+    with pytest.raises(ValueError, match=rf"ax holds {len(alone.axes) + 1} Axes: this figure"):
+        draw(ax=Figure().subplots(1, len(alone.axes) + 1))
+    with pytest.raises(TypeError, match="ax is 3: it must be one Axes of matplotlib"):
+        draw(ax=3)

@@ -323,6 +323,7 @@ def test_a_machine_of_a_campaign_may_go_beyond_the_height_of_its_profile():
     assert np.isfinite(row["field_gap"]).all()
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsys):
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"
     file.write_text(text_of('preload = [100, "1 MPa"]', realisations="1"))

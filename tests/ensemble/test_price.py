@@ -17,7 +17,7 @@ from adhesis.ensemble.run.plan import prior
 from adhesis.ensemble.run.price import as_text, price
 from adhesis.ensemble.run.session import run_campaign
 from adhesis.solver.method import PathError
-from tests.support.campaign_support import adhesis, campaign_text, write_campaign
+from tests.support.campaign_support import adhesis_here, campaign_text, write_campaign
 from tests.support.fake_run import fake_engine, fake_result
 
 
@@ -223,9 +223,10 @@ def test_a_part_costs_its_share():
     assert sum(shares) == pytest.approx(sum(cost(task) for task in campaign.tasks()))
 
 
-def test_a_dry_run_writes_nothing(tmp_path):
+def test_a_dry_run_writes_nothing(tmp_path, monkeypatch):
     path = write_campaign(tmp_path)
-    process = adhesis("run", path, "--dry-run", "--ranks", "3", cwd=tmp_path, fake="")
+    monkeypatch.chdir(tmp_path)
+    process = adhesis_here("run", path, "--dry-run", "--ranks", "3", fake="")
     assert process.returncode == 0, process.stderr
     assert "8 tasks to do in 4 cells, 0 done; nothing was written" in process.stdout
     assert "core hours" in process.stdout

@@ -115,8 +115,8 @@ def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, whole, n
 
 def test_walltime_ends_the_run_in_time(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    words = ("run", path, "--out", out, "--walltime", "3s")
-    process = adhesis_here(*words, fake="step=0.2 hang=0.8:0.04:1")  # that task would never end
+    words = ("run", path, "--out", out, "--walltime", "1s")
+    process = adhesis_here(*words, fake="step=0.02 hang=0.8:0.04:1")  # that task would never end
     assert process.returncode == 75
     assert "stopped early: " in process.stderr
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import getpass
 import os
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -89,6 +88,26 @@ class Cluster:
         return "\n".join(texts)
 
 
+# Ends daemons, steps and ranks, all of which name the folder in their environment, once its input
+# ends: also where the tests are interrupted or killed, which the steps of Slurm outlive.
+GUARD = """
+import os, pathlib, shutil, signal, sys
+sys.stdin.read()
+name, folder = f"SLURM_CONF={sys.argv[1]}/slurm.conf".encode(), sys.argv[1]
+found = True
+while found:
+    found = False
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            if name in (process / "environ").read_bytes().split(b"\\0"):
+                os.kill(int(process.name), signal.SIGKILL)
+                found = True
+        except OSError:
+            pass
+shutil.rmtree(folder, ignore_errors=True)
+"""
+
+
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Cluster]:
     # Not below pytest's folder: munge wants a path that everybody may pass through.
@@ -149,6 +168,10 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
     env = {k: v for k, v in launch.launch_environment(3).items() if not k.startswith("SLURM")}
     env |= {"PATH": PATH, "SLURM_CONF": str(folder / "slurm.conf")}
     cluster = Cluster(folder, env)
+    guard = subprocess.Popen(
+        [sys.executable, "-c", GUARD, folder], stdin=subprocess.PIPE, start_new_session=True
+    )
+
     daemons: list[subprocess.Popen[bytes]] = []
 
     def start(*command: str | Path) -> None:
@@ -181,15 +204,9 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
             pytest.skip(f"Slurm is installed, but does not start here: {reason}")
         yield cluster
     finally:
-        for daemon in reversed(daemons):
-            daemon.terminate()
-        for daemon in reversed(daemons):
-            try:
-                daemon.wait(timeout=5)  # nothing that it could still save is needed
-            except subprocess.TimeoutExpired:
-                daemon.kill()
-                daemon.wait()
-        shutil.rmtree(folder, ignore_errors=True)
+        guard.communicate()  # which ends its input
+        for daemon in daemons:
+            daemon.wait()
 
 
 @dataclass

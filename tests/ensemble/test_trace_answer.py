@@ -575,6 +575,7 @@ def test_a_plan_expects_no_more_patches_than_crests_that_are_reached(gamma: floa
     assert plan.seconds["Δ 0.3"] < plan.seconds["answer"]
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys):
     """The measure reaches the loops, the page and the document; an unknown one is refused."""
     rows = [f"{1e6 * a:.4f},{1e6 * b:.5f}" for a, b in zip(X, 5 * PROFILE.at(X), strict=True)]

@@ -20,7 +20,7 @@ import pytest
 from adhesis.ensemble.results.read import Results
 from tests.support.campaign_support import (
     MPIRUN,
-    adhesis,
+    adhesis_here,
     command,
     differences,
     done_rows,
@@ -131,7 +131,7 @@ def nodes(tmp_path: Path) -> Iterator[Nodes]:
 def test_a_campaign_runs_over_two_nodes_and_outlives_one(nodes: Nodes, tmp_path: Path) -> None:
     """The job ends promptly with a dead node; the next one goes on with what is left."""
     path, out, whole = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "whole.h5"
-    assert adhesis("run", path, "--out", whole, fake="").returncode == 0
+    assert adhesis_here("run", path, "--out", whole, fake="").returncode == 0
     process = nodes.launch("run", path, "--out", out, fake="hold=1")
     wait_until(lambda: done_rows(out) >= 2 or process.poll() is not None)
     assert process.poll() is None, process.communicate()[1]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import adhesis
 from tools.readme_without_links import readme
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -22,6 +23,7 @@ def test_versions_agree() -> None:
     assert (reported["version"], reported["license"]) == (PROJECT["version"], PROJECT["license"])
     assert re.search(r'volume: 92\n    start: "062404"', citation)
     assert "value: arXiv:1511.08891" in citation
+    assert adhesis.__version__ == PROJECT["version"]
     heads = re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert heads[0] == PROJECT["version"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import re
 from pathlib import Path
 
 import pytest
@@ -23,16 +22,3 @@ def test_the_campaigns_of_the_study_are_valid() -> None:
     campaigns = [load_campaign(path) for path in sorted((STUDY / "campaigns").glob("*.toml"))]
     assert len(campaigns) > 20
     assert all(campaign.task_count for campaign in campaigns)
-
-
-def test_nothing_of_the_product_imports_the_study() -> None:
-    modules = [
-        path
-        for top in ("adhesis", "adhesis/ensemble", "adhesis/solver")
-        for path in (ROOT / top).rglob("*.py")
-    ]
-    assert len(modules) > 80
-    for path in modules:
-        assert not re.search(r"^\s*(from|import) study\b", path.read_text("utf-8"), re.MULTILINE), (
-            path
-        )

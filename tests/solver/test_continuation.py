@@ -24,7 +24,6 @@ from adhesis.solver.sharp.continuation.branch import (
     Target,
     Trail,
 )
-from adhesis.solver.sharp.continuation.jump import ComputedJump, History
 from adhesis.solver.sharp.continuation.predictor import Predictor, carry_previous
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
@@ -368,9 +367,6 @@ def test_a_touch_where_the_clearance_leaps_is_at_the_last_clear_point():
     assert (found.seeds, found.late) == ([0.6], 0.0)
 
 
-# ---------------------------------------------------------------------- trail and history
-
-
 def test_a_trail_begins_anew_at_its_last_point():
     curve = Curve()
     trail = Trail(curve.point(0.9, clearance=0.5))
@@ -380,12 +376,3 @@ def test_a_trail_begins_anew_at_its_last_point():
     assert trail.closed == pytest.approx(0.3)
     trail.restart(0.4)
     assert ([p.at for p in trail.points], trail.clearance, trail.closed) == ([0.7], 0.4, 0.0)
-
-
-def test_a_jump_is_written_once_and_whole():
-    history = History()
-    before, after, jump = object(), object(), object()
-    computed = ComputedJump(0.5, cast(Any, (before, after)), cast(Any, jump), None, None, 0.25)
-    assert (history.states, history.jumps) == ([], [])
-    history.commit(computed)
-    assert (history.states, history.jumps, history.misplaced) == ([before, after], [jump], 0.25)

@@ -32,23 +32,6 @@ def loop_of(
     return run_loop(method, max_penetration=turn, load_steps=6)
 
 
-@pytest.mark.parametrize("relative", STIFFNESSES)
-def test_wave_loses_what_the_closed_form_says(relative):
-    wave = wave_of(0.2)
-    stiffness = relative * wave.full_contact_stress / AMPLITUDE
-    exact = wave.loop_under(stiffness)
-    profile = single_wave(AMPLITUDE, PERIOD)
-    loop = loop_of(profile, wave.work_of_adhesion, stiffness, 0.1, accuracy=1e-6)
-    bound = 1e-5 if stiffness == 0 else 1e-6  # under a load s goes like a square root at the end
-    assert loop.loss == pytest.approx(exact.loss, rel=bound)
-    assert loop.loss_from_drops == pytest.approx(exact.loss, rel=bound)
-    assert [j.kind for j in loop.jumps] == ["snap-in", "pull-off"]
-    # beside a fold s goes like a square root of what is prescribed
-    assert loop.jumps[-1].separation == pytest.approx(exact.fold_separation, rel=1e-4)
-    if stiffness == 0:
-        assert loop.pull_off_stress == pytest.approx(-exact.fold_mean_stress, rel=1e-6)
-
-
 @pytest.mark.parametrize("relative", [np.inf, *STIFFNESSES])
 def test_the_work_of_each_branch_of_a_wave_is_that_of_the_closed_form(relative):
     wave = wave_of(0.2)
@@ -60,6 +43,7 @@ def test_the_work_of_each_branch_of_a_wave_is_that_of_the_closed_form(relative):
         spring = wave.mean_stress_slope(a) / stiffness if stiffness else 0.0
         return float(wave.mean_stress(a) * (spring - wave.separation_slope(a)))
 
+    assert [j.kind for j in loop.jumps] == ["snap-in", "pull-off"]
     exact = wave.loop_under(stiffness)
     turn = float(loop.contact_fraction.max()) * PERIOD / 2
     gained = -quad(power, exact.touch_half_width, turn, epsabs=0, epsrel=1e-10)[0]
@@ -119,13 +103,14 @@ def test_a_stiff_machine_gives_the_loop_at_fixed_separation(rough):
     assert fixed.loss < soft[0] < soft[1]
 
 
-@pytest.mark.parametrize("relative", [1.0, 0.0])
+@pytest.mark.parametrize("relative", [np.inf, 1.0, 0.0])
 def test_mirror_shift_and_scale_change_nothing(rough, relative):
     unit = Problem(rough, HALF_SPACE, 0.0).stress_scale / rough.h_max
     here = loop_of(rough, 0.01, relative * unit, 0.4)
-    same = 1e-5 if relative == 0 else 1e-6
+    same = 1e-6 if relative == 1 else 1e-5
     for other in (rough.mirrored(), rough.shifted(0.3 * PERIOD)):
         assert loop_of(other, 0.01, relative * unit, 0.4).loss == pytest.approx(here.loss, rel=same)
     # lengths a hundredfold: γ/(E* λ) and k λ/E* stay
     large = loop_of(rough.scaled(100, 100), 1.0, relative * unit / 100, 0.4)
     assert large.loss_dimensionless == pytest.approx(here.loss_dimensionless, rel=same)
+    assert [j.kind for j in large.jumps] == [j.kind for j in here.jumps]

@@ -273,13 +273,6 @@ def test_a_model_without_a_minimum_has_none_at_any_distance():
     assert distance_to_minimum(-matrix, force) == np.inf
 
 
-def test_with_equal_speeds_edges_move_alike_whatever_their_forces():
-    force = np.array([1.0, -0.3, 0.001])
-    for equal_speeds, wanted in ((True, [0.1, -0.1, 0.01]), (False, [0.1, -0.03, 0.0001])):
-        step = implicit_step(np.zeros((3, 3)), force, 0.1, equal_speeds)
-        np.testing.assert_allclose(step, wanted)
-
-
 # ------------------------------------------------------------------ judgement of a step
 
 

@@ -20,10 +20,8 @@ from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
-from tests.support.wave_stress_intensity import stress_intensity
 
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5
-ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 
 
 def wave(alpha: float) -> SingleWave:
@@ -35,90 +33,13 @@ def wave_method(alpha: float, **options) -> GridMethod:
     return grid_of(problem, **options)
 
 
-def rough_profile(seed: int = 4) -> Profile:
-    return self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, seed=seed, h_rms=1e-7)
+def rough_profile() -> Profile:
+    return self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, seed=4, h_rms=1e-7)
 
 
 def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6, **options) -> LoopResult:
-    steps = options.pop("load_steps", 12)
     method = grid_of(Problem(profile, HalfSpace(young, 0.5), gamma), **{"nodes": 512, **options})
-    return run_loop(method, max_penetration=0.8, load_steps=steps)
-
-
-# ------------------------------------------------------------------ the single wave
-
-
-@pytest.mark.parametrize("alpha", ALPHAS)
-def test_a_single_wave_has_two_large_jumps(alpha):
-    """Its losses are held to the closed form by ``adhesis validate``, in test_validate.py."""
-    result = run_loop(wave_method(alpha, nodes=1024), max_penetration=0.1, load_steps=2)
-    large = [j.kind for j in result.jumps if j.energy_drop > 0.01 * wave(alpha).loop.loss]
-    assert large == ["snap-in", "pull-off"]
-
-
-@pytest.mark.parametrize("alpha", [0.2, 0.4])
-def test_drops_converge_to_the_exact_loss(alpha):
-    nodes = np.array([64, 128, 256, 512])
-    exact = wave(alpha).loop.loss
-    errors = []
-    for n in nodes.tolist():
-        method = wave_method(alpha, nodes=n, accuracy=1e-4)
-        result = run_loop(method, max_penetration=0.05, load_steps=1)
-        errors.append(abs(result.loss_from_drops / exact - 1))
-    order = -np.polyfit(np.log(nodes), np.log(errors), 1)[0]
-    assert order > 1.2
-    assert errors[-1] < 2e-3
-
-
-def test_branch_states_are_johnsons():
-    exact = wave(0.3)
-    method = wave_method(0.3, nodes=2048)
-    state = method.follow(method.detached(AMPLITUDE), AMPLITUDE).states[-1]
-    for separation in (0.9, 0.7, 0.5, 0.8, 1.2, 1.3):
-        state = method.follow(state, separation * AMPLITUDE).states[-1]
-        a = exact.half_width(separation * AMPLITUDE)
-        assert state.separation == separation * AMPLITUDE
-        assert state.contact_fraction == pytest.approx(2 * a / PERIOD, abs=1.5 / 2048)
-        scale = exact.full_contact_stress
-        assert state.mean_stress / scale == pytest.approx(
-            float(exact.mean_stress(a)) / scale, abs=1e-3
-        )
-        assert state.energy == pytest.approx(
-            float(exact.energy(a)), abs=1e-3 * scale * AMPLITUDE * PERIOD
-        )
-
-
-@pytest.mark.parametrize("penetration", [0.1, 0.5, 0.9, 0.99])
-def test_without_adhesion_the_single_wave_is_westergaards(penetration):
-    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, 0.0)
-    method = grid_of(problem, nodes=2048)
-    s = (1 - penetration) * AMPLITUDE
-    state = method.follow(method.detached(AMPLITUDE), s).states[-1]
-    # s = A (1 - y + y ln y), p̄ = p* y, y = sin²(πa/λ)
-    y = np.sin(0.5 * np.pi * state.contact_fraction) ** 2
-    assert AMPLITUDE * (1 - y + y * np.log(y)) == pytest.approx(s, abs=3e-3 * AMPLITUDE)
-    full = np.pi * HALF_SPACE.modulus * AMPLITUDE / PERIOD
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        mid = 0.5 * (low + high)
-        low, high = (mid, high) if 1 - mid + mid * np.log(mid) > 1 - penetration else (low, mid)
-    assert state.mean_stress == pytest.approx(full * low, rel=2e-5)
-    assert method.fields(state, 2048).stress.min() >= 0
-
-
-def test_edge_stress_is_that_of_the_stress_intensity():
-    exact = wave(0.4)
-    for nodes in (2048, 4096):
-        method = wave_method(0.4, nodes=nodes)
-        state = method.follow(method.detached(AMPLITUDE), 0.6 * AMPLITUDE).states[-1]
-        stress = method.fields(state, nodes).stress
-        edge = np.flatnonzero(stress)[[0, -1]]
-        a = 0.5 * float(state.edges[0, 1] - state.edges[0, 0])
-        # K of these very edges: they are up to half a node from equilibrium.
-        k = float(stress_intensity(exact, a, state.separation))
-        edge = np.roll(stress, nodes // 2)
-        edge = edge[np.flatnonzero(edge)[[0, -1]]]
-        assert np.abs(edge) * np.sqrt(PERIOD / nodes) == pytest.approx(0.7602 * k, rel=0.02)
+    return run_loop(method, max_penetration=0.8, load_steps=12)
 
 
 # ------------------------------------------------------------------ rough profiles
@@ -145,41 +66,16 @@ def test_mean_stress_is_the_slope_of_the_energy(loop):
     assert error.sum() < 5e-3 * loop.loss * 1e-3
 
 
-def test_same_input_same_bits(loop):
-    again = rough_loop(rough_profile())
-    np.testing.assert_array_equal(again.mean_stress, loop.mean_stress)
-    np.testing.assert_array_equal(again.separation, loop.separation)
-    assert again.loss == loop.loss
-    assert again.jumps == loop.jumps
-
-
-def test_shift_by_whole_nodes(loop):
-    shifted = rough_loop(rough_profile().shifted(37 * 1e-3 / 512))
-    assert shifted.loss == pytest.approx(loop.loss, rel=1e-5)
-    assert shifted.patches.max() == loop.patches.max()
-
-
-def test_shift_by_a_fraction_of_a_node_is_the_error_of_the_grid(loop):
-    shifted = rough_loop(rough_profile().shifted(0.37 * 1e-3 / 512))
-    assert shifted.loss == pytest.approx(loop.loss, rel=0.01)
-
-
-def test_mirror_image(loop):
-    mirrored = rough_loop(rough_profile().mirrored())
-    assert mirrored.loss == pytest.approx(loop.loss, rel=1e-5)
-
-
-def test_only_dimensionless_groups_matter(loop):
-    # Lengths times 4, heights times 2: γ/(E*λ) (λ/h)² stays with γ times 1 and E* times 1/…
-    # α² ~ γ λ/(E* h²): γ × 8, E × 8·4/4.
-    scaled = rough_loop(rough_profile().scaled(2.0, 4.0), gamma=2e-3 * 8, young=8e6)
+def test_shift_mirror_and_scale_change_nothing(loop):
+    """By whole nodes; a part of a node is the error of the grid. Lengths × 4, heights × 2."""
+    profile = rough_profile()
+    node = profile.period / 512
+    for other in (profile.shifted(37 * node), profile.mirrored()):
+        assert rough_loop(other).loss == pytest.approx(loop.loss, rel=1e-5)
+    assert rough_loop(profile.shifted(0.37 * node)).loss == pytest.approx(loop.loss, rel=0.01)
+    scaled = rough_loop(profile.scaled(2.0, 4.0), gamma=2e-3 * 8, young=8e6)  # γ λ/(E* h²) stays
     assert scaled.loss_dimensionless == pytest.approx(loop.loss_dimensionless, rel=1e-5)
     np.testing.assert_array_equal(scaled.patches, loop.patches)
-
-
-def test_finer_grid_and_finer_path_keep_the_loss(loop):
-    assert rough_loop(rough_profile(), nodes=1024).loss == pytest.approx(loop.loss, rel=0.02)
-    assert rough_loop(rough_profile(), load_steps=24).loss == pytest.approx(loop.loss, rel=3e-3)
 
 
 def test_no_jump_hides_in_a_long_load_step():
@@ -251,13 +147,6 @@ def test_strong_adhesion_runs_to_nearly_full_contact_at_first_touch_but_never_cl
     assert result.contact_fraction.max() < 1
     assert abs(result.audit_residual) < 5e-3
     assert result.patches[-1] == 0
-
-
-def test_last_gap_stays_open_as_the_separation_goes_to_zero():
-    method = wave_method(0.6, nodes=256)
-    state = method.follow(method.detached(AMPLITUDE), 1e-3 * AMPLITUDE).states[-1]
-    assert 0.9 < state.contact_fraction < 1
-    assert method.fields(state, 256).gap.mean() == pytest.approx(1e-3 * AMPLITUDE, rel=1e-3)
 
 
 def test_two_equal_maxima_touch_together_and_leave_as_in_sharp():
@@ -347,9 +236,9 @@ def weak(seed: int, share: float) -> Problem:
     return Problem(profile, HALF_SPACE, share * HALF_SPACE.modulus * 1e-12 * profile.q0 * 2)
 
 
-@pytest.mark.parametrize(("seed", "share"), [(3, 5e-3), (12, 7.1e-3), (19, 2e-3)])
+@pytest.mark.parametrize(("seed", "share"), [(3, 5e-3), (19, 2e-3)])
 def test_drops_that_a_weakly_adhesive_patch_loses_on_the_grid_count_in_its_error(seed, share):
-    """With 64 nodes a wave; the error was 1.3 to 2.2 times too small."""
+    """With 64 nodes a wave; the error was up to 2.2 times too small."""
     problem = weak(seed, share)
     grid, exact = (
         run_loop(method, max_penetration=0.7, load_steps=10)

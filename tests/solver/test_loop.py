@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import ContactState, Control, HalfSpace, Path, Problem, run_loop, single_wave
+from adhesis import ContactState, Control, Path, Problem, run_loop, single_wave
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
 from adhesis.solver.model.jump import Jump
@@ -50,14 +50,6 @@ def test_audit_residual_falls_with_the_square_of_the_state_spacing():
     assert orders == pytest.approx(2.0, abs=0.3)
 
 
-def test_loss_does_not_depend_on_the_depth():
-    losses = [
-        run_loop(exact(0.3), max_penetration=depth, load_steps=20).loss_from_drops
-        for depth in (0.05, 0.5, 0.99)
-    ]
-    assert losses == pytest.approx([losses[0]] * 3, rel=1e-12)
-
-
 def test_path_starts_and_ends_detached_and_keeps_the_axis():
     result = run_loop(exact(0.2), max_penetration=0.6, load_steps=12)
     loading, unloading = result.states("loading"), result.states("unloading")
@@ -79,15 +71,6 @@ def test_path_starts_and_ends_detached_and_keeps_the_axis():
     assert -0.252 - 0.05 < result.pull_off_penetration < -0.252
 
 
-def test_work_along_a_stable_stretch_is_the_change_of_energy():
-    """Without a jump in between, dU = -λ p̄ ds."""
-    result = run_loop(exact(0.2, states_per_step=100), max_penetration=0.9, load_steps=20)
-    stretch = result.states("loading")[5:]
-    work = -PERIOD * np.trapezoid(result.mean_stress[stretch], result.separation[stretch])
-    change = result.energy[stretch[-1]] - result.energy[stretch[0]]
-    assert work == pytest.approx(change, rel=1e-6)
-
-
 def test_dimensionless_loss_is_the_papers():
     """W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max), computed here from the two axes."""
     result = run_loop(exact(0.2), max_penetration=0.9, load_steps=40)
@@ -97,46 +80,6 @@ def test_dimensionless_loss_is_the_papers():
     assert result.loss_dimensionless == pytest.approx(loss, rel=1e-12)
     # On one wave E* q0 h_max/2 is p*, so W~ is the loss of the exact table.
     assert result.loss_dimensionless == pytest.approx(1.2018194e-2, rel=1e-5)
-
-
-def test_only_dimensionless_groups_matter():
-    base = run_loop(exact(0.3), max_penetration=0.7, load_steps=10)
-    other = SingleWave.with_alpha(0.3, 64 * AMPLITUDE, 8 * PERIOD, 4 * HALF_SPACE.modulus)
-    problem = Problem(
-        single_wave(AMPLITUDE, PERIOD).scaled(64, 8), HalfSpace(4e6, 0.5), other.work_of_adhesion
-    )
-    scaled = run_loop(ExactWave(problem), max_penetration=0.7, load_steps=10)
-    # The slope is not the same: the arc measure contributes (A q0)² = 2.5e-9 at most.
-    assert scaled.loss_dimensionless == pytest.approx(base.loss_dimensionless, rel=1e-8)
-    assert scaled.contact_fraction == pytest.approx(base.contact_fraction, rel=1e-7, abs=1e-12)
-
-
-def test_without_adhesion_there_is_no_loss_and_no_jump():
-    result = run_loop(exact(0.0), max_penetration=0.8, load_steps=20)
-    assert result.jumps == ()
-    assert result.loss_from_drops == 0.0
-    assert abs(result.loss) < 1e-14 * AMPLITUDE * flat_wave(0.0).full_contact_stress
-    assert np.all(result.mean_stress >= 0)
-
-
-def test_a_shifted_crest_changes_nothing():
-    profile = single_wave(AMPLITUDE, PERIOD).shifted(0.4999 * PERIOD)
-    method = ExactWave(Problem(profile, HALF_SPACE, flat_wave(0.2).work_of_adhesion))
-    moved = run_loop(method, max_penetration=0.9, load_steps=10)
-    here = run_loop(exact(0.2), max_penetration=0.9, load_steps=10)
-    assert moved.loss == pytest.approx(here.loss, rel=1e-9)
-
-
-def test_partial_loop_from_an_older_state_closes_without_loss():
-    """Half-way reversal on the stable branch: the same states are met again, no jump."""
-    method = exact(0.3)
-    touch = method.follow(method.detached(AMPLITUDE), AMPLITUDE).states[-1]
-    deep = method.follow(touch, 0.3 * AMPLITUDE)
-    shallow = method.follow(deep.states[-1], 1.2 * AMPLITUDE)
-    again = method.follow(shallow.states[-1], 0.3 * AMPLITUDE)
-    assert shallow.jumps == again.jumps == ()
-    assert again.states[-1].energy == deep.states[-1].energy
-    assert again.states[-1].edges == pytest.approx(deep.states[-1].edges, rel=1e-14)
 
 
 def test_callers_see_every_state_and_every_step():
@@ -259,25 +202,6 @@ def test_exact_wave_refuses_other_profiles():
     rough = Profile(PERIOD, np.array([0, 1e-9, 1e-9], dtype=complex))
     with pytest.raises(ValueError, match="harmonic 1"):
         ExactWave(Problem(rough, HALF_SPACE, 0.0))
-
-
-def test_exact_wave_fields_fulfil_the_contact_conditions():
-    method = exact(0.3)
-    path = method.follow(method.detached(AMPLITUDE), 0.5 * AMPLITUDE)
-    state = path.states[-1]
-    f = method.fields(state, 4096)
-    contact = f.gap == 0
-    assert np.mean(contact) == pytest.approx(state.contact_fraction, abs=2 / 4096)
-    assert np.all(f.gap[~contact] > 0)
-    assert np.all(f.stress[~contact] == 0)
-    assert np.mean(f.gap) == pytest.approx(state.separation, rel=1e-4)
-    assert f.displacement == pytest.approx(f.gap + f.height - state.separation, abs=1e-24)
-    detached = method.fields(method.detached(2 * AMPLITUDE), 64)
-    assert np.all(detached.stress == 0)
-    assert detached.gap == pytest.approx(2 * AMPLITUDE - detached.height)
-
-
-# ---------------------------------------------------------------------- kinds of jumps
 
 
 def test_a_loop_prints_itself_in_a_few_lines():

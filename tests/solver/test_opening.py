@@ -61,7 +61,7 @@ def loop_of(
     problem = Problem(profile, HalfSpace(1e9, 0.5), gamma, strength=strength)
     states: list[ContactState] = []
     loop = run_loop(
-        make_method(name, problem),
+        make_method(name, problem, nodes_per_wave=64 if name == "grid" else None),
         max_penetration=0.9,
         load_steps=20,
         on_state=lambda branch, state: states.append(state),
@@ -71,20 +71,6 @@ def loop_of(
 
 def troughs_problem(strength: float = STRENGTH) -> Problem:
     return Problem(TROUGHS, SOLID, GAMMA, strength=strength)
-
-
-def test_a_closed_trough_opens_where_its_tension_reaches_the_strength():
-    method = make_method("sharp", troughs_problem(), accuracy=1e-4)
-    loop = run_loop(method, max_penetration=0.99, load_steps=5)
-    exact = LastGap(TROUGHS, SOLID.modulus, GAMMA)
-    b = exact.half_length_at(STRENGTH, TROUGHS.period / 2, 5e-5, 2e-4)
-    first = next(jump for jump in loop.jumps if jump.kind == "opening")
-    assert first.branch == "unloading"
-    assert first.separation == pytest.approx(exact.separation(b), rel=1e-4)
-    assert first.patches_after == first.patches_before + 1
-    length = griffith_length(STRENGTH, SOLID.modulus, GAMMA)
-    assert first.barrier * TROUGHS.period == pytest.approx(GAMMA * length / 2, rel=0.01)
-    assert 0 < loop.barrier < 0.1 * loop.loss
 
 
 def test_grid_opens_a_closed_trough_there_too():

@@ -20,7 +20,7 @@ from adhesis import (
 )
 from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.mean_stress_event import up_to
-from adhesis.solver.method import ContactState, Path
+from adhesis.solver.method import ContactState, Method, Path
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.references.exact_wave import ExactWave
@@ -44,6 +44,12 @@ def of_wave(control: Control = FIXED) -> Problem:
     return Problem(wave, HALF_SPACE, WAVE.work_of_adhesion, control)
 
 
+def method_of(name: str, problem: Problem) -> Method:
+    if name == "exact":
+        return ExactWave(problem)
+    return make_method(name, problem, nodes_per_wave=256 if name == "grid" else None)
+
+
 def stress_range() -> tuple[float, float]:
     """Half-width at which Johnson's mean stress at fixed separation is largest, and that stress."""
     a = np.linspace(1e-3, 0.499, 20_001) * PERIOD
@@ -65,8 +71,7 @@ def johnson(preload: float) -> tuple[float, float]:
 def test_a_wave_turns_where_the_closed_form_has_the_preload(name, near, stiffness):
     """With a stiffness in units of p*/A; the loss does not depend on the depth."""
     control = Control(stiffness * WAVE.full_contact_stress / AMPLITUDE)
-    problem = of_wave(control)
-    method = ExactWave(problem) if name == "exact" else make_method(name, problem)
+    method = method_of(name, of_wave(control))
     _, largest = stress_range()
     for share in (0.2, 0.9):
         preload = share * largest
@@ -165,7 +170,7 @@ def test_a_preload_that_is_never_reached_is_said_and_the_turning_point_named():
 def test_a_preload_before_the_contact_snaps_through_is_reached_and_one_beyond_is_refused(name):
     """A soft machine snaps through after the largest mean stress; one load step goes beyond."""
     control = Control(2.0 * WAVE.full_contact_stress / AMPLITUDE)
-    method = make_method(name, of_wave(control))
+    method = method_of(name, of_wave(control))
     _, largest = stress_range()
     in_one, in_many = (
         run_loop(method, preload=0.99 * largest, load_steps=steps) for steps in (1, 10)
@@ -175,7 +180,7 @@ def test_a_preload_before_the_contact_snaps_through_is_reached_and_one_beyond_is
     )
     with pytest.raises(PathError, match=r"full contact before .* less than the preload"):
         run_loop(method, preload=1.05 * largest, load_steps=10)
-    strong = make_method(name, Problem(single_wave(1e-6, PERIOD), HALF_SPACE, 1.0, Control(1e9)))
+    strong = method_of(name, Problem(single_wave(1e-6, PERIOD), HALF_SPACE, 1.0, Control(1e9)))
     with pytest.raises(PathError, match=r"full contact .* less than the preload"):
         run_loop(strong, preload=500.0, load_steps=10)
 
@@ -205,8 +210,7 @@ def test_curves_of_a_preload_are_on_no_axis_of_load_steps():
 
 @pytest.mark.parametrize("name", ["exact", "sharp"])
 def test_a_state_at_a_mean_stress_has_the_contact_and_the_gap_of_the_closed_form(name):
-    problem = of_wave()
-    method = ExactWave(problem) if name == "exact" else make_method("sharp", problem)
+    method = method_of(name, of_wave())
     _, largest = stress_range()
     loop = run_loop(method, max_penetration=0.6, load_steps=10)
     wanted = 0.2 * largest

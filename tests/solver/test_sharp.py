@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 
 from adhesis import (
-    HalfSpace,
     Problem,
     Profile,
     make_method,
     run_loop,
     self_affine_profile,
-    single_wave,
 )
-from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE
 
@@ -30,42 +27,22 @@ def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, s
     return run_loop(method, max_penetration=max_penetration, load_steps=load_steps)
 
 
-# ------------------------------------------------------------------ the single wave
-
-
-@pytest.mark.parametrize("alpha", [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-def test_a_single_wave_jumps_twice_where_the_closed_form_does(alpha):
-    """Its losses are held to the closed form by ``adhesis validate``, in test_validate.py."""
-    amplitude, period = 1e-8, 1e-3  # A q0 = 6e-5 is flat
-    exact = SingleWave.with_alpha(alpha, amplitude, period, HALF_SPACE.modulus)
-    result = loop(
-        single_wave(amplitude, period),
-        exact.work_of_adhesion,
-        accuracy=1e-5,
-        max_penetration=0.1,
-        load_steps=2,
-    )
-    assert [j.kind for j in result.jumps] == ["snap-in", "pull-off"]
-    assert result.jumps[0].separation == pytest.approx(amplitude, rel=1e-12)
-    assert result.jumps[1].separation == pytest.approx(exact.loop.fold_separation, rel=1e-8)
-
-
 # ------------------------------------------------------------------ limit of the grid
 
 
 def test_grid_converges_to_sharp():
     """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
-    problem = Problem(rough(), HALF_SPACE, 0.01)
-    sharp = run_loop(make_method("sharp", problem), max_penetration=0.9, load_steps=20).loss
+    problem = Problem(rough(n0=2, ratio=6), HALF_SPACE, 0.01)
+    sharp = run_loop(make_method("sharp", problem), max_penetration=0.9, load_steps=10).loss
     errors = []
     for nodes in (8, 64):
         grid = make_method("grid", problem, nodes_per_wave=nodes)
-        errors.append(abs(run_loop(grid, max_penetration=0.9, load_steps=20).loss / sharp - 1))
+        errors.append(abs(run_loop(grid, max_penetration=0.9, load_steps=10).loss / sharp - 1))
     assert errors[1] < errors[0]
     assert errors[1] < 2e-3
 
 
-@pytest.mark.parametrize("gamma", [1e-4, 1e-3, 1e-2, 1.0])
+@pytest.mark.parametrize("gamma", [1e-3, 1e-2, 1.0])
 def test_loop_integral_equals_the_sum_of_drops(gamma):
     result = loop(rough(), gamma, accuracy=1e-4)
     # For weak adhesion the loss is a small difference of two works: jumps located to 2e-6 h_max,
@@ -81,12 +58,6 @@ def test_audit_at_paper_scale():
     assert result.patches[-1] == 0
 
 
-def test_every_jump_lowers_the_energy():
-    result = loop(rough(4), 0.003)
-    assert len(result.jumps) > 10
-    assert all(j.energy_drop > 0 for j in result.jumps)
-
-
 def test_loss_does_not_depend_on_the_load_steps():
     """Jumps are located, so load steps only sample the curve."""
     losses = [loop(rough(), 0.01, load_steps=n).loss for n in (5, 40)]
@@ -94,7 +65,7 @@ def test_loss_does_not_depend_on_the_load_steps():
 
 
 @pytest.mark.parametrize("gamma", [0.02, 0.1])
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     """Edges that race make a path sensitive; steps that are minima in their box decide it."""
     profile = rough(seed)
@@ -112,31 +83,6 @@ def test_touching_is_looked_for_before_a_branch_ends():
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
 
 
-def test_same_input_same_bits():
-    first, second = (loop(rough(), 0.01) for _ in range(2))
-    assert np.array_equal(first.mean_stress, second.mean_stress)
-    assert np.array_equal(first.energy, second.energy)
-
-
-# ------------------------------------------------------------------ invariances
-
-
-def test_shift_and_mirror_do_not_change_the_loop():
-    profile = rough()
-    plain = loop(profile, 0.01).loss
-    assert loop(profile.shifted(0.3217 * PERIOD), 0.01).loss == pytest.approx(plain, rel=1e-5)
-    assert loop(profile.mirrored(), 0.01).loss == pytest.approx(plain, rel=1e-5)
-
-
-def test_only_dimensionless_groups_matter():
-    """Lengths × 7, modulus × 3, γ × 21: the same W~ and the same jumps."""
-    profile = rough()
-    plain = loop(profile, 0.01)
-    scaled = loop(profile.scaled(7.0, 7.0), 0.01 * 21, solid=HalfSpace(3e6, 0.5))
-    assert scaled.loss_dimensionless == pytest.approx(plain.loss_dimensionless, rel=1e-6)
-    assert [j.kind for j in scaled.jumps] == [j.kind for j in plain.jumps]
-
-
 # ------------------------------------------------------------------ hard cases
 
 
@@ -147,18 +93,6 @@ def test_no_loss_without_adhesion():
     assert abs(result.loss_dimensionless) < 1e-12
     assert result.pull_off_penetration == pytest.approx(0.0, abs=1e-12)
     assert result.mean_stress.min() > -1e-3 * result.mean_stress.max()
-
-
-def test_westergaard_without_adhesion():
-    amplitude, period = 1e-6, 1e-3
-    result = loop(single_wave(amplitude, period), 0.0, max_penetration=0.95, accuracy=1e-6)
-    p_star = np.pi * HALF_SPACE.modulus * amplitude / period
-    inside = (result.contact_fraction > 0.05) & (result.branch == "loading")
-    y = np.sin(np.pi * result.contact_fraction[inside] / 2) ** 2
-    assert inside.sum() > 5
-    assert np.allclose(result.mean_stress[inside] / p_star, y, atol=2e-6)
-    separation = amplitude * (1 - y + y * np.log(y))
-    assert np.allclose(result.separation[inside], separation, rtol=1e-4, atol=1e-12)
 
 
 def test_first_touch_may_run_to_almost_full_contact():
@@ -175,41 +109,6 @@ def test_almost_closed_gaps():
     result = loop(rough(), 0.01, max_penetration=0.999, load_steps=30)
     assert abs(result.audit_residual) < 1e-3
     assert result.contact_fraction.max() > 0.9
-
-
-def twin_crests(amplitude=1e-6):
-    coefficients = np.zeros(3, dtype=complex)
-    coefficients[2] = amplitude / 2
-    return Profile(PERIOD, coefficients)
-
-
-def test_equal_maxima_touch_together():
-    """Two equal crests in one period behave as one crest in half the period."""
-    profile = twin_crests()
-    gamma = 2e-5
-    method = make_method("sharp", Problem(profile, HALF_SPACE, gamma), accuracy=1e-6)
-    state = method.follow(method.detached(profile.h_max), profile.h_max).states[-1]
-    assert state.patches == 2
-    half = make_method(
-        "sharp", Problem(single_wave(1e-6, PERIOD / 2), HALF_SPACE, gamma), accuracy=1e-6
-    )
-    once = half.follow(half.detached(1e-6), 1e-6).states[-1]
-    assert state.mean_stress == pytest.approx(once.mean_stress, rel=1e-6)
-    assert state.contact_fraction == pytest.approx(once.contact_fraction, rel=1e-6)
-
-
-def test_an_unstable_symmetric_state_is_left():
-    """Strong adhesion: with equal gaps no minimum, one gap closes and the energy falls further."""
-    profile, gamma = twin_crests(), 0.005
-    problem = Problem(profile, HALF_SPACE, gamma)
-    state = (
-        make_method("sharp", problem)
-        .follow(make_method("sharp", problem).detached(profile.h_max), profile.h_max)
-        .states[-1]
-    )
-    half = make_method("sharp", Problem(single_wave(1e-6, PERIOD / 2), HALF_SPACE, gamma))
-    once = half.follow(half.detached(1e-6), 1e-6).states[-1]
-    assert state.energy < 2 * once.energy
 
 
 @pytest.mark.parametrize("hurst", [0.501, 0.999])

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from adhesis import Problem, self_affine_profile, single_wave
+from adhesis import Problem, Profile, self_affine_profile, single_wave
 from adhesis.solver._kernels import (
     FieldModel,
     LoadingDevice,
     solve_field,
 )
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField, respond_at_fixed_edges
 from adhesis.solver.sharp.field.opening_series import fine_opening
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -19,7 +20,6 @@ from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
-from tests.support.solved_field import solved_field
 
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
 
@@ -41,6 +41,20 @@ def source(rough):
 @pytest.fixture(scope="module")
 def separation(rough):
     return 0.5 * rough.h_max * rough.q0
+
+
+def solved_field(
+    source: StressSource,
+    gaps: Array,
+    prescribed: float,
+    tolerance: float,
+    device: LoadingDevice = FIXED_SEPARATION,
+) -> GapField:
+    """Solve the field of these gaps to a relative accuracy."""
+    model = FieldModel(device, float(-np.log(tolerance)), source.panels)
+    return GapField(
+        source, gaps, prescribed, tolerance, device, lambda: solve_field(gaps, prescribed, model)
+    )
 
 
 def energy(source, gaps, separation):
@@ -271,8 +285,6 @@ def test_hundreds_of_patches_in_one_period():
     separation = amplitude * (1 - y + y * np.log(y))
     coefficients = np.zeros(waves + 1, dtype=complex)
     coefficients[waves] = amplitude / 2
-    from adhesis import Profile
-
     source = StressSource(Profile(2 * np.pi, coefficients))
     crest = np.arange(waves) * 2 * np.pi / waves
     gaps = np.stack([crest + half_width / waves, crest + (2 * np.pi - half_width) / waves], axis=1)

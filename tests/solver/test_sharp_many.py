@@ -20,7 +20,6 @@ from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import move_edges
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.field.gap_field import respond_at_fixed_edges
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
@@ -165,7 +164,7 @@ def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded
 
 
 @pytest.fixture
-def hierarchical(loaded):
+def many_gaps(loaded):
     """Edges of many gaps, and a point of theirs."""
     method, state = loaded
     edges = method.edges
@@ -179,10 +178,10 @@ def relaxed(edges, gaps, at):
     return gaps
 
 
-def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, hierarchical):
+def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, many_gaps):
     """Edges and rates against a field a hundred times as accurate, where dense edges balance."""
     method, _ = loaded
-    edges, point = hierarchical
+    edges, point = many_gaps
     exact = SharpMethod(method.problem, accuracy=1e-6).edges
     dense = exact.equilibrium(point.gaps, point.at, exact.wave)
     assert len(point.gaps) >= 10
@@ -194,12 +193,12 @@ def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, hierarchical):
 
 
 @pytest.mark.parametrize("motion", [1e-5, 1e-3, 1e-2, 0.1, 0.3])
-def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(hierarchical, motion):
+def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps, motion):
     """References move with edges that go near and far, are passed on, and come back: one state.
 
     Openings, rates and pressure are those of a response set up there from nothing.
     """
-    edges, point = hierarchical
+    edges, point = many_gaps
     at = point.at
     edges.forget()
     anew = edges.equilibrium(point.gaps, at, edges.wave)
@@ -215,9 +214,9 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(hierarchi
     assert np.abs(back.field.opening - anew.field.opening).max() < 1e-5 * scale
 
 
-def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(hierarchical):
+def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):
     """A patch less, and one more: that of the other gaps is taken over, with the same result."""
-    edges, point = hierarchical
+    edges, point = many_gaps
     gaps, at = point.gaps, point.at
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
     end = relaxed(edges, fewer, at)
@@ -343,7 +342,7 @@ def test_no_step_leads_to_another_branch():
             max_penetration=0.6572167384925119,
             load_steps=28,
         )
-        for accuracy in (1e-3, 1e-4)
+        for accuracy in (1e-3, 3e-4)
     )
     assert abs(coarse.loss - fine.loss) < coarse.loss_error
     assert abs(coarse.audit_residual) < 1e-4
@@ -367,9 +366,9 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
     assert edges.count.fields < 2000
 
 
-def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(hierarchical, monkeypatch):
+def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(many_gaps, monkeypatch):
     """A response is found by the number of gaps; where it does not serve, nor do its orders."""
-    edges, point = hierarchical
+    edges, point = many_gaps
     known = edges.responses.at(point.gaps, point.at)
     asked = []
 
@@ -394,11 +393,3 @@ def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
         state = method.follow(state, profile.h_max * (1 - 0.0225 * step)).states[-1]
     assert method.report().descent_steps < 50_000
     assert state.patches > 40
-
-
-def test_edges_without_a_field_have_no_response():
-    gaps = np.array([[1.0, 2.0], [np.nan, 5.0]])
-    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=2, h_rms=1e-6, seed=1)
-    model = FieldModel(FIXED_SEPARATION, 10.0, StressSource(profile).panels)
-    with pytest.raises(FloatingPointError, match="not positive definite"):
-        respond_at_fixed_edges(solve_field(gaps, 1e-3, model))

@@ -12,9 +12,9 @@ from typing import Any
 RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py")
 LONG = (
     *("ranks", "test_staging.py", "test_every_claim", "test_kinetics.py", "test_report.py"),
-    *("test_docs.py", "test_run.py", "test_preload.py", "test_opening.py", "test_store.py"),
-    *("test_trace_answer.py", "test_launching.py", "test_notebook.py", "test_sharp.py"),
-    *("test_grid.py", "test_setup.py", "test_sharp_path.py"),
+    *("test_notebook.py", "test_docs.py", "test_trace_answer.py", "test_sharp.py", "test_run.py"),
+    *("test_preload.py", "test_opening.py", "test_grid.py", "test_damage.py", "test_store.py"),
+    *("test_sharp_many.py", "test_opened.py", "test_open_work.py", "test_limits.py"),
 )
 
 
