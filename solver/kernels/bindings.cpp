@@ -752,7 +752,7 @@ void bind_parts(nb::module_& m) {
         gap_moments(gap_of(gap), panels, modes, fields, s.data(), ends);
         Vector loads;
         for (auto& end : ends) loads.insert(loads.end(), end.begin(), end.begin() + fields);
-        return std::pair(hand_over(std::move(s), {size_t(modes), size_t(fields)}),
+        return std::pair(hand_over(std::move(s), {size_t(fields), size_t(modes)}),
                          hand_over(std::move(loads), {2, size_t(fields)}));
       },
       "gap"_a, "panels"_a, "modes"_a, "fields"_a,

@@ -253,7 +253,7 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int field
     ends[0][field] = sum_lanes(low[field]);
     ends[1][field] = sum_lanes(high[field]);
     for (int n = 0; n < modes; ++n)
-      s[n * fields + field] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
+      s[field * modes + n] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
   }
 }
 
