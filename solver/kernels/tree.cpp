@@ -349,20 +349,21 @@ Tree::Tree(const Nodes& nodes, const Halves& halves, const Integers& known, doub
   inner_potential.resize(end.interpolation);
 }
 
-WIDE void Tree::place_charges(int index) {
+WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {
   const Run& run = runs[index];
   const int rank = run.rank;
   const auto& [node, share] = chebyshev_rule(rank);
-  for (int i = 0; i < rank; ++i) {
+  for (int i = 0; own && i < rank; ++i) {
     Place place = theta_at(run.interval, node[i]);
     theta[run.node + i] = place.theta;
     stretch[run.node + i] = place.stretch;
   }
   double* out = interpolation.data() + run.interpolation;
-  for (int half : run.half) {
-    const Run& child = runs[half];
-    fill_interpolation(run.interval, node, share, &theta[child.node], &stretch[child.node],
-                       child.rank, out);
+  for (int half = 0; half < 2; ++half) {
+    const Run& child = runs[run.half[half]];
+    if (own || halves[half])
+      fill_interpolation(run.interval, node, share, &theta[child.node], &stretch[child.node],
+                         child.rank, out);
     out += child.rank * rank;
   }
   const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
@@ -370,17 +371,17 @@ WIDE void Tree::place_charges(int index) {
               two.rank, &kernel[run.kernel]);
 }
 
-bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits, char& moved) {
+bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits, Flags& moved) {
   Run& run = runs[index];
-  moved = false;
+  const auto [one, two] = run.half;
   if (run.rank > 0) {
     const Gap before = run.interval;
     run.interval = interval(gaps, run.range[0], run.range[1]);
-    moved = run.interval.end != before.end || run.interval.patch != before.patch;
+    moved[index] = run.interval.end != before.end || run.interval.patch != before.patch;
     // one charge fewer than required: CHARGE_MARGIN covers it
     if (wanted_rank(run.interval, digits) > run.rank + 1) return false;
   }
-  place_charges(index);
+  place_charges(index, moved[index], {bool(moved[one]), bool(moved[two])});
   return true;
 }
 
