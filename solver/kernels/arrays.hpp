@@ -73,6 +73,28 @@ inline double dot_difference(const double* a, const double* b, const double* x, 
   return total;
 }
 
+// Compute out = base + a x, without a base a x, four rows at a time; `a` has at least four rows and
+// columns, or no columns.
+[[gnu::always_inline]] inline void apply(const double* a, int rows, int columns, const double* x,
+                                         const double* base, double* out) {
+  const int last = columns - 4;
+  Four rest = {};  // the columns after the last whole four, behind some that count no more
+  for (int j = columns - columns % 4; j < columns; ++j) rest[j - last] = x[j];
+  for (int i = 0; i < rows; i += 4) {
+    const int row = std::min(i, rows - 4);
+    Four sum[4] = {};
+    for (int j = 0; j < columns; j += 4) {
+      const int at = std::min(j, last);
+      const Four here = at == j ? load_four(x + j) : rest;
+      for (int r = 0; r < 4; ++r) sum[r] += load_four(a + (row + r) * columns + at) * here;
+    }
+    for (int r = 0; r < 4; ++r) {
+      const double product = (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
+      out[row + r] = base ? base[row + r] + product : product;
+    }
+  }
+}
+
 // Add factor x_i to every out_i.
 inline void add_scaled(double factor, const double* x, double* out, int count) {
   for (int i = 0; i < count; ++i) out[i] += factor * x[i];

@@ -80,9 +80,9 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
     edge.edge = numbers[i];
     edge.theta = ends[edge.edge];
     auto [critical, drift] = critical_opening(edge.theta, law, panels);
-    auto [opening, slope] = half_plane_opening(edge.theta, edge.edge % 2, panels);
+    edge.half_plane = half_plane_opening(edge.theta, edge.edge % 2, panels);
     edge.opening = residual[i] + critical;
-    edge.own = tangent(i, i) + outwards(edge.edge) * (drift - slope);
+    edge.own = tangent(i, i) + outwards(edge.edge) * (drift - edge.half_plane.slope);
     const int following = (i + 1) % count;
     edge.after = numbers[following] == (numbers[i] + 1) % int(ends.size()) ? following : -1;
     evaluate(edge);
@@ -102,11 +102,9 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
 }
 
 void EdgeModel::evaluate(MovingEdge& edge) const {
-  auto [half_plane, slope] = half_plane_opening(edge.theta, edge.edge % 2, panels_);
   auto [critical, drift, pinned] = critical_of(edge.edge, edge.theta, edge.opening, law_, panels_);
-  edge.half_plane = half_plane;
   edge.pinned = pinned;
-  edge.rate = edge.own + outwards(edge.edge) * slope;
+  edge.rate = edge.own + outwards(edge.edge) * edge.half_plane.slope;
   edge.critical = critical;
   edge.critical_rate = outwards(edge.edge) * drift;
 }
@@ -119,9 +117,10 @@ void EdgeModel::advance(const Vector& step) {
   for (int e = 0; e < count; ++e) {
     MovingEdge& edge = edges[e];
     const double end = edge.theta + outwards(edge.edge) * 0.5 * step[e];
-    const double half_plane = half_plane_opening(end, edge.edge % 2, panels_).value;
-    edge.opening += edge.own * step[e] + half_plane - edge.half_plane +
+    const ValueAndSlope half_plane = half_plane_opening(end, edge.edge % 2, panels_);
+    edge.opening += edge.own * step[e] + half_plane.value - edge.half_plane.value +
                     dot(&coupling_.values[e * count], by_motion.data(), count);
+    edge.half_plane = half_plane;
     edge.motion += step[e];
   }
   follow_lengths(step);

@@ -26,7 +26,7 @@ struct MovingEdge {
   int after;  // index of the edge after it, -1 if that is none of the moving ones
   double theta, motion = 0;
   double opening, rate;            // C, and ∂C/∂n
-  double half_plane;               // R
+  ValueAndSlope half_plane;        // R, and its derivative by θ
   double critical, critical_rate;  // C_c, and its derivative by n
   bool pinned;                     // whether C lies between both critical openings
   double own;                      // ∂C/∂n, less that of a half-plane crack

@@ -14,8 +14,8 @@ EndTerms subtract_modes(const Vector& s, int modes, int fields, const EndTerms& 
   for (int field = 0; field < fields; ++field) {
     double low = 0, high = 0, sign = 1;
     for (int n = 0; n < modes; ++n) {
-      high += s[n * fields + field];
-      low += sign * s[n * fields + field];
+      high += s[field * modes + n];
+      low += sign * s[field * modes + n];
       sign = -sign;
     }
     out[0][field] = ends[0][field] - low;
@@ -93,7 +93,7 @@ Equations allocate_equations(const Nodes& nodes) {
           std::vector<EndTerms>(nodes.gap_count())};
 }
 
-void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model& model) {
+WIDE void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model& model) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   Vector s(m * fields);
@@ -101,14 +101,10 @@ void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model
   gap_moments(nodes.gaps[k], *model.panels, m, fields, s.data(), ends);
   equations.end_terms[k] = subtract_modes(s, m, fields, ends);
   fill_nodes(k, rule, nodes);
-  for (int i = 0; i < m; ++i) {
-    double total = 0, total_of_slope = 0;
-    for (int n = 0; n < m; ++n) {
-      total += rule.modes[i * m + n] * s[n * fields];
-      if (fields > 1) total_of_slope += rule.modes[i * m + n] * s[n * fields + 1];
-    }
-    equations.load[first + i] = rule.weights[i] * total;
-    equations.load_of_slope[first + i] = rule.weights[i] * total_of_slope;
+  for (int field = 0; field < fields; ++field) {
+    double* load = (field == 0 ? equations.load : equations.load_of_slope).data() + first;
+    apply(rule.modes.data(), m, m, &s[field * m], nullptr, load);
+    for (int i = 0; i < m; ++i) load[i] *= rule.weights[i];
   }
   fill_block(nodes.gaps[k], &nodes.theta[first], &nodes.weight[first], rule,
              &equations.blocks[nodes.square[k]]);

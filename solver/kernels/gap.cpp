@@ -23,16 +23,16 @@ WIDE void place_nodes(const Gap& gap, std::span<const double> cosine, std::span<
   const int middle = (count + 1) / 2;  // nodes up to it are measured from the right end
   for (int side = 0; side < 2; ++side) {
     auto [near, far] = poles_of(gap, side);
-    double inwards = 1.0 - 2 * side;
+    const double inwards = 1.0 - 2 * side, slope = alpha / (near + far), product = near * far;
     for (int i = side == 1 ? 0 : middle; i < (side == 1 ? middle : count); ++i) {
       double y = alpha * (1 + inwards * cosine[i]);
       int entry = int(y * per_unit);
       double x = y - double(entry) / per_unit;
-      double grown = 1.0 / 24 + x * (1.0 / 120 + x * (1.0 / 720 + x / 5040));
+      double grown = 1.0 / 24 + x * (1.0 / 120 + x * (1.0 / 720 + x * (1.0 / 5040)));
       grown = x * (1 + x * (0.5 + x * (1.0 / 6 + x * grown)));
       grown = table[entry] + grown * (1 + table[entry]);
-      double r = grown * near * far / (far + (1 + grown) * near);
-      theta_by_t[i] = alpha * (near + r) * (far - r) / (near + far) * sine[i];
+      double r = grown * product / (far + (1 + grown) * near);
+      theta_by_t[i] = slope * (near + r) * (far - r) * sine[i];
       theta[i] = gap.end[side] + inwards * r;
     }
   }

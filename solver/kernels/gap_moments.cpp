@@ -45,7 +45,7 @@ int most_end_nodes(const Gap& gap, const Panels& panels) {
 }
 
 // Place nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
-void place_end_piece(const Gap& gap, int side, double length, const Panels& panels,
+WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels& panels,
                      MomentNodes& nodes) {
   const Poles poles = poles_of(gap, side);
   const double scale = 1 / gap.alpha;
@@ -142,7 +142,7 @@ std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes, con
 //
 // A panel is no longer than its distance from either end, so the logarithm of the map differs at
 // its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
-void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Panels& panels,
+WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Panels& panels,
                  MomentNodes& nodes) {
   const int p = panels.nodes();
   const double scale = 1 / (2 * gap.alpha);
@@ -253,7 +253,7 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int field
     ends[0][field] = sum_lanes(low[field]);
     ends[1][field] = sum_lanes(high[field]);
     for (int n = 0; n < modes; ++n)
-      s[n * fields + field] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
+      s[field * modes + n] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
   }
 }
 

@@ -68,11 +68,12 @@ double length_up_to(double theta, const Panels& panels) {
   const int panel = std::min(std::max(int(position), 0), panels.finest_count - 1);
   const double share = std::min(std::max(position - panel, 0.0), 1.0);
   const LengthRule& rule = panels.length;
+  Vector at(rule.nodes), tilt(at.size());
+  for (double& node : at) node = panel + share * node;
+  interpolate(panels.tilt, at.data(), int(at.size()), panels, tilt.data());
   double part = 0;
-  for (size_t i = 0; i < rule.nodes.size(); ++i) {
-    const double at = (panel + share * rule.nodes[i]) * panels.width;
-    part += rule.weights[i] * measure_at(at, panels).value;
-  }
+  for (size_t i = 0; i < at.size(); ++i)
+    part += rule.weights[i] * std::sqrt(1 + tilt[i] * tilt[i]);
   return turns * rule.before.back() + rule.before[panel] + part * share * panels.width;
 }
 

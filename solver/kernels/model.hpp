@@ -75,7 +75,7 @@ inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& pa
 
 // Compute the moments of S, and with two columns of S', over a gap; see chebyshev_moments.py.
 //
-// `s` has rows modes and `fields` columns, `ends` both loads of each field: ends[side][field].
+// `s` has `fields` rows and a column for each mode, `ends` both loads of each field: ends[side][field].
 void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
                  std::array<std::array<double, 2>, 2>& ends);
 

@@ -83,10 +83,9 @@ int fast_size(int fewest) {
 
 int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave) {
   double widest = 0;
-  for (int i = 1; i < 24; ++i) {
-    const double t = pi * i / 24;
-    widest = std::max(widest, theta_at(gap, std::cos(t)).stretch * std::sin(t));
-  }
+  const auto circle = circle_of(24);
+  for (int i = 1; i < circle->count; ++i)
+    widest = std::max(widest, theta_at(gap, circle->cosine[i]).stretch * circle->sine[i]);
   const int waves = int(std::ceil(0.5 * per_wave * widest * top)) + FEWEST_SINE_NODES;
   return fast_size(std::max(waves, modes));
 }

@@ -41,7 +41,7 @@ bool replace_runs(LinearResponse& response, const Flags& changed, const Model& m
   for (int run = tree.count; run < tree.run_count(); ++run) {
     auto [one, two] = tree.runs[run].half;
     if (!(moved[one] || moved[two])) continue;
-    if (!tree.replace(run, response.nodes.gaps, model.digits, moved[run])) return false;
+    if (!tree.replace(run, response.nodes.gaps, model.digits, moved)) return false;
   }
   return true;
 }

@@ -21,6 +21,27 @@ int wanted_rank(const Gap& interval, double digits) {
   return std::min(std::max(wanted, gauss_rules().front().count), MOST_CHARGES);
 }
 
+// Chebyshev nodes, rising, and their barycentric weights.
+struct ChebyshevRule {
+  Vector node, share;
+};
+
+const ChebyshevRule& chebyshev_rule(int rank) {
+  static const std::vector<ChebyshevRule> rules = [] {
+    std::vector<ChebyshevRule> all;
+    for (int count = 0; count <= MOST_CHARGES; ++count) {
+      ChebyshevRule& rule = all.emplace_back();
+      for (int i = 0; i < count; ++i) {
+        const double t = pi * (count - i - 0.5) / count;
+        rule.node.push_back(std::cos(t));
+        rule.share.push_back(i % 2 == 0 ? std::sin(t) : -std::sin(t));
+      }
+    }
+    return all;
+  }();
+  return rules[rank];
+}
+
 // Compute K between two sets of charges.
 WIDE void fill_kernel(const double* theta, const double* stretch, int rows, const double* other,
                       const double* other_stretch, int columns, double* out) {
@@ -83,49 +104,37 @@ template <int rows>
   for (int i = 0; i < rows; ++i) store_four(sum[i], out + i * columns);
 }
 
-// Compute out = base + a b, or aᵀ b, by tiles; no matrix has fewer than four rows or columns. The
-// last tiles overlap those before them, where they compute the same again.
-WIDE void multiply(const double* a, int row_step, int inner_step, const double* b, int rows,
-                   int inner, int columns, const double* base, double* out) {
-  for (int i = 0; i < rows; i += 4) {
-    const int row = std::min(i, rows - 4);
-    for (int j = 0; j < columns; j += 4) {
-      const int column = std::min(j, columns - 4), at = row * columns + column;
-      multiply_tile<4>(a + row * row_step, row_step, inner_step, b + column, inner, columns,
-                    base ? base + at : nullptr, out + at);
+// Compute out = base + a b by tiles, of at least four columns; the last tile of a row overlaps the
+// one before, where it computes the same again.
+[[gnu::always_inline]] inline void multiply_by_tiles(const double* a, int row_step, int inner_step,
+                                                     const double* b, int rows, int inner,
+                                                     int columns, const double* base, double* out) {
+  for (int j = 0; j < columns; j += 4) {
+    const int column = std::min(j, columns - 4);
+    for (int i = 0; i < rows;) {
+      const int at = i * columns + column;
+      const double *from = a + i * row_step, *add = base ? base + at : nullptr;
+      if (i + 4 <= rows) {
+        multiply_tile<4>(from, row_step, inner_step, b + column, inner, columns, add, out + at);
+        i += 4;
+      } else {
+        multiply_tile<1>(from, row_step, inner_step, b + column, inner, columns, add, out + at);
+        i += 1;
+      }
     }
   }
 }
 
 // out = base + a b, a of (rows, inner), b of (inner, columns).
-void multiply(const double* a, const double* b, int rows, int inner, int columns, double* out,
-              const double* base = nullptr) {
-  multiply(a, inner, 1, b, rows, inner, columns, base, out);
+WIDE void multiply(const double* a, const double* b, int rows, int inner, int columns, double* out,
+                   const double* base = nullptr) {
+  multiply_by_tiles(a, inner, 1, b, rows, inner, columns, base, out);
 }
 
-// out = aᵀ b, a of (inner, rows), b of (inner, columns).
-void multiply_transposed(const double* a, const double* b, int inner, int rows, int columns,
-                         double* out) {
-  multiply(a, 1, rows, b, rows, inner, columns, nullptr, out);
-}
-
-// Compute out = base + a x, a of (rows, columns), or of no columns; four rows at a time.
-[[gnu::always_inline]] inline void apply(const double* a, int rows, int columns, const double* x,
-                                         const double* base, double* out) {
-  const int last = columns - 4;
-  Four rest = {};  // the columns after the last whole four, behind some that count no more
-  for (int j = columns - columns % 4; j < columns; ++j) rest[j - last] = x[j];
-  for (int i = 0; i < rows; i += 4) {
-    const int row = std::min(i, rows - 4);
-    Four sum[4] = {};
-    for (int j = 0; j < columns; j += 4) {
-      const int at = std::min(j, last);
-      const Four here = at == j ? load_four(x + j) : rest;
-      for (int r = 0; r < 4; ++r) sum[r] += load_four(a + (row + r) * columns + at) * here;
-    }
-    for (int r = 0; r < 4; ++r)
-      out[row + r] = base[row + r] + ((sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]));
-  }
+// out = base + aᵀ b, a of (inner, rows), b of (inner, columns).
+WIDE void multiply_transposed(const double* a, const double* b, int inner, int rows, int columns,
+                              double* out, const double* base = nullptr) {
+  multiply_by_tiles(a, 1, rows, b, rows, inner, columns, base, out);
 }
 
 // Compute out = aᵀ x, a of (rows, columns).
@@ -340,23 +349,21 @@ Tree::Tree(const Nodes& nodes, const Halves& halves, const Integers& known, doub
   inner_potential.resize(end.interpolation);
 }
 
-WIDE void Tree::place_charges(int index) {
+WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {
   const Run& run = runs[index];
   const int rank = run.rank;
-  Vector node(rank), share(rank);  // Chebyshev nodes, and their barycentric weights
-  for (int i = 0; i < rank; ++i) {
-    double t = pi * (rank - i - 0.5) / rank;
-    node[i] = std::cos(t);
-    share[i] = i % 2 == 0 ? std::sin(t) : -std::sin(t);
+  const auto& [node, share] = chebyshev_rule(rank);
+  for (int i = 0; own && i < rank; ++i) {
     Place place = theta_at(run.interval, node[i]);
     theta[run.node + i] = place.theta;
     stretch[run.node + i] = place.stretch;
   }
   double* out = interpolation.data() + run.interpolation;
-  for (int half : run.half) {
-    const Run& child = runs[half];
-    fill_interpolation(run.interval, node, share, &theta[child.node], &stretch[child.node],
-                       child.rank, out);
+  for (int half = 0; half < 2; ++half) {
+    const Run& child = runs[run.half[half]];
+    if (own || halves[half])
+      fill_interpolation(run.interval, node, share, &theta[child.node], &stretch[child.node],
+                         child.rank, out);
     out += child.rank * rank;
   }
   const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
@@ -364,17 +371,17 @@ WIDE void Tree::place_charges(int index) {
               two.rank, &kernel[run.kernel]);
 }
 
-bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits, char& moved) {
+bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits, Flags& moved) {
   Run& run = runs[index];
-  moved = false;
+  const auto [one, two] = run.half;
   if (run.rank > 0) {
     const Gap before = run.interval;
     run.interval = interval(gaps, run.range[0], run.range[1]);
-    moved = run.interval.end != before.end || run.interval.patch != before.patch;
+    moved[index] = run.interval.end != before.end || run.interval.patch != before.patch;
     // one charge fewer than required: CHARGE_MARGIN covers it
     if (wanted_rank(run.interval, digits) > run.rank + 1) return false;
   }
-  place_charges(index);
+  place_charges(index, moved[index], {bool(moved[one]), bool(moved[two])});
   return true;
 }
 
@@ -386,20 +393,25 @@ void Tree::factor(int index) {
   const double* k12 = &kernel[run.kernel];
   // (1 - H R1)⁻¹, H = K12 R2 K21
   const int stride = (n + 3) / 4 * 8;
-  Vector k21(m * n), half(n * m), reflected(n * n), matrix(n * n), eliminated(n * stride);
+  thread_local Vector room;
+  room.resize(std::max(room.size(), size_t(2 * n * m + n * (2 * n + stride) + (2 * n + m) * r)));
+  double *k21 = room.data(), *half = k21 + m * n, *reflected = half + n * m;
+  double *matrix = reflected + n * n, *eliminated = matrix + n * n;
+  double *drive = eliminated + n * stride, *charges = drive + n * r;
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < m; ++j) k21[j * n + i] = k12[i * m + j];
-  multiply(k12, second, n, m, m, half.data());
-  multiply(half.data(), k21.data(), n, m, n, reflected.data());
-  multiply(reflected.data(), first, n, n, n, matrix.data());
-  const double squares = trace_of_square(matrix.data(), n);
+  multiply(k12, second, n, m, m, half);
+  multiply(half, k21, n, m, n, reflected);
+  multiply(reflected, first, n, n, n, matrix);
+  const double squares = trace_of_square(matrix, n);
+  std::fill_n(eliminated, n * stride, 0.0);
   for (int i = 0; i < n; ++i) {
-    double* row = &eliminated[i * stride];
+    double* row = eliminated + i * stride;
     for (int j = 0; j < n; ++j) row[j] = (i == j ? 1 : 0) - matrix[i * n + j];
     row[stride / 2 + i] = 1;
   }
   double* unit = &inverse[run.inverse];
-  invert(eliminated.data(), n, stride, unit);
+  invert(eliminated, n, stride, unit);
   // With H = K12 R2 K21 a pair of halves has n - count [[H, 1], [1, R1]] negative eigenvalues more
   // than its halves: Haynsworth's formula, applied twice. These are none where the eigenvalues of
   // H R1, real if one of both is definite, are below one.
@@ -408,7 +420,7 @@ void Tree::factor(int index) {
   const double weak = 1 - 1 / SOFT_EDGE;
   if (squares > weak * weak || (one.count.negative > 0 && two.count.negative > 0)) {
     Vector own_first(first, first + n * n);
-    const NegativeCount pair = count_negative(reflected.data(), own_first.data(), n);
+    const NegativeCount pair = count_negative(reflected, own_first.data(), n);
     run.count.negative += n - pair.negative;
     run.count.nearest = pair.nearest;
   }
@@ -416,14 +428,14 @@ void Tree::factor(int index) {
   const double *e1 = &interpolation[run.interpolation], *e2 = e1 + n * r;
   double *d1 = &inner_potential[run.interpolation], *d2 = d1 + n * r;
   // D1 = (1 - H R1)⁻¹ (E1 + K12 R2 E2), D2 = E2 + K21 R1 D1
-  Vector drive(n * r), charges((n + m) * r);  // by the potential, with the other sign
-  multiply(half.data(), e2, n, m, r, drive.data(), e1);
-  multiply(unit, drive.data(), n, n, r, d1);
-  multiply(first, d1, n, n, r, charges.data());
-  multiply(k21.data(), charges.data(), m, n, r, d2, e2);
-  multiply(second, d2, m, m, r, charges.data() + n * r);
+  // `drive` and `charges` are by the potential, with the other sign
+  multiply(half, e2, n, m, r, drive, e1);
+  multiply(unit, drive, n, n, r, d1);
+  multiply(first, d1, n, n, r, charges);
+  multiply_transposed(k12, charges, n, m, r, d2, e2);
+  multiply(second, d2, m, m, r, charges + n * r);
   double* own = &response[run.response];
-  multiply_transposed(e1, charges.data(), n + m, r, r, own);
+  multiply_transposed(e1, charges, n + m, r, r, own);
   for (int i = 0; i < r; ++i)
     for (int j = 0; j < i; ++j)
       own[i * r + j] = own[j * r + i] = 0.5 * (own[i * r + j] + own[j * r + i]);
@@ -437,15 +449,14 @@ WIDE void Tree::charge(int index, Charges& charges) const {
   const double* k12 = &kernel[run.kernel];
   double *g1 = &charges.potential_of_sibling[one.node],
          *g2 = &charges.potential_of_sibling[two.node];
-  constexpr double none[MOST_CHARGES] = {};
   double q1[MOST_CHARGES], q2[MOST_CHARGES], g[MOST_CHARGES], alone[2 * MOST_CHARGES];
   std::copy_n(&charges.isolated[one.node], n, alone);
   std::copy_n(&charges.isolated[two.node], m, alone + n);
   // g1 = -(1 - H R1)⁻¹ K12 (q2° + R2 K21 q1°);  g2 = -K21 q1
   apply_transposed(k12, n, m, alone, g2);
   apply(second, m, m, g2, alone + n, q2);
-  apply(k12, n, m, q2, none, g);
-  apply(&inverse[run.inverse], n, n, g, none, g1);  // still with the other sign
+  apply(k12, n, m, q2, nullptr, g);
+  apply(&inverse[run.inverse], n, n, g, nullptr, g1);  // still with the other sign
   apply(first, n, n, g1, alone, q1);
   apply_transposed(k12, n, m, q1, g2);
   for (int i = 0; i < n; ++i) g1[i] = -g1[i];

@@ -284,7 +284,6 @@ def _way_beyond(
     # what is prescribed ends a path at fixed separations: that of a state may be off by rounding
     while (x if fixed else state.separation) > end:
         x = max(x - step, end) if fixed else x - step
-        step *= 2  # under a load the separation falls ever more slowly
         try:
             path = method.follow(state, x)
         except PathError:
@@ -296,6 +295,9 @@ def _way_beyond(
             way = turn - path.jumps[found[0]].separation
             break
         dropped += drops[-1] if len(drops) else 0.0
+        # under a load the separation falls ever more slowly, and without jumps there is far to go
+        if not (fixed and path.jumps):
+            step *= 2
         state = path.states[-1]
     return way if way < longest else math.inf
 

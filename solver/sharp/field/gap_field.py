@@ -121,8 +121,9 @@ class GapField:
             If the matrix of the gaps is not positive definite to rounding.
         """
         if self._solve is not None:
-            self._solution, self._solve = self._solve(), None  # it may hold a response
-        check_definite(self._solution)
+            solution = self._solve()
+            check_definite(solution)
+            self._solution, self._solve = solution, None  # it may hold a response
         return self._solution
 
     @property

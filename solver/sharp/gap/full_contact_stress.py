@@ -121,8 +121,8 @@ class StressSource:
 
         Patches have shape (L, 2), by their left edges, which lie in [0, 2π).
         """
-        left = np.concatenate([[gaps[-1, 1] - 2 * np.pi], gaps[:-1, 1]])
-        patches = np.stack([left, gaps[:, 0]], axis=1)
+        ends = gaps.ravel()
+        patches = np.concatenate([ends[-1:] - 2 * np.pi, ends[:-1]]).reshape(-1, 2)
         patches -= np.floor(patches[:, :1] / (2 * np.pi)) * 2 * np.pi
         first = int(np.argmin(patches[:, 0]))
         length = self.panels.contact_length(gaps)

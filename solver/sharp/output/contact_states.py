@@ -140,15 +140,13 @@ class States:
     ) -> ContactState:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
-        half = self._half
-        at = gap_field.separation
+        half, gaps, solution = self._half, gap_field.gaps, gap_field.solution
+        at, pressure = solution.separation, solution.pressure
         if separation is None:
             separation = at / self.q0
-        mean_stress = gap_field.pressure * half
-        gaps = gap_field.gaps
+        mean_stress = pressure * half
         patches, measure = self.source.contact_between(gaps)
-        work = gap_field.solution.work_of_gaps()
-        elastic = self._full_energy + 0.5 * work - np.pi * at * gap_field.pressure
+        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * at * pressure
         return ContactState(
             separation=separation,
             edges=patches / self.q0,
