@@ -268,6 +268,7 @@ if [ -n "${others:-}" ]; then
 fi
 find_python || die "$needed (say which with PYTHON=…)"
 has_venv || die "the venv module of $python is missing (Debian: apt-get install python3-venv)"
+has_headers || die "the C headers of $python are missing (Debian: apt-get install python3-dev)"
 if [ -z "${pid[tools]:-}" ]; then begin_tools; fi
 
 # --------------------------------------------------------------------------------- what to build
@@ -279,8 +280,6 @@ if ! find_parallel_hdf5; then
     else
         why_serial="no parallel HDF5 with its mpicc found (Debian: libhdf5-openmpi-dev; cluster: load its modules or set HDF5_DIR)"
     fi
-elif ! has_headers; then
-    why_serial="the C headers of $python are missing (Debian: python3-dev)"
 fi
 if ! has_mpi; then why_serial=${why_serial:-"no mpirun in PATH"}; fi
 
