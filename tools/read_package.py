@@ -19,7 +19,7 @@ def sources() -> set[str]:
         for top in (ROOT / "adhesis", ROOT)
         for folder in ((top,) if top.name == "adhesis" else (ROOT / "solver", ROOT / "ensemble"))
         for path in folder.rglob("*")
-        if path.suffix in (".py", ".pyi", ".typed", ".mplstyle", ".csv")
+        if path.suffix in (".py", ".pyi", ".typed", ".mplstyle")
     }
     return found | {"adhesis/ensemble/commit.txt"}
 
