@@ -41,7 +41,7 @@ def _sample() -> str:
 
     from adhesis.solver.model.profile import self_affine_profile
 
-    x = _STEP * np.arange(_POINTS)
+    x = _STEP * np.arange(_POINTS, dtype=np.float64)
     rough = self_affine_profile(0.8, period=2e-3, n0=8, ratio=12, seed=7, h_rms=0.4e-6)
     heights = rough.at(x) + 2e-3 * x + 1.5e-6 * (2 * x / x[-1] - 1) ** 2
     heights += 4e-9 * np.random.default_rng(7).standard_normal(_POINTS)
