@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol, TextIO
 
+from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import duration
 
 _EVERY = 10.0  # s
@@ -19,8 +20,8 @@ _REWRITE = "\r\x1b[K"
 
 
 def log(text: str) -> None:
-    """Write a line to stderr, unbuffered."""
-    print(text, file=sys.stderr, flush=True)
+    """Write a line to stderr, unbuffered, its control characters spelled out."""
+    print(printable(text), file=sys.stderr, flush=True)
 
 
 @contextmanager

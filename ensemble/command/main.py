@@ -44,7 +44,7 @@ EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
 )
 _CAMPAIGNS = ("new", "run", "status", "verify", "merge", "report")
-_WITHOUT_NUMERICS = ("new", "sample", "completion")
+_WITHOUT_NUMERICS = ("new", "completion")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
 _OPTIONS = {
     "loop": "adhesis.ensemble.loop.loop_arguments",

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from adhesis.ensemble.outputs import write_new
 
-SAMPLE = Path(__file__).with_name("sample.csv")
 EXAMPLES = (
     "adhesis sample trace.csv",
     "adhesis sample data/stylus.csv",
 )
+_POINTS, _STEP = 1001, 1e-6  # m
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,9 +24,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
-    write_new("FILE", args.file, SAMPLE.read_bytes)
+    write_new("FILE", args.file, lambda: _sample().encode())
     print(
         f"next        adhesis trace {args.file} --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 "
         "--to out"
     )
     return 0
+
+
+def _sample() -> str:
+    """Return the file: part of a self-affine profile, with tilt, bow, noise, drop-outs and dust.
+
+    The numbers are rounded so far that every machine writes the same ones.
+    """
+    import numpy as np
+
+    from adhesis.solver.model.profile import self_affine_profile
+
+    x = _STEP * np.arange(_POINTS, dtype=np.float64)
+    rough = self_affine_profile(0.8, period=2e-3, n0=8, ratio=12, seed=7, h_rms=0.4e-6)
+    heights = rough.at(x) + 2e-3 * x + 1.5e-6 * (2 * x / x[-1] - 1) ** 2
+    heights += 4e-9 * np.random.default_rng(7).standard_normal(_POINTS)
+    heights[640] += 3e-6  # dust
+    rows = [f"{1e6 * a:.1f},{1e6 * h:.4f}" for a, h in zip(x, heights, strict=True)]
+    for missing in (211, 212, 213, 808):
+        rows[missing] = rows[missing].partition(",")[0] + ","
+    head = "# synthetic stylus trace; adhesis sample\nposition (um),height (um)\n"
+    return head + "\n".join(rows) + "\n"
