@@ -214,14 +214,6 @@ def test_the_interval_reaches_as_far_as_students_and_as_halls():
     )
 
 
-def test_the_standard_error_is_the_spread_of_the_mean():
-    rng = np.random.default_rng(5)
-    found = estimates(rng.normal(1.0, 0.2, (2000, 10)), with_interval=False)
-    means = np.array([e.mean for e in found])
-    sem = np.sqrt(np.mean([e.sem**2 for e in found]))
-    assert sem == pytest.approx(means.std(), rel=0.05)
-
-
 def test_intervals_of_few_and_of_equal_values():
     assert [interval_method(n) for n in (0, 1, 2, 9, 10)] == [
         *("none", "none"),

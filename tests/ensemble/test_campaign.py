@@ -229,13 +229,6 @@ def test_bad_files_are_refused_in_one_sentence(text, words):
     assert words in refused(text)
 
 
-def test_files_that_cannot_be_read(tmp_path):
-    binary = tmp_path / "b.toml"
-    binary.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not UTF-8"):
-        load_campaign(binary)
-
-
 def test_equal_by_meaning_not_by_text():
     one = parse_campaign(campaign_text())
     two = parse_campaign("# a comment\n" + campaign_text(hurst="[0.80, 0.7]", period="0.001"))

@@ -10,14 +10,12 @@ import shlex
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command import main as command_line
 from adhesis.ensemble.command.main import COMMANDS, main, module_of, parser_of
-from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.errors import RankError
 from adhesis.ensemble.results.layout import create
 from adhesis.solver import checks
@@ -153,15 +151,6 @@ def test_an_unknown_command_is_refused_with_the_list(words, capsys):
         return
     line = refused(capsys, words)
     assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of new, run, ")
-
-
-def test_the_parser_keeps_the_names_and_values_of_its_options(capsys):
-    parser = Parser("adhesis x", "text", ("adhesis x 1", "adhesis x 2"))
-    parser.add_argument("--to", type=Path)
-    parser.add_argument("--count", type=int)
-    parser.add_argument("--name")
-    read = parser.parse(["--to", "a/b", "--count", "-3", "--name", "n"])
-    assert read == argparse.Namespace(to=Path("a/b"), count=-3, name="n")
 
 
 # ---------------------------------------------------------------------- help

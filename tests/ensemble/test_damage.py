@@ -117,12 +117,6 @@ def test_a_damaged_row_is_named(path, case):
         assert results.damaged().tolist() == [row]
 
 
-def test_a_damaged_row_is_left_out_and_computed_again(damage, path):
-    name, row, value = ROWS["kind of a jump"]
-    content = changed(path, _set(name, row, value))
-    assert damage.judge(content) == ("named", f"rows ({row},)")
-
-
 def test_a_row_that_lost_its_status_is_pending_and_not_damaged(damage, path):
     """A kill between checksum and status leaves just that behind."""
     assert damage.judge(changed(path, _set("status", 2, PENDING))) == ("pending", "rows (2,)")

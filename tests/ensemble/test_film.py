@@ -164,12 +164,6 @@ def test_without_ffmpeg_an_mp4_is_refused(loop, monkeypatch):
         loop.film("a.mp4")
 
 
-def test_progress_counts_the_frames(loop):
-    seen = []
-    film = film_of(loop, frames=5, progress=lambda done, total: seen.append((done, total)))
-    assert seen == [(k, len(film)) for k in range(1, len(film) + 1)]
-
-
 # ---------------------------------------------------------------------- command
 
 

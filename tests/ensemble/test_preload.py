@@ -183,7 +183,8 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     assert document["loop"]["turning_stress"] == pytest.approx(300.0, rel=1e-8)
     prepared = prepare_trace(read_trace(path, unit="m"))
     scene = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.002, "load_steps": 8}
-    far = adhesis.loss_of_trace(prepared, **scene, preload=1e9, quick=True, processes=0)
+    latest = {"max_penetration": 0.5, "quick": True, "processes": 0}
+    far = adhesis.loss_of_trace(prepared, **scene, preload=1e9, **latest)
     (others,) = (text for text in far.warnings if "did not turn at the preload" in text)
     count = len(far.plan.runs) - 1
     assert others.startswith(f"{count} of {count} other loops did not turn at the preload: “")

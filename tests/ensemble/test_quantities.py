@@ -139,13 +139,6 @@ def test_lengths_of_a_campaign_may_have_units() -> None:
     assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
 
 
-def test_a_stiffness_of_a_campaign_may_have_a_unit() -> None:
-    text = campaign_text()
-    assert parse_campaign(
-        text.replace("[cycle]\n", '[cycle]\nstiffness = "2 GPa/m"\n')
-    ) == parse_campaign(text.replace("[cycle]\n", "[cycle]\nstiffness = 2e9\n"))
-
-
 def test_a_campaign_file_is_asked_for_units_and_the_text_in_a_results_file_is_not(
     tmp_path: Path,
 ) -> None:
@@ -169,12 +162,6 @@ def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_u
     assert parse_campaign(campaign_text(young='"1 MPa"')) == parse_campaign(
         campaign_text(young="1e6")
     )
-
-
-def test_lengths_are_shown_in_a_unit_of_their_size() -> None:
-    assert LENGTH.text(5e-6) == "5 µm"
-    assert LENGTH.text(2e-3) == "2 mm"
-    assert LENGTH.read_with_unit("2 mm") == 2e-3
 
 
 def test_quantities_are_shown_in_a_unit_of_their_size() -> None:

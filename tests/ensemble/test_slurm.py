@@ -254,13 +254,6 @@ class Job:
             ) from error
 
 
-# How the first start of a job with STAGING ends.
-ENDS = {
-    "requeued": ("scontrol", "requeue"),
-    "at its time limit": ("scancel", "--batch", "--signal=USR1"),  # what Slurm does then
-}
-
-
 class Submit(Protocol):
     """How a job is submitted; see :func:`submit`."""
 
@@ -327,8 +320,7 @@ def jobs(cluster: Cluster, submit: Submit) -> dict[str, Job]:
     # Slurm looks at its clocks twice a minute and signals up to a minute early: soon, that is.
     limited = ("--ntasks=2", "--time=2", "--signal=B:USR1@85")
     jobs = {"limited": submit(*limited, realisations=10)}
-    for end in ENDS:
-        jobs[f"staged, {end}"] = submit("--ntasks=2", realisations=10, staging="disk")
+    jobs["staged"] = submit("--ntasks=2", realisations=10, staging="disk")
     jobs["parts"] = submit(str(ROOT / "jobs" / "parts.sh"), "2", "--mem=1", "study.toml")
     jobs["killed"] = submit("--nodes=1", "--ntasks-per-node=3", realisations=10)
     jobs["stopped"] = submit("--nodes=1", "--ntasks-per-node=3", realisations=10, silence=2)
@@ -377,19 +369,18 @@ def test_a_job_with_a_rank_that_hangs_comes_back_and_finishes(jobs: dict[str, Jo
     assert job.done_tasks() == 40
 
 
-@pytest.mark.parametrize("end", ENDS)
 def test_two_jobs_of_one_campaign_with_staging_lose_no_row(
-    cluster: Cluster, jobs: dict[str, Job], end: str
+    cluster: Cluster, jobs: dict[str, Job]
 ) -> None:
     """The second one comes while the first runs, which then comes back and finishes."""
-    first = jobs[f"staged, {end}"]
+    first = jobs["staged"]
     first.wait(lambda: first.staged_tasks() > 0, "a first task")
     second = first.again("--patience", "0")
     second.wait(lambda: second.values["JobState"] == "FAILED", "refused")
     assert "study.h5 is held by another job" in second.log
     assert first.staged_tasks() > 0
     assert not (first.folder / "study.h5").exists()
-    cluster.call(*ENDS[end], first.number)
+    cluster.call("scontrol", "requeue", first.number)
     first.wait(lambda: first.values["Restarts"] == "1", "requeued")
     first.wait(lambda: first.values["JobState"] == "COMPLETED", "finished")
     assert first.done_tasks() == 40

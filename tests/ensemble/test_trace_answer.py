@@ -576,12 +576,13 @@ def test_a_plan_expects_no_more_patches_than_crests_that_are_reached(gamma: floa
 
 
 @pytest.mark.usefixtures("quick_figures")
-def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys):
+def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys, monkeypatch):
     """The measure reaches the loops, the page and the document; an unknown one is refused."""
+    monkeypatch.setattr(answers, "Loops", lambda jobs, _: Loops(jobs, 0))  # in this process
     rows = [f"{1e6 * a:.4f},{1e6 * b:.5f}" for a, b in zip(X, 5 * PROFILE.at(X), strict=True)]
     file = tmp_path / "t.csv"
     file.write_text("x (um),z (um)\n" + "\n".join(rows))
-    words = ["trace", str(file), *CONTACT, "--quick", "--quiet", "--processes", "1"]
+    words = ["trace", str(file), *CONTACT, "--quick", "--quiet"]
     words = [*words, "--load-steps", "4", "--max-penetration", "0.3", "--accuracy", "1e-2"]
     found = {}
     for measure in ("arc", "flat"):

@@ -177,21 +177,6 @@ def test_what_is_no_number_or_breaks_its_bounds_is_refused(name: str) -> None:
         assert shown(value) in sentence or not is_number
 
 
-def test_the_bounds_are_those_that_were_measured() -> None:
-    """Beyond them no method resolves a loop, or the numbers leave the range of floats."""
-    for bounds, right, wrong in (
-        (checks.MAX_PENETRATION, 1 - 1e-6, 1 - 1e-7),
-        (checks.RMS_SLOPE, 100.0, 101.0),
-        (checks.ACCURACY, 1e-10, 1e-20),
-        (checks.LOAD_STEPS, 100_000, 10**9),
-        (checks.NODES, 1 << 26, 10**12),
-        (checks.HURST, 0.5, 1.0),
-        (checks.POISSON, 0.5, 0.51),
-    ):
-        assert bounds.holds(right)
-        assert not bounds.holds(wrong)
-
-
 @pytest.mark.parametrize(
     "two",
     [2, 2.0, np.float32(2), np.float64(2), np.int64(2), np.array(2.0), Fraction(2), Decimal(2)],

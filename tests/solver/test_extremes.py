@@ -137,14 +137,6 @@ def test_a_plain_path_is_a_loop_bit_by_bit(share, stiffness, turn, load_steps):
     assert loop.patches[-1] == 0
 
 
-def test_a_plain_path_of_the_method_sharp_is_its_loop():
-    problem = Problem(ROUGH, HALF_SPACE, 0.01)
-    loop = run_loop(SharpMethod(problem), max_penetration=1e-3, load_steps=1)
-    path = run_path(SharpMethod(problem), [1e-3], load_steps=1)
-    assert path.work == loop.loss > 0
-    assert np.array_equal(path.mean_stress, loop.mean_stress)
-
-
 def test_turning_points_far_below_first_touch_are_marks_of_the_way_out():
     """Unloading that skips load steps still ends one at the points where minor loops begin."""
     problem = wave_problem(0.9)
