@@ -160,7 +160,7 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
     return solve
 
 
-def field_at_fixed_edges(edges: EdgeMechanics) -> Solve:
+def field_at_fixed_edges(edges: EdgeMechanics) -> Callable[[Point, Point, float], Point]:
     """Return a function that solves the field between two points that have the same edges."""
 
     def solve(clear: Point, hit: Point, at: float) -> Point:
