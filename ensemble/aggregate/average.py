@@ -139,7 +139,7 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     InputError if a file cannot be read, is no results file, or holds no finished task.
     """
     with Results(path) as results:
-        status, kept = results.status(), results.column(KEPT)
+        status, kept = results.status(), np.append(results.column(KEPT), len(results))
         cells = tuple(_averaged(results, cell, kept) for cell in read_cells(results, status))
         failed = np.flatnonzero(status == FAILED)[:_MAX_FAILURES]
         companions = tuple(read_companion(other, results.campaign) for other in beside)

@@ -51,9 +51,13 @@ class FieldStatistics:
 def average_fields(
     results: Results, rows: NDArray[np.intp], kept: NDArray[np.intp]
 ) -> FieldStatistics:
-    """Average the rows of a cell; ``kept`` are the rows of the file that keep their fields."""
+    """Average the rows of a cell.
+
+    ``kept`` are the rows of the file that keep their fields, ascending, and a number beyond them.
+    """
     averages = {name: _average(results, name, rows) for name in _AVERAGED}
-    slots = np.flatnonzero(np.isin(kept, rows))[:1]
+    places = np.searchsorted(kept, rows)
+    slots = places[kept[places] == rows][:1]
     shape = [results.column(name, slots).astype(float) for name in _OF_SHAPE]
     return FieldStatistics(
         in_contact=averages["psd_displacement"][1],

@@ -10,7 +10,8 @@ it. Tasks that share work go out together, as one unit.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+import heapq
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 Unit = tuple[int, ...]
@@ -45,6 +46,7 @@ class Schedule:
         self._groups = {name: _Group(prior) for name, prior in priors.items()}
         self._group_of, self._round_of, self._key_of = group_of, round_of, key_of or {}
         self._rounds: dict[int, list[Unit]] = {}
+        self._turns: list[int] = []  # heap of these rounds, and of some that are over
         self._ordered: set[int] = set()  # rounds whose units stand in order, the longest last
         self._known_seconds = self._known_prior = 0.0
         self.waiting = 0
@@ -58,7 +60,10 @@ class Schedule:
             units.setdefault((task,) if key is None else key, []).append(task)
         for unit in units.values():
             turn = self._round_of[unit[0]]
-            self._rounds.setdefault(turn, []).append(tuple(unit))
+            if turn not in self._rounds:
+                self._rounds[turn] = []
+                heapq.heappush(self._turns, turn)
+            self._rounds[turn].append(tuple(unit))
             self._ordered.discard(turn)
             self._count(unit, 1)
 
@@ -98,7 +103,7 @@ class Schedule:
 
     def take(self, time_left: float | None = None) -> Unit:
         """Return the next unit; an empty one if none waits or fits into ``time_left`` (s)."""
-        for turn in sorted(self._rounds):
+        for turn in self._in_order():
             units = self._rounds[turn]
             if turn not in self._ordered:
                 self._ordered.add(turn)
@@ -114,6 +119,13 @@ class Schedule:
             self._count(unit, -1)
             return unit
         return ()
+
+    def _in_order(self) -> Iterator[int]:
+        """Rounds that wait; of many the first is found quickly, and as a rule has what fits."""
+        while self._turns and self._turns[0] not in self._rounds:
+            heapq.heappop(self._turns)
+        yield from self._turns[:1]
+        yield from sorted(self._rounds)[1:]
 
     def _count(self, unit: Iterable[int], by: int) -> None:
         for task in unit:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 
@@ -27,53 +27,37 @@ from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.jump import JUMP_KINDS
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """The jumps of one kind in all loops of a cell."""
-
-    cell: AveragedCell
-    place: int  # in JUMP_KINDS
-
-    @property
-    def number(self) -> float:
-        """Number of jumps."""
-        return float(self.cell.jumps.number[self.place])
-
-    @property
-    def energy(self) -> float:
-        """Their drops together, J/m²."""
-        return float(self.cell.jumps.energy[self.place])
-
-    @property
-    def share(self) -> float | None:
-        """Share of the kind in all drops; None without any."""
-        of_all_kinds = float(self.cell.jumps.energy.sum())
-        return self.energy / of_all_kinds if of_all_kinds else None
-
-
 def _kinds(data: Aggregate) -> list[int]:
-    """Return the kinds of jumps that any cell has."""
+    """Return the places in JUMP_KINDS of the kinds that any cell has."""
     return np.flatnonzero(np.any([cell.jumps.number for cell in data.cells], axis=0)).tolist()
+
+
+def _share(kind: int, cell: AveragedCell) -> float | None:
+    """Return the share of a kind in the drops of a cell; None without any."""
+    drops = float(cell.jumps.energy.sum())
+    return float(cell.jumps.energy[kind]) / drops if drops else None
 
 
 def jumps(data: Aggregate) -> Table:
     """One row for each cell and kind: how many jumps, and their share of all drops."""
+    rows = [(cell, int(k)) for cell in data.cells for k in np.flatnonzero(cell.jumps.number)]
     columns = (
-        *key_columns(data, attrgetter("cell")),
-        TableColumn("kind", lambda of: JUMP_KINDS[of.place], "kind"),
-        TableColumn("scale", lambda of: "small" if SMALL[of.place] else "large", "scale"),
+        *key_columns(data, itemgetter(0)),
+        TableColumn("kind", lambda row: JUMP_KINDS[row[1]], "kind"),
+        TableColumn("scale", lambda row: "small" if SMALL[row[1]] else "large", "scale"),
         TableColumn(
-            "jumps_per_loop", lambda of: of.number / of.cell.done, "jumps a loop", number(3)
+            "jumps_per_loop",
+            lambda row: float(row[0].jumps.number[row[1]]) / row[0].done,
+            *("jumps a loop", number(3)),
         ),
         TableColumn(
             "energy_per_loop [J/m^2]",
-            lambda of: of.energy / of.cell.done,
+            lambda row: float(row[0].jumps.energy[row[1]]) / row[0].done,
             *("drops a loop (mJ/m²)", number(3, unit=1e-3)),
         ),
-        TableColumn("share_of_drops", attrgetter("share"), "share", percent),
+        TableColumn("share_of_drops", lambda row: _share(row[1], row[0]), "share", percent),
     )
-    every = (_Kind(cell, place) for cell in data.cells for place in _kinds(data))
-    return make_table("Jumps by kind", columns, (of for of in every if of.number))
+    return make_table("Jumps by kind", columns, rows)
 
 
 def shares_by_kind(data: Aggregate) -> Table:
@@ -86,10 +70,6 @@ def shares_by_kind(data: Aggregate) -> Table:
         ),
     )
     return make_table("Share of the drops by kind of the jump", columns, data.cells)
-
-
-def _share(place: int, cell: AveragedCell) -> float | None:
-    return _Kind(cell, place).share
 
 
 def mechanisms(data: Aggregate) -> Table:
