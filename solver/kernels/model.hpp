@@ -55,7 +55,8 @@ struct ValueAndSlope {
 // Evaluate a piecewise Chebyshev series, and its derivative by θ.
 ValueAndSlope evaluate_series(const Vector& coefficients, double theta, const Panels& panels);
 
-// Evaluate a piecewise Chebyshev series at many positions, θ over the width of a panel.
+// Evaluate a piecewise Chebyshev series at many positions, θ over the width of a panel; `out` may be
+// where they are.
 void interpolate(const Vector& coefficients, const double* position, int count,
                  const Panels& panels, double* out);
 
