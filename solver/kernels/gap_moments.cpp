@@ -49,7 +49,7 @@ int most_end_nodes(const Gap& gap, const Panels& panels) {
 
 // Place nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
 WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels& panels,
-                     MomentNodes& nodes) {
+                          MomentNodes& nodes) {
   const Poles poles = poles_of(gap, side);
   const double scale = 1 / gap.alpha;
   const double origin = gap.end[side] / panels.width;
@@ -146,7 +146,7 @@ std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes, con
 // A panel is no longer than its distance from either end, so the logarithm of the map differs at
 // its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
 WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Panels& panels,
-                 MomentNodes& nodes) {
+                      MomentNodes& nodes) {
   const int p = panels.nodes();
   const double scale = 1 / (2 * gap.alpha);
   for (const Tile& tile : tiles) {

@@ -66,7 +66,7 @@ WIDE void take_fours(int parts, int stride, const Circle& circle, const Complex&
 
 // Take butterflies of an odd radix, of which there are few.
 WIDE void take_odd(int radix, int parts, int stride, const Circle& circle, const Complex& x,
-              Complex& out) {
+                   Complex& out) {
   const int far = stride * parts, turn = 2 * circle.count;
   for (int p = 0; p < parts; ++p) {
     for (int k = 0; k < radix; ++k) {

@@ -80,8 +80,8 @@ void fill_interpolation(const Gap& interval, const Vector& node, const Vector& s
   }
 }
 
-// Compute some rows and four columns of base + a b; without a base, of a b. The element of `a` in row i
-// and column k lies at i row_step + k inner_step.
+// Compute some rows and four columns of base + a b; without a base, of a b. The element of `a` in
+// row i and column k lies at i row_step + k inner_step.
 template <int rows>
 [[gnu::always_inline]] inline void multiply_tile(const double* a, int row_step, int inner_step,
                                                  const double* b, int inner, int columns,
