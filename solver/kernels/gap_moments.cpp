@@ -21,11 +21,14 @@ constexpr double surely_smooth = 2.0;    // modes·length/distance of a panel th
 struct MomentNodes {
   std::array<Vector, 2> from_end;  // 1 + η and 1 - η: η measured from the left and the right end
   std::array<Vector, 2> source;
-  int fields, count = 0;
+  int fields, count;
 
-  MomentNodes(int most, int fields) : fields(fields) {
-    for (Vector& distance : from_end) distance.resize(most);
-    for (int field = 0; field < fields; ++field) source[field].resize(most);
+  // Begin anew, with room for as many nodes.
+  void begin(int most, int of_fields) {
+    fields = of_fields;
+    count = 0;
+    for (auto* part : {&from_end, &source})
+      for (Vector& values : *part) values.resize(std::max(values.size(), size_t(most)));
   }
 };
 
@@ -46,7 +49,7 @@ int most_end_nodes(const Gap& gap, const Panels& panels) {
 
 // Place nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
 WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels& panels,
-                     MomentNodes& nodes) {
+                          MomentNodes& nodes) {
   const Poles poles = poles_of(gap, side);
   const double scale = 1 / gap.alpha;
   const double origin = gap.end[side] / panels.width;
@@ -143,7 +146,7 @@ std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes, con
 // A panel is no longer than its distance from either end, so the logarithm of the map differs at
 // its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
 WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Panels& panels,
-                 MomentNodes& nodes) {
+                      MomentNodes& nodes) {
   const int p = panels.nodes();
   const double scale = 1 / (2 * gap.alpha);
   for (const Tile& tile : tiles) {
@@ -174,12 +177,13 @@ WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Pane
 }
 
 // Place Gauss-Chebyshev nodes of the first kind in η, which serve s_n and s^± alike.
-MomentNodes place_short_gap(const Gap& gap, int modes, int fields, const Panels& panels) {
+void place_short_gap(const Gap& gap, int modes, int fields, const Panels& panels,
+                     MomentNodes& nodes) {
   const ShortRule* rule = &panels.short_rule;
   const int count = std::max(int(rule->eta.size()), 2 * modes);
   ShortRule longer(count > int(rule->eta.size()) ? count : 0);
   if (!longer.eta.empty()) rule = &longer;
-  MomentNodes nodes(count + 4, fields);
+  nodes.begin(count + 4, fields);
   Vector theta(count), theta_by_t(count), value(count);
   place_nodes(gap, rule->eta, rule->sine, theta.data(), theta_by_t.data());
   for (int i = 0; i < count; ++i) {
@@ -194,21 +198,21 @@ MomentNodes place_short_gap(const Gap& gap, int modes, int fields, const Panels&
     for (int i = 0; i < count; ++i) nodes.source[field][i] = theta_by_t[i] * value[i];
   }
   nodes.count = count;
-  return nodes;
 }
 
-MomentNodes place_moment_nodes(const Gap& gap, int modes, int fields, const Panels& panels) {
+void place_moment_nodes(const Gap& gap, int modes, int fields, const Panels& panels,
+                        MomentNodes& nodes) {
   const double width = panels.width;
-  if (gap.length() <= SHORT_GAP_PANELS * width) return place_short_gap(gap, modes, fields, panels);
+  if (gap.length() <= SHORT_GAP_PANELS * width)
+    return place_short_gap(gap, modes, fields, panels, nodes);
   long first = long(std::floor(gap.end[0] / width)) + 2;  // end pieces are one to two panels long
   long last = long(std::ceil(gap.end[1] / width)) - 2;
   std::vector<Tile> tiles = tile_gap(gap, first, last, modes, panels);
   const int most = most_end_nodes(gap, panels) + int(tiles.size()) * panels.nodes();
-  MomentNodes nodes(most + 4, fields);
+  nodes.begin(most + 4, fields);
   place_end_piece(gap, 0, double(first) * width - gap.end[0], panels, nodes);
   place_end_piece(gap, 1, gap.end[1] - double(last) * width, panels, nodes);
   place_tiles(gap, tiles, panels, nodes);
-  return nodes;
 }
 
 [[gnu::always_inline]] inline double sum_lanes(Four x) { return (x[0] + x[1]) + (x[2] + x[3]); }
@@ -217,7 +221,8 @@ MomentNodes place_moment_nodes(const Gap& gap, int modes, int fields, const Pane
 
 WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
                       std::array<std::array<double, 2>, 2>& ends) {
-  MomentNodes nodes = place_moment_nodes(gap, modes, fields, panels);
+  thread_local MomentNodes nodes;  // kept, as gaps of many sizes follow each other
+  place_moment_nodes(gap, modes, fields, panels, nodes);
   for (; nodes.count % 4 != 0; ++nodes.count) {  // whole vectors, the last ones without weight
     nodes.from_end[0][nodes.count] = nodes.from_end[1][nodes.count] = 1;
     for (int field = 0; field < fields; ++field) nodes.source[field][nodes.count] = 0;

@@ -72,8 +72,7 @@ double length_up_to(double theta, const Panels& panels) {
   for (double& node : at) node = panel + share * node;
   interpolate(panels.tilt, at.data(), int(at.size()), panels, tilt.data());
   double part = 0;
-  for (size_t i = 0; i < at.size(); ++i)
-    part += rule.weights[i] * std::sqrt(1 + tilt[i] * tilt[i]);
+  for (size_t i = 0; i < at.size(); ++i) part += rule.weights[i] * std::sqrt(1 + tilt[i] * tilt[i]);
   return turns * rule.before.back() + rule.before[panel] + part * share * panels.width;
 }
 

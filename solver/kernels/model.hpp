@@ -55,7 +55,8 @@ struct ValueAndSlope {
 // Evaluate a piecewise Chebyshev series, and its derivative by θ.
 ValueAndSlope evaluate_series(const Vector& coefficients, double theta, const Panels& panels);
 
-// Evaluate a piecewise Chebyshev series at many positions, θ over the width of a panel.
+// Evaluate a piecewise Chebyshev series at many positions, θ over the width of a panel; `out` may
+// be where they are.
 void interpolate(const Vector& coefficients, const double* position, int count,
                  const Panels& panels, double* out);
 
@@ -75,7 +76,8 @@ inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& pa
 
 // Compute the moments of S, and with two columns of S', over a gap; see chebyshev_moments.py.
 //
-// `s` has `fields` rows and a column for each mode, `ends` both loads of each field: ends[side][field].
+// `s` has `fields` rows and a column for each mode, `ends` both loads of each field:
+// ends[side][field].
 void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
                  std::array<std::array<double, 2>, 2>& ends);
 

@@ -12,9 +12,9 @@ FineOpening fine_moments(const Gap& gap, const Circle& circle, const Panels& pan
   FineOpening out{Vector(count), Vector(count), Vector(count), Vector(count)};
   const std::span<const double> cosine(&circle.cosine[1], count), sine(&circle.sine[1], count);
   place_nodes(gap, cosine, sine, out.theta.data(), out.theta_by_t.data());
-  Vector position(count), load(count);
-  for (int i = 0; i < count; ++i) position[i] = out.theta[i] / panels.width;
-  interpolate(panels.stress, position.data(), count, panels, load.data());
+  Vector& load = out.opening;  // not known yet
+  for (int i = 0; i < count; ++i) load[i] = out.theta[i] / panels.width;
+  interpolate(panels.stress, load.data(), count, panels, load.data());
   for (int i = 0; i < count; ++i) load[i] *= out.theta_by_t[i];
   sine_sums(load, circle, out.modes);
   for (double& mode : out.modes) mode *= 2.0 / (count + 1);

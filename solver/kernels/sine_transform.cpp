@@ -10,7 +10,10 @@ namespace {
 struct Complex {
   Vector re, im;
 
-  explicit Complex(int count) : re(count), im(count) {}
+  void resize(int count) {
+    re.resize(count);
+    im.resize(count);
+  }
 };
 
 // Take `parts` butterflies of radix 2 for each of `stride`.
@@ -63,7 +66,7 @@ WIDE void take_fours(int parts, int stride, const Circle& circle, const Complex&
 
 // Take butterflies of an odd radix, of which there are few.
 WIDE void take_odd(int radix, int parts, int stride, const Circle& circle, const Complex& x,
-              Complex& out) {
+                   Complex& out) {
   const int far = stride * parts, turn = 2 * circle.count;
   for (int p = 0; p < parts; ++p) {
     for (int k = 0; k < radix; ++k) {
@@ -84,23 +87,21 @@ WIDE void take_odd(int radix, int parts, int stride, const Circle& circle, const
   }
 }
 
-// Sum z_j exp(2πi j k/M) over j, M a fourth of the circle's points.
-Complex transform(Complex x, const Circle& circle) {
-  Complex out(int(x.re.size()));
+// Set x to Σ_j x_j exp(2πi j k/M), M a fourth of the circle's points; `other` is overwritten.
+void transform(Complex& x, Complex& other, const Circle& circle) {
   int left = int(x.re.size()), stride = 1;
   while (left > 1) {
     const int radix = left % 4 == 0 ? 4 : left % 2 == 0 ? 2 : left % 3 == 0 ? 3 : 5;
     if (radix == 4)
-      take_fours(left / 4, stride, circle, x, out);
+      take_fours(left / 4, stride, circle, x, other);
     else if (radix == 2)
-      take_twos(left / 2, stride, circle, x, out);
+      take_twos(left / 2, stride, circle, x, other);
     else
-      take_odd(radix, left / radix, stride, circle, x, out);
+      take_odd(radix, left / radix, stride, circle, x, other);
     left /= radix;
     stride *= radix;
-    std::swap(x, out);
+    std::swap(x, other);
   }
-  return x;
 }
 
 }  // namespace
@@ -144,13 +145,16 @@ std::shared_ptr<const Circle> circle_of(int count) {
 
 void sine_sums(const Vector& x, const Circle& circle, Vector& out) {
   const int count = circle.count, half = count / 2;
-  Complex folded(half);
+  thread_local Complex sums, other;  // kept, as gaps of many sizes follow each other
+  sums.resize(half);
+  other.resize(half);
+  sums.re[0] = 0;
   for (int j = 1; j < count; ++j) {
     const double a = x[j - 1], b = x[count - j - 1];
     const double y = circle.sine[j] * (a + b) + 0.5 * (a - b);
-    (j % 2 == 1 ? folded.im : folded.re)[j / 2] = y;
+    (j % 2 == 1 ? sums.im : sums.re)[j / 2] = y;
   }
-  const Complex sums = transform(std::move(folded), circle);
+  transform(sums, other, circle);
   const Vector &re = sums.re, &im = sums.im;
   // Σ_j y_j exp(2πi j k/N) from even and odd j; its imaginary parts are the even sums, its real
   // parts the steps between the odd ones

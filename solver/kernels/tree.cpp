@@ -80,8 +80,8 @@ void fill_interpolation(const Gap& interval, const Vector& node, const Vector& s
   }
 }
 
-// Compute some rows and four columns of base + a b; without a base, of a b. The element of `a` in row i
-// and column k lies at i row_step + k inner_step.
+// Compute some rows and four columns of base + a b; without a base, of a b. The element of `a` in
+// row i and column k lies at i row_step + k inner_step.
 template <int rows>
 [[gnu::always_inline]] inline void multiply_tile(const double* a, int row_step, int inner_step,
                                                  const double* b, int inner, int columns,
@@ -146,10 +146,10 @@ WIDE void multiply_transposed(const double* a, const double* b, int inner, int r
   }
 }
 
-// Invert a matrix of rows of `stride`, a multiple of four, which is overwritten; its inverse gets
-// rows of n. By elimination with the largest pivots of columns.
+// Invert the left half of n rows of `stride`, a multiple of eight; the right half holds the unit
+// matrix. By elimination with the largest pivots of columns, on both halves at once.
 WIDE void invert(double* a, int n, int stride, double* inverse) {
-  const int first = stride / 2;  // the inverse grows beside the matrix
+  const int first = stride / 2;
   for (int k = 0; k < n; ++k) {
     int best = k;
     for (int i = k + 1; i < n; ++i)

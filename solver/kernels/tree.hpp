@@ -74,12 +74,13 @@ struct Tree {
 
   Halves halves() const;
 
-  // Place the charges of a run, and compute its interpolation and kernel; the charges of which halves
-  // have moved, if its own have not.
+  // Place the charges of a run, and compute its interpolation and kernel; the charges of which
+  // halves have moved, if its own have not.
   void place_charges(int run, bool own = true, std::array<bool, 2> halves = {true, true});
 
-  // Place the charges of a run anew, as those of halves have moved, and mark whether they have moved
-  // themselves: the interval of a run does not change by gaps inside. Returns whether it has enough.
+  // Place the charges of a run anew, as those of halves have moved, and mark whether they have
+  // moved themselves: the interval of a run does not change by gaps inside. Returns whether it has
+  // enough.
   bool replace(int run, const std::vector<Gap>& gaps, double digits, Flags& moved);
 
   // Compute the response of a run from those of its halves.
