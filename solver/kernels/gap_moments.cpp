@@ -199,9 +199,9 @@ MomentNodes place_short_gap(const Gap& gap, int modes, int fields, const Panels&
 
 MomentNodes place_moment_nodes(const Gap& gap, int modes, int fields, const Panels& panels) {
   const double width = panels.width;
-  if (gap.length() <= SHORT_GAP_PANELS * width) return place_short_gap(gap, modes, fields, panels);
   long first = long(std::floor(gap.end[0] / width)) + 2;  // end pieces are one to two panels long
   long last = long(std::ceil(gap.end[1] / width)) - 2;
+  if (last < first) return place_short_gap(gap, modes, fields, panels);  // they would meet
   std::vector<Tile> tiles = tile_gap(gap, first, last, modes, panels);
   const int most = most_end_nodes(gap, panels) + int(tiles.size()) * panels.nodes();
   MomentNodes nodes(most + 4, fields);

@@ -67,9 +67,7 @@ def test_a_signal_that_comes_in_a_long_kernel_ends_it(alarm):
 
     def descend() -> None:
         while not ended.is_set():
-            response.descend(
-                ends, 1e-3, 100_000, False, Running(ends), edges.law, edges.model
-            )
+            response.descend(ends, 1e-3, 100_000, False, Running(ends), edges.law, edges.model)
 
     signal.setitimer(signal.ITIMER_REAL, 0.3)
     started = time.perf_counter()

@@ -32,7 +32,7 @@ from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
 from adhesis.solver.sharp.nucleation.location import Located, secant_share
-from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, OVERLAP
+from adhesis.solver.sharp.tolerances import BISECTION_AFTER, OVERLAP
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class Nucleation:
             if high >= -0.5 * self.tolerance:
                 break
             # openings are linear in d at fixed edges
-            share = secant_share(low, high, self.tolerance) if cleared < CLEAR_TRIALS else 0.5
+            share = secant_share(low, high, self.tolerance) if cleared < BISECTION_AFTER else 0.5
             trial = clear + (hit - clear) * share
             tried = self.edges.field(point.gaps, trial)
             value, there = self.minimum(tried)
