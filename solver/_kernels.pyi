@@ -1,8 +1,6 @@
-"""Kernels of the methods sharp and grid."""
-
 from collections.abc import Sequence
 import enum
-from typing import Annotated, overload
+from typing import overload
 
 import numpy
 import numpy.typing
@@ -24,29 +22,17 @@ STEP_GROWTH: float
 STEP_REDUCTION: float
 
 class Panels:
-    """The full-contact stress of a profile, compressed on panels."""
-
     def __init__(self, *, width: float, finest_count: int, x: numpy.typing.NDArray[numpy.float64], w: numpy.typing.NDArray[numpy.float64], stress: numpy.typing.NDArray[numpy.float64], slope: numpy.typing.NDArray[numpy.float64], tilt: numpy.typing.NDArray[numpy.float64], half_plane: Sequence[numpy.typing.NDArray[numpy.float64]], weights: Sequence[numpy.typing.NDArray[numpy.float64]], level_start: numpy.typing.NDArray[numpy.int64], end_x: numpy.typing.NDArray[numpy.float64], end_w: numpy.typing.NDArray[numpy.float64], short_count: int, length_x: numpy.typing.NDArray[numpy.float64], length_w: numpy.typing.NDArray[numpy.float64], length_before: numpy.typing.NDArray[numpy.float64], top: int) -> None: ...
 
-    def stress(self, theta: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """Evaluate S and S' at any angles."""
+    def stress(self, theta: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
-    def measure(self, theta: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """Evaluate sqrt(1 + h'²) and its θ-derivative."""
+    def measure(self, theta: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
-    def half_plane_opening(self, theta: numpy.typing.NDArray[numpy.float64], side: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """
-        Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.
-        """
+    def half_plane_opening(self, theta: numpy.typing.NDArray[numpy.float64], side: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
-    def contact_length(self, gaps: numpy.typing.NDArray[numpy.float64]) -> float:
-        """Integrate sqrt(1 + h'²) dθ over the patches between gaps."""
+    def contact_length(self, gaps: numpy.typing.NDArray[numpy.float64]) -> float: ...
 
 class LoadingDevice:
-    """
-    Device that prescribes the value d = separation_weight·q0 s - compliance·p.
-    """
-
     def __init__(self, separation_weight: float, compliance: float) -> None: ...
 
     @property
@@ -56,8 +42,6 @@ class LoadingDevice:
     def compliance(self) -> float: ...
 
 class FieldModel:
-    """Inputs of a field besides its gaps and the prescribed value."""
-
     def __init__(self, device: LoadingDevice, digits: float, panels: Panels) -> None: ...
 
     @property
@@ -70,8 +54,6 @@ class FieldModel:
     def panels(self) -> Panels: ...
 
 class EdgeLaw:
-    """Law by which the edges move, with the tolerances of one problem."""
-
     @overload
     def __init__(self, *, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, rough_rate: float, force_error: float, pinning: float) -> None: ...
 
@@ -100,52 +82,37 @@ class EdgeLaw:
     def pinning(self) -> float: ...
 
     @property
-    def memory(self) -> NDArray[numpy.float64]:
-        """Gaps at the last state."""
+    def memory(self) -> NDArray[numpy.float64]: ...
 
     @memory.setter
     def memory(self, arg: numpy.typing.NDArray[numpy.float64], /) -> None: ...
 
-    def free_edges(self, gaps: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.int64]:
-        """
-        Find the edges that are not at their memory; all with one work of adhesion.
-        """
+    def free_edges(self, gaps: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.int64]: ...
 
-    def critical_of(self, gaps: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64], panels: Panels) -> numpy.typing.NDArray[numpy.float64]:
-        """Compute C_c at every edge with the opening C."""
+    def critical_of(self, gaps: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64], panels: Panels) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def critical_openings(self, theta: numpy.typing.NDArray[numpy.float64], panels: Panels) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """Evaluate C_c of edges that advance, and its θ-derivative."""
+    def critical_openings(self, theta: numpy.typing.NDArray[numpy.float64], panels: Panels) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
-def shortest_length(gaps: numpy.typing.NDArray[numpy.float64]) -> float:
-    """Find the length of the shortest gap or patch."""
+def shortest_length(gaps: numpy.typing.NDArray[numpy.float64]) -> float: ...
 
 class Field:
-    """Solution of equation (1) of gap_field for given gaps."""
+    @property
+    def pressure(self) -> float: ...
 
     @property
-    def pressure(self) -> float:
-        """p = 2p̄/E*; NaN if there is no solution."""
+    def separation(self) -> float: ...
 
     @property
-    def separation(self) -> float:
-        """q0 s."""
+    def unit_mean(self) -> float: ...
 
     @property
-    def unit_mean(self) -> float:
-        """Xᵀ (B + G)⁻¹ X."""
+    def resistance(self) -> float: ...
 
     @property
-    def resistance(self) -> float:
-        """-2π/resistance is ∂p/∂d at fixed edges."""
+    def opening(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def opening(self) -> numpy.typing.NDArray[numpy.float64]:
-        """C at each edge."""
-
-    @property
-    def scaled_opening(self) -> numpy.typing.NDArray[numpy.float64]:
-        """f: the openings over sqrt(1-η²), at all nodes."""
+    def scaled_opening(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
     def orders(self) -> numpy.typing.NDArray[numpy.int64]: ...
@@ -157,49 +124,30 @@ class Field:
     def theta(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def weight(self) -> numpy.typing.NDArray[numpy.float64]:
-        """X."""
+    def weight(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def load(self) -> numpy.typing.NDArray[numpy.float64]:
-        """S~."""
+    def load(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def block(self, k: int) -> NDArray[numpy.float64]:
-        """Diagonal block of B + G of a gap."""
+    def block(self, k: int) -> NDArray[numpy.float64]: ...
 
-    def edge_openings(self, scaled: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """Evaluate C at each edge from f at all nodes, of all modes."""
+    def edge_openings(self, scaled: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def openings_by_prescribed(self) -> numpy.typing.NDArray[numpy.float64]:
-        """∂C/∂d at fixed edges."""
+    def openings_by_prescribed(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def fine_opening(self, k: int, per_wave: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """
-        Evaluate θ, T and the weight of ∫ T g dθ over T of a gap at fine nodes, and b_n.
-        """
+    def fine_opening(self, k: int, per_wave: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
-    def sum_modes(self, k: int, theta: numpy.typing.NDArray[numpy.float64], modes: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """Sum b_n sin((n+1)t), cos t = η(θ), in gap k."""
+    def sum_modes(self, k: int, theta: numpy.typing.NDArray[numpy.float64], modes: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def refine_opening(self, k: int, modes: numpy.typing.NDArray[numpy.float64], factor: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """
-        Evaluate θ and T of gap k at about `factor` times as many nodes as modes.
-        """
+    def refine_opening(self, k: int, modes: numpy.typing.NDArray[numpy.float64], factor: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
-    def work_of_gaps(self) -> float:
-        """Integrate S_full T dθ over the gaps."""
+    def work_of_gaps(self) -> float: ...
 
-def sum_pull(theta: numpy.typing.NDArray[numpy.float64], sine: numpy.typing.NDArray[numpy.float64], cosine: numpy.typing.NDArray[numpy.float64], weight: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-    """Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2."""
+def sum_pull(theta: numpy.typing.NDArray[numpy.float64], sine: numpy.typing.NDArray[numpy.float64], cosine: numpy.typing.NDArray[numpy.float64], weight: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 
-def solve_field(gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, model: FieldModel, orders: numpy.typing.NDArray[numpy.int64] | None = None) -> Field:
-    """
-    Solve the field of gaps, shape (L, 2); `orders` are those of their rules.
-    """
+def solve_field(gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, model: FieldModel, orders: numpy.typing.NDArray[numpy.int64] | None = None) -> Field: ...
 
 class ResponseSolution:
-    """All edges as a linear response has them at a prescribed value."""
-
     @property
     def motion(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
@@ -210,8 +158,6 @@ class ResponseSolution:
     def stable(self) -> bool: ...
 
 class Equilibrium:
-    """Equilibrium of all edges, if one was found."""
-
     @property
     def found(self) -> bool: ...
 
@@ -237,19 +183,14 @@ class Equilibrium:
     def slope(self) -> float: ...
 
     @property
-    def pinned_share(self) -> numpy.typing.NDArray[numpy.float64]:
-        """Place of C of pinned edges between both critical openings."""
+    def pinned_share(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def pinned_rate(self) -> numpy.typing.NDArray[numpy.float64]:
-        """Its derivative by d."""
+    def pinned_rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def solve_field(self, prescribed: float, model: FieldModel) -> Field:
-        """Solve every gap by itself in the potential of the others."""
+    def solve_field(self, prescribed: float, model: FieldModel) -> Field: ...
 
 class DescentEvent(enum.Enum):
-    """Why a descent ended."""
-
     AT_REST = 0
 
     VANISHED = 1
@@ -261,8 +202,6 @@ class DescentEvent(enum.Enum):
     OUTGROWN = 4
 
 class Descent:
-    """Result of a descent."""
-
     @property
     def event(self) -> DescentEvent: ...
 
@@ -276,13 +215,9 @@ class Descent:
     def raced(self) -> bool: ...
 
 class Running:
-    """What a descent knows of the way that its edges have come."""
-
     def __init__(self, start: numpy.typing.NDArray[numpy.float64]) -> None: ...
 
 class LinearResponse:
-    """Linear response of all gaps and their edges."""
-
     @property
     def gap_count(self) -> int: ...
 
@@ -290,105 +225,65 @@ class LinearResponse:
     def orders(self) -> numpy.typing.NDArray[numpy.int64]: ...
 
     @property
-    def opening(self) -> numpy.typing.NDArray[numpy.float64]:
-        """C of every edge in its reference."""
+    def opening(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def potential(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """Potentials of the last solution without p, and with a unit of p."""
+    def potential(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
     @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues."""
+    def negative(self) -> int: ...
 
     @property
-    def charges(self) -> numpy.typing.NDArray[numpy.int64]:
-        """Number of charges of every run of the tree of gaps."""
+    def charges(self) -> numpy.typing.NDArray[numpy.int64]: ...
 
-    def update(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, least: numpy.typing.NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
-        """Set up a response of gaps of which most are those of this one."""
+    def update(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, least: numpy.typing.NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None: ...
 
-    def count_unknown(self, gaps: numpy.typing.NDArray[numpy.float64], law: EdgeLaw, model: FieldModel) -> int:
-        """Count the gaps that `update` would not take over."""
+    def count_unknown(self, gaps: numpy.typing.NDArray[numpy.float64], law: EdgeLaw, model: FieldModel) -> int: ...
 
-    def settle(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, law: EdgeLaw, model: FieldModel) -> bool:
-        """Renew the response for a known equilibrium; False if it is outgrown."""
+    def settle(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, law: EdgeLaw, model: FieldModel) -> bool: ...
 
     def solve(self, prescribed: float, law: EdgeLaw, model: FieldModel) -> ResponseSolution: ...
 
-    def solve_separately(self, gaps: numpy.typing.NDArray[numpy.float64], pressure: float, prescribed: float, model: FieldModel) -> Field:
-        """Solve every gap by itself in the potential of the last solution."""
+    def solve_separately(self, gaps: numpy.typing.NDArray[numpy.float64], pressure: float, prescribed: float, model: FieldModel) -> Field: ...
 
-    def tangent_between(self, gaps: numpy.typing.NDArray[numpy.float64], edges: numpy.typing.NDArray[numpy.int64], prescribed: float, law: EdgeLaw, model: FieldModel) -> NDArray[numpy.float64]:
-        """
-        Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.
+    def tangent_between(self, gaps: numpy.typing.NDArray[numpy.float64], edges: numpy.typing.NDArray[numpy.int64], prescribed: float, law: EdgeLaw, model: FieldModel) -> NDArray[numpy.float64]: ...
 
-        All others follow, but those at their memory, which are pinned.
-        """
+    def find_equilibrium(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, reach: float, strict: bool, law: EdgeLaw, model: FieldModel) -> Equilibrium: ...
 
-    def find_equilibrium(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, reach: float, strict: bool, law: EdgeLaw, model: FieldModel) -> Equilibrium:
-        """Find the equilibrium next to these gaps by Newton's iteration."""
+    def descend(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, most: int, equal_speeds: bool, running: Running, law: EdgeLaw, model: FieldModel) -> Descent: ...
 
-    def descend(self, gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, most: int, equal_speeds: bool, running: Running, law: EdgeLaw, model: FieldModel) -> Descent:
-        """Descend in energy until an event."""
-
-def set_up_response(gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, least: numpy.typing.NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None:
-    """
-    Solve the field of these gaps, and linearise about it; None if they have none.
-    """
+def set_up_response(gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, least: numpy.typing.NDArray[numpy.int64] | None, law: EdgeLaw, model: FieldModel) -> LinearResponse | None: ...
 
 class SearchLengths:
-    """Lengths of a search for touches, in 1/q0."""
-
     def __init__(self, *, wave: float, closing_per_motion: float, surface: float, narrowest: float, widest: float) -> None: ...
 
-    def seed_widths(self, curvature: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """Compute the widths of seeds at touches with these curvatures."""
+    def seed_widths(self, curvature: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 
-    def clearances(self, opening: numpy.typing.NDArray[numpy.float64], curvature: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Compute the opening left at minima before a seed is put; not positive at a touch.
-        """
+    def clearances(self, opening: numpy.typing.NDArray[numpy.float64], curvature: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 
 class SearchedGaps:
-    """Gaps as they were when they were last searched; a copy has none."""
-
     def __init__(self) -> None: ...
 
     def __getstate__(self) -> int: ...
 
     def __setstate__(self, arg: int, /) -> None: ...
 
-def search(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> tuple[float, int, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]], SearchedGaps]:
-    """
-    Find the least clearance of a field, searching only gaps that may have closed.
+def search(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> tuple[float, int, tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]], SearchedGaps]: ...
 
-    Also returns the number of these gaps, their minima (positions, openings and curvatures), and the updated searched gaps.
-    """
+def clearance_left(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> numpy.typing.NDArray[numpy.float64]: ...
 
-def clearance_left(field: Field, searched: SearchedGaps, lengths: SearchLengths) -> numpy.typing.NDArray[numpy.float64]:
-    """Bound the clearance left in each gap from below."""
-
-def least_clearances(field: Field, gaps: numpy.typing.NDArray[numpy.int64], lengths: SearchLengths) -> numpy.typing.NDArray[numpy.float64]:
-    """Find the least clearance of some gaps."""
+def least_clearances(field: Field, gaps: numpy.typing.NDArray[numpy.int64], lengths: SearchLengths) -> numpy.typing.NDArray[numpy.float64]: ...
 
 class TwoPoints:
-    """Two points of a branch, `way` apart in d."""
-
     def __init__(self, gaps: numpy.typing.NDArray[numpy.float64], rate: numpy.typing.NDArray[numpy.float64], gaps_before: numpy.typing.NDArray[numpy.float64], rate_before: numpy.typing.NDArray[numpy.float64], way: float) -> None: ...
 
-    def leading_edge(self) -> LeadingEdge:
-        """Find the leading edge, and the fold ahead."""
+    def leading_edge(self) -> LeadingEdge: ...
 
-    def other_fold(self, leading: int) -> OtherFold:
-        """Find the nearest fold ahead that other gaps lead to."""
+    def other_fold(self, leading: int) -> OtherFold: ...
 
-    def predict_gaps(self, on: float, leading: LeadingEdge) -> NDArray[numpy.float64]:
-        """Predict the gaps at a distance `on` in d."""
+    def predict_gaps(self, on: float, leading: LeadingEdge) -> NDArray[numpy.float64]: ...
 
 class LeadingEdge:
-    """The edge that leads, and d along its motion."""
-
     @property
     def edge(self) -> int: ...
 
@@ -414,67 +309,39 @@ class LeadingEdge:
     def fold_distance(self) -> float: ...
 
 class OtherFold:
-    """Fold that others lead to than the leading edge."""
-
     def __init__(self) -> None: ...
 
     @property
-    def edge(self) -> int:
-        """-1 for none."""
+    def edge(self) -> int: ...
 
     @property
-    def distance(self) -> float:
-        """In d; infinite for none."""
+    def distance(self) -> float: ...
 
-def dot(a: NDArray[numpy.float64], b: NDArray[numpy.float64]) -> float:
-    """Sum a_i b_i, in an order that depends on their number alone."""
+def dot(a: numpy.typing.NDArray[numpy.float64], b: numpy.typing.NDArray[numpy.float64]) -> float: ...
 
-def total(values: NDArray[numpy.float64]) -> float:
-    """Sum the values, in an order that depends on their number alone."""
+def total(values: numpy.typing.NDArray[numpy.float64]) -> float: ...
 
-def restrict(values: NDArray[numpy.float64], inside: NDArray[numpy.float64]) -> bool:
-    """
-    Set the values outside Ω to zero, in place; returns whether they all were.
-    """
+def restrict(values: numpy.typing.NDArray[numpy.float64], inside: numpy.typing.NDArray[numpy.float64]) -> bool: ...
 
-def residual_inside(target: NDArray[numpy.float64], displacement: NDArray[numpy.float64], inside: NDArray[numpy.float64], out: NDArray[numpy.float64]) -> float:
-    """
-    Compute the residual on Ω, zero elsewhere; returns the largest absolute one.
-    """
+def residual_inside(target: numpy.typing.NDArray[numpy.float64], displacement: numpy.typing.NDArray[numpy.float64], inside: numpy.typing.NDArray[numpy.float64], out: numpy.typing.NDArray[numpy.float64]) -> float: ...
 
-def update_direction(direction: NDArray[numpy.float64], inside: NDArray[numpy.float64], correction: NDArray[numpy.float64], factor: float) -> None:
-    """
-    Set the next search direction: the correction on Ω plus `factor` times the last one.
-    """
+def update_direction(direction: numpy.typing.NDArray[numpy.float64], inside: numpy.typing.NDArray[numpy.float64], correction: numpy.typing.NDArray[numpy.float64], factor: float) -> None: ...
 
-def advance(stress: NDArray[numpy.float64], displacement: NDArray[numpy.float64], residual: NDArray[numpy.float64], direction: NDArray[numpy.float64], response: NDArray[numpy.float64], inside: NDArray[numpy.float64], step: float) -> float:
-    """
-    Take a step along the direction; returns the largest absolute residual on Ω.
-    """
+def advance(stress: numpy.typing.NDArray[numpy.float64], displacement: numpy.typing.NDArray[numpy.float64], residual: numpy.typing.NDArray[numpy.float64], direction: numpy.typing.NDArray[numpy.float64], response: numpy.typing.NDArray[numpy.float64], inside: numpy.typing.NDArray[numpy.float64], step: float) -> float: ...
 
-def inverse_form(matrix: NDArray[numpy.float64], vector: NDArray[numpy.float64]) -> float:
-    """Return bᵀA⁻¹b for a symmetric positive definite A; overwrites A."""
+def inverse_form(matrix: numpy.typing.NDArray[numpy.float64], vector: numpy.typing.NDArray[numpy.float64]) -> float: ...
 
-def pair_runs(count: int) -> list[list[int]]:
-    """
-    Pair neighbouring runs of gaps, level by level: the halves of every run.
-    """
+def pair_runs(count: int) -> list[list[int]]: ...
 
-def pair_again(known: Sequence[Sequence[int]], source: numpy.typing.NDArray[numpy.int64]) -> tuple[list[list[int]], numpy.typing.NDArray[numpy.int64]]:
-    """Pair the runs of gaps most of which are those of known halves."""
+def pair_again(known: Sequence[Sequence[int]], source: numpy.typing.NDArray[numpy.int64]) -> tuple[list[list[int]], numpy.typing.NDArray[numpy.int64]]: ...
 
-def count_negative(h: numpy.typing.NDArray[numpy.float64], r: numpy.typing.NDArray[numpy.float64]) -> int:
-    """Count the negative eigenvalues of [[h, 1], [1, r]]."""
+def count_negative(h: numpy.typing.NDArray[numpy.float64], r: numpy.typing.NDArray[numpy.float64]) -> int: ...
 
-def local_minima(theta: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-    """Find local minima where θ falls: position, value, its error."""
+def local_minima(theta: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]: ...
 
-def on_new_tree(response: LinearResponse, prescribed: float, law: EdgeLaw, model: FieldModel) -> LinearResponse:
-    """Solve a response on a tree that is built anew."""
+def on_new_tree(response: LinearResponse, prescribed: float, law: EdgeLaw, model: FieldModel) -> LinearResponse: ...
 
 class EdgeModel:
-    """Model of the edge openings about solved edges."""
-
     def __init__(self, edges: numpy.typing.NDArray[numpy.int64], gaps: numpy.typing.NDArray[numpy.float64], residual: numpy.typing.NDArray[numpy.float64], tangent: numpy.typing.NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> None: ...
 
     @property
@@ -492,14 +359,11 @@ class EdgeModel:
     @property
     def hessian(self) -> NDArray[numpy.float64]: ...
 
-    def advance(self, step: numpy.typing.NDArray[numpy.float64]) -> None:
-        """Move the edges outwards by these steps."""
+    def advance(self, step: numpy.typing.NDArray[numpy.float64]) -> None: ...
 
     def flow(self, limit: numpy.typing.NDArray[numpy.float64], equal_speeds: bool, is_long: bool, strongest: float, law: EdgeLaw) -> ModelFlow: ...
 
 class ModelFlow:
-    """Flow through the model."""
-
     def __init__(self, motion: numpy.typing.NDArray[numpy.float64], opening: numpy.typing.NDArray[numpy.float64], lengths: numpy.typing.NDArray[numpy.float64], residuals: Sequence[numpy.typing.NDArray[numpy.float64]]) -> None: ...
 
     @property
@@ -508,13 +372,9 @@ class ModelFlow:
     @property
     def lengths(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
-def implicit_step(hessian: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], longest: float, equal_speeds: bool) -> numpy.typing.NDArray[numpy.float64]:
-    """Take a linearly implicit step."""
+def implicit_step(hessian: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64], longest: float, equal_speeds: bool) -> numpy.typing.NDArray[numpy.float64]: ...
 
-def distance_to_minimum(hessian: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64]) -> float:
-    """
-    Compute the largest motion to the minimum of a quadratic model; infinite without one.
-    """
+def distance_to_minimum(hessian: numpy.typing.NDArray[numpy.float64], force: numpy.typing.NDArray[numpy.float64]) -> float: ...
 
 def model_error(flow: ModelFlow, residual: numpy.typing.NDArray[numpy.float64], edges: numpy.typing.NDArray[numpy.int64], gaps: numpy.typing.NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> float: ...
 

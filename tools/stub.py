@@ -16,8 +16,8 @@ PATH = Path(__file__).resolve().parent.parent / "adhesis" / "solver" / "_kernels
 
 
 def stub() -> str:
-    """Return the types of the module: of arrays those of their numbers, and of constants alone."""
-    generator = StubGen(_kernels)
+    """Return the types of the module: of arrays those of their numbers, of constants alone."""
+    generator = StubGen(_kernels, include_docstrings=False)
     generator.put(_kernels)
     text = re.sub(r"^([A-Z_]+: \w+) = .*$", r"\1", generator.get(), flags=re.MULTILINE)
     return re.sub(r"Annotated\[(NDArray\[[a-z0-9.]+\]), dict\([^)]*\)\]", r"\1", text)

@@ -39,9 +39,7 @@ namespace {
 
 template <class Number>
 using Output = nb::ndarray<nb::numpy, Number>;
-using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
-using Changed = nb::ndarray<double, nb::c_contig, nb::device::cpu>;  // in place
-constexpr auto new_array = nb::rv_policy::automatic;                 // a property's
+constexpr auto new_array = nb::rv_policy::automatic;  // a property's
 using Unlocked = nb::call_guard<nb::gil_scoped_release>;
 
 // Hand numbers over to numpy, without a copy; to one dimension unless a shape is given.
@@ -81,6 +79,20 @@ struct ArrayCaster {
   static handle from_cpp(const Vector& values, rv_policy, cleanup_list* cleanup) noexcept {
     auto out = adhesis::hand_over(std::vector<Number>(values.begin(), values.end()));
     return make_caster<decltype(out)>::from_cpp(out, rv_policy::automatic, cleanup);
+  }
+};
+
+// Numbers that are read, or changed in place, where they are.
+template <class Number>
+struct type_caster<std::span<Number>> {
+  NB_TYPE_CASTER(std::span<Number>, const_name("numpy.typing.NDArray[numpy.float64]"))
+  make_caster<ndarray<Number, c_contig, device::cpu>> array;
+
+  bool from_python(handle from, uint32_t flags, cleanup_list* cleanup) noexcept {
+    if (!std::is_const_v<Number>) flags &= ~uint32_t(cast_flags::convert);
+    if (!array.from_python(from, flags, cleanup)) return false;
+    value = {array.value.data(), array.value.size()};
+    return true;
   }
 };
 
@@ -536,51 +548,22 @@ void bind_predictor(nb::module_& m) {
 
 void bind_grid(nb::module_& m) {
   m.def(
-      "dot", [](const Array& a, const Array& b) { return dot(a.data(), b.data(), int(a.size())); },
-      "a"_a, "b"_a, "Sum a_i b_i, in an order that depends on their number alone.");
-  m.def(
-      "total", [](const Array& values) { return total(values.data(), int(values.size())); },
-      "values"_a, "Sum the values, in an order that depends on their number alone.");
-  m.def(
-      "restrict",
-      [](Changed values, const Array& inside) {
-        return restrict_inside(values.data(), inside.data(), int(values.size()));
-      },
-      "values"_a.noconvert(), "inside"_a,
-      "Set the values outside Ω to zero, in place; returns whether they all were.");
-  m.def(
-      "residual_inside",
-      [](const Array& target, const Array& displacement, const Array& inside, Changed out) {
-        return residual_inside(target.data(), displacement.data(), inside.data(), out.data(),
-                               int(out.size()));
-      },
-      "target"_a, "displacement"_a, "inside"_a, "out"_a.noconvert(),
-      "Compute the residual on Ω, zero elsewhere; returns the largest absolute one.");
-  m.def(
-      "update_direction",
-      [](Changed direction, const Array& inside, const Array& correction, double factor) {
-        update_direction(direction.data(), inside.data(), correction.data(), factor,
-                         int(direction.size()));
-      },
-      "direction"_a.noconvert(), "inside"_a, "correction"_a, "factor"_a,
-      "Set the next search direction: the correction on Ω plus `factor` times the last one.");
-  m.def(
-      "advance",
-      [](Changed stress, Changed displacement, Changed residual, const Array& direction,
-         const Array& response, const Array& inside, double step) {
-        return advance({stress.data(), displacement.data(), residual.data()}, direction.data(),
-                       response.data(), inside.data(), step, int(stress.size()));
-      },
-      "stress"_a.noconvert(), "displacement"_a.noconvert(), "residual"_a.noconvert(), "direction"_a,
-      "response"_a, "inside"_a, "step"_a,
-      "Take a step along the direction; returns the largest absolute residual on Ω.");
-  m.def(
-      "inverse_form",
-      [](Changed matrix, const Array& vector) {
-        return inverse_form(matrix.data(), vector.data(), int(vector.size()));
-      },
-      "matrix"_a.noconvert(), "vector"_a,
-      "Return bᵀA⁻¹b for a symmetric positive definite A; overwrites A.");
+      "dot", [](Numbers a, Numbers b) { return dot(a.data(), b.data(), int(a.size())); }, "a"_a,
+      "b"_a, "Sum a_i b_i, in an order that depends on their number alone.");
+  m.def("total", &total, "values"_a,
+        "Sum the values, in an order that depends on their number alone.");
+  m.def("restrict", &restrict_inside, "values"_a, "inside"_a,
+        "Set the values outside Ω to zero, in place; returns whether they all were.");
+  m.def("residual_inside", &residual_inside, "target"_a, "displacement"_a, "inside"_a, "out"_a,
+        "Compute the residual on Ω, zero elsewhere; returns the largest absolute one.");
+  m.def("update_direction", &update_direction, "direction"_a, "inside"_a, "correction"_a,
+        "factor"_a,
+        "Set the next search direction: the correction on Ω plus `factor` times the last one.");
+  m.def("advance", &advance, "stress"_a, "displacement"_a, "residual"_a, "direction"_a,
+        "response"_a, "inside"_a, "step"_a,
+        "Take a step along the direction; returns the largest absolute residual on Ω.");
+  m.def("inverse_form", &inverse_form, "matrix"_a, "vector"_a,
+        "Return bᵀA⁻¹b for a symmetric positive definite A; overwrites A.");
 }
 
 // Single parts, for their tests.

@@ -43,7 +43,7 @@ double clearance_since(const Field& field, int k, const SearchedGap& was,
     // a minimum may appear at any node, but hardly beside the ends
     if (std::min(here - gap.end[0], gap.end[1] - here) > within) {
       none_inside = false;
-      const double rest = expected - CLOSING_SAFETY * std::max(closing, 0.0) - by_edges;
+      const double rest = expected - std::max(closing, 0.0) - by_edges;
       if (!(rest > CLEARANCE_LEFT * expected)) return -1;
     } else if (opening[i] < 0 && 0 <= expected) {
       return -1;
@@ -51,7 +51,7 @@ double clearance_since(const Field& field, int k, const SearchedGap& was,
   }
   double clearance = was.clearance;
   if (clearance == infinity && none_inside) clearance = most;
-  const double rest = clearance - CLOSING_SAFETY * closed - by_edges;
+  const double rest = clearance - closed - by_edges;
   if (clearance < infinity && !(rest > CLEARANCE_LEFT * clearance)) return -1;
   return was.clearance < infinity ? rest : infinity;
 }

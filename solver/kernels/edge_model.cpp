@@ -175,9 +175,9 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
   Matrix hessian(count);
   Vector force(count);
   const double longest = (is_long ? 1 : MODEL_SHORT_STEP) * law.longest_step;
-  double length = 0, share = 1, first = 0, shortest = RUNNING_ENDS * law.longest_step;
-  for (double own : limit) shortest = std::min(shortest, RUNNING_ENDS * own);
-  while (int(out.lengths.size()) < MODEL_STEPS && share == 1) {
+  double length = 0, share = 1, first = 0, shortest = law.rest_step;
+  for (double own : limit) shortest = std::min(shortest, law.rest_step * own / law.longest_step);
+  while (share == 1) {
     model.forces(force);
     const double total = norm(force);
     strongest = std::max(strongest, total);
@@ -186,8 +186,8 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
     model.hessian(hessian);
     Vector step = implicit_step(hessian, force, longest, equal_speeds);
     if (law.pinning > 0) stop_at_memory(model, force, step, law);
-    if (!(largest(step) > shortest) &&
-        (distance_to_minimum(hessian, force) <= shortest || total < law.force_error))
+    if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
+                                        total < law.force_error || largest(step) == 0))
       break;
     share = share_within(model, step, limit);
     if (share < 1)

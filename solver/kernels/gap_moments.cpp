@@ -203,10 +203,9 @@ void place_short_gap(const Gap& gap, int modes, int fields, const Panels& panels
 void place_moment_nodes(const Gap& gap, int modes, int fields, const Panels& panels,
                         MomentNodes& nodes) {
   const double width = panels.width;
-  if (gap.length() <= SHORT_GAP_PANELS * width)
-    return place_short_gap(gap, modes, fields, panels, nodes);
   long first = long(std::floor(gap.end[0] / width)) + 2;  // end pieces are one to two panels long
   long last = long(std::ceil(gap.end[1] / width)) - 2;
+  if (last < first) return place_short_gap(gap, modes, fields, panels, nodes);  // they would meet
   std::vector<Tile> tiles = tile_gap(gap, first, last, modes, panels);
   const int most = most_end_nodes(gap, panels) + int(tiles.size()) * panels.nodes();
   nodes.begin(most + 4, fields);

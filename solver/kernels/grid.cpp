@@ -2,12 +2,13 @@
 
 namespace adhesis {
 
-double total(const double* values, int n) {
+double total(Numbers values) {
+  const int n = int(values.size());
   Four even = {}, odd = {};
   int i = 0;
   for (; i + 8 <= n; i += 8) {
-    even += load_four(values + i);
-    odd += load_four(values + i + 4);
+    even += load_four(&values[i]);
+    odd += load_four(&values[i + 4]);
   }
   const Four both = even + odd;
   double out = (both[0] + both[1]) + (both[2] + both[3]);
@@ -15,9 +16,9 @@ double total(const double* values, int n) {
   return out;
 }
 
-bool restrict_inside(double* values, const double* inside, int n) {
+bool restrict_inside(Changed values, Numbers inside) {
   bool was = true;
-  for (int i = 0; i < n; ++i) {
+  for (size_t i = 0; i < values.size(); ++i) {
     if (inside[i] == 0 && values[i] != 0) {
       values[i] = 0;
       was = false;
@@ -26,35 +27,35 @@ bool restrict_inside(double* values, const double* inside, int n) {
   return was;
 }
 
-double residual_inside(const double* target, const double* displacement, const double* inside,
-                       double* out, int n) {
+double residual_inside(Numbers target, Numbers displacement, Numbers inside, Changed out) {
   double most = 0;
-  for (int i = 0; i < n; ++i) {
+  for (size_t i = 0; i < out.size(); ++i) {
     out[i] = (target[i] - displacement[i]) * inside[i];
     most = std::max(most, std::abs(out[i]));
   }
   return most;
 }
 
-void update_direction(double* direction, const double* inside, const double* correction,
-                      double factor, int n) {
-  for (int i = 0; i < n; ++i) direction[i] = inside[i] * correction[i] + factor * direction[i];
+void update_direction(Changed direction, Numbers inside, Numbers correction, double factor) {
+  for (size_t i = 0; i < direction.size(); ++i)
+    direction[i] = inside[i] * correction[i] + factor * direction[i];
 }
 
-double advance(GridState state, const double* direction, const double* response,
-               const double* inside, double step, int n) {
+double advance(Changed stress, Changed displacement, Changed residual, Numbers direction,
+               Numbers response, Numbers inside, double step) {
   double most = 0;
-  for (int i = 0; i < n; ++i) {
-    state.stress[i] += step * direction[i];
-    state.displacement[i] += step * response[i];
-    state.residual[i] -= step * response[i] * inside[i];
-    most = std::max(most, std::abs(state.residual[i]));
+  for (size_t i = 0; i < stress.size(); ++i) {
+    stress[i] += step * direction[i];
+    displacement[i] += step * response[i];
+    residual[i] -= step * response[i] * inside[i];
+    most = std::max(most, std::abs(residual[i]));
   }
   return most;
 }
 
-double inverse_form(double* matrix, const double* vector, int n) {
-  double sum = 0;
+double inverse_form(Changed values, Numbers vector) {
+  const int n = int(vector.size());
+  double *matrix = values.data(), sum = 0;
   Vector y(n);
   for (int i = 0; i < n; ++i) {
     double* row = matrix + i * n;

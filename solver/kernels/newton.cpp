@@ -68,7 +68,6 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
   const int edges = int(ends.size());
   Equilibrium out;
   Flags pinned = at_memory(ends, law);
-  const int most = MOST_CORRECTIONS * (law.pinning > 0 ? PINNED_CORRECTIONS : 1);
   Vector travelled(edges), step(edges), moved(edges);
   double last = infinity;
   bool judged_again = false;
@@ -86,7 +85,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     if (law.pinning > 0) {
       const Vector before = ends;
       ends = pin_edges(response, ends, pinned, out.at, law, model);
-      if (ends != before && out.corrections < most) {
+      if (ends != before && out.corrections < MOST_CORRECTIONS) {
         last = infinity;
         continue;
       }
@@ -103,9 +102,9 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
       moved[e] = response.nodes.gaps[e / 2].end[e % 2] + outwards(e) * out.at.motion[e];
     }
     const double size = largest(step);
-    const bool stalled = size <= law.field_error && size > STALLED_SHARE * last;
+    const bool stalled = size <= law.field_error && size > NEWTON_SHRINKS * last;
     // not written as > : a size that is no number is a failure, too
-    const double longest = std::max(HIERARCHICAL_NEWTON_GROWTH * last, law.rest_step);
+    const double longest = std::max(NEWTON_SHRINKS * last, law.rest_step);
     const bool within = size <= std::min(reach, longest);
     if (!(within && largest(travelled) <= reach && shortest_length(moved) > 0)) break;
     ends = moved;
@@ -114,7 +113,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
       out.found = true;
       break;
     }
-    if (out.corrections >= most) break;
+    if (out.corrections >= MOST_CORRECTIONS) break;
     last = size;
   }
   out.potential = response.potential_at(pressure);

@@ -143,7 +143,7 @@ double work_of_gaps(const Field& field) {
   double total = 0;
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const int m = nodes.size_of(k);
-    const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, ENERGY_NODES);
+    const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, SHAPE_NODES);
     const FineOpening fine = fine_moments(nodes.gaps[k], *circle_of(count + 1), panels);
     for (int n = m; n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);
   }
@@ -159,9 +159,7 @@ std::vector<Minimum> find_minima(const Field& field, const Integers& gaps) {
     const int count = count_sine_nodes(gap, field.nodes.size_of(k), top, SHAPE_NODES);
     const FineOpening fine = open_gap(field, k, *circle_of(count + 1));
     for (Candidate minimum : local_minima(fine.theta, fine.opening)) {
-      const double low = MINIMUM_IS_LOW * minimum.half * minimum.width * minimum.width;
-      if (minimum.opening < std::max(low, MINIMUM_DOUBT * minimum.error))
-        refine(gap, fine.modes, minimum);
+      if (minimum.opening < MINIMUM_DOUBT * minimum.error) refine(gap, fine.modes, minimum);
       out.push_back({minimum.theta, minimum.opening, 2 * minimum.half, k});
     }
   }

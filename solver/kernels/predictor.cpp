@@ -25,7 +25,7 @@ LeadingEdge follow_edge(int edge, const TwoPoints& points, double fastest) {
   const double root = std::sqrt(out.square * out.square - 3 * out.cube * here);
   if (root > out.square) {
     const double fold = here / (root - out.square);
-    if (fold < CUBIC_TRUSTED) {
+    if (fold < PREDICTION_TRUSTED) {
       out.fold = fold;
       out.fold_distance = std::abs(points.way) * polynomial(out, fold);
       return out;

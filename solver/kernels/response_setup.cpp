@@ -137,9 +137,6 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
   const auto fresh = std::count_if(source.begin(), source.end(), [](int k) { return k < 0; });
   if (!in_order(gaps) || double(fresh) > REFERENCE_MOST_FAR * count)
     return set_up_response(ends, prescribed, least, law, model);
-  const int most = int(gauss_rules().size()) - 1;
-  for (int k = 0; k < count; ++k)  // a gap that has changed is likely to change again
-    if (source[k] < 0) orders[k] = std::min(orders[k] + FURTHER_ORDERS, most);
   raise_orders(orders, least);
   for (int k = 0; k < count; ++k) {
     if (source[k] < 0) continue;
@@ -158,7 +155,7 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
   Integers rank(same.size(), 0);
   for (size_t run = 0; run < same.size(); ++run)
     if (same[run] >= 0) rank[run] = known.tree.runs[same[run]].rank;
-  Tree tree(nodes, halves, rank, FURTHER_CHARGES * model.digits);
+  Tree tree(nodes, halves, rank, model.digits);
   for (int k = 0; k < count; ++k) {
     const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     for (int i = 0; i < nodes.size_of(k); ++i) {

@@ -11,10 +11,6 @@ namespace adhesis {
 
 // ---------------------------------------------------------------- field of given edges
 
-// Finest panels (at most λ_min/2 each). A shorter gap is integrated by one Gauss rule: its end
-// pieces, one to two panels each, would meet.
-inline constexpr double SHORT_GAP_PANELS = 4;
-
 // Radians of the highest Chebyshev mode over one panel: 8 to 14 Gauss nodes resolve half a wave.
 inline constexpr double PANEL_PHASE = 3.0;
 
@@ -25,10 +21,7 @@ inline constexpr double CHARGE_MARGIN = 1.0;
 // run at an accuracy of 1e-14, and of 1e-17 at 1e-5.
 inline constexpr int MOST_CHARGES = 160;
 
-// Sine nodes per λ_min for the energy: two resolve the shortest wave, the rest is margin.
-inline constexpr double ENERGY_NODES = 3.0;
-
-// Sine nodes per λ_min that bracket every local minimum of an opening.
+// Sine nodes per λ_min that bracket every local minimum of an opening, and for the energy.
 inline constexpr double SHAPE_NODES = 6.0;
 
 // Sine nodes of a gap beyond those by its length, for its ends.
@@ -36,23 +29,19 @@ inline constexpr int FEWEST_SINE_NODES = 64;
 
 // ---------------------------------------------------------------- equilibrium of the edges
 
-// Corrections by Newton's iteration before an equilibrium counts as lost.
-inline constexpr int MOST_CORRECTIONS = 8;
-
-// Times as many with two works of adhesion, where edges begin to move and are pinned on the way.
-inline constexpr int PINNED_CORRECTIONS = 4;
+// Corrections by Newton's iteration before an equilibrium counts as lost: many where edges with two
+// works of adhesion begin to move and are pinned on the way.
+inline constexpr int MOST_CORRECTIONS = 32;
 
 // Errors of a force by the field, by which the opening of a pinned edge may lie outside of both
 // critical ones: where a path turns back those of edges that moved are as accurate as that.
 inline constexpr double PINNED_SLACK = 100.0;
 
-// Share of the last correction. One that is no smaller, and below EdgeLaw.field_error, goes to
-// and fro across a step of the field, where panels or modes change: the iteration ends.
-inline constexpr double STALLED_SHARE = 0.3;
-
 // Share of the last correction. An iteration that shrinks less is given up early. Corrections no
-// longer than EdgeLaw.rest_step are not judged so: the error of references takes part in them.
-inline constexpr double HIERARCHICAL_NEWTON_GROWTH = 0.7;
+// longer than EdgeLaw.rest_step are not judged so: the error of references takes part in them. One
+// that shrinks less below EdgeLaw.field_error goes to and fro across a step of the field, where
+// panels or modes change: there the iteration ends.
+inline constexpr double NEWTON_SHRINKS = 0.7;
 
 // Share of a gap or patch by which one step of one edge may shorten it; of the last gap of a period
 // that to which it may still shrink.
@@ -83,24 +72,20 @@ inline constexpr double SOFT_EDGE = 6.0;
 inline constexpr double UNBALANCED = 0.01;
 
 // Share of a gap or patch beyond which the potential in the old gap is not taken for that in the
-// new one. At 0.3, 53 of 857 failures of Newton's iteration were of states that dense matrices
-// find (γ = 0.0025 at the paper's scale), at 0.1 eight.
+// new one. At 0.3, 53 of 857 failures of Newton's iteration were of states that dense matrices find
+// (γ = 0.0025 at the paper's scale), at 0.1 eight.
 inline constexpr double REFERENCE_FAR = 0.1;
+
+// Share of a patch by which it may change before the nodes beside it are placed anew. With half of
+// it rates after some gaps had been moved by 0.1 λ_min and back were wrong by 1.2e-3.
+inline constexpr double REFERENCE_PATCH = 0.2;
 
 // Share of all gaps that may move so far before all are solved anew.
 inline constexpr double REFERENCE_MOST_FAR = 0.25;
 
-// Gaps: fewer count as so many for that.
+// Gaps: fewer count as so many for that. Without it each step of a descent of few gaps begins anew,
+// and knows nothing of the error of the one before: some never ended.
 inline constexpr int FEW_REFERENCES = 8;
-
-// Share of a patch by which it may change before the nodes beside it are placed anew.
-inline constexpr double REFERENCE_PATCH = 0.2;
-
-// Orders by which the rule of a gap that has changed is raised beyond what it needs.
-inline constexpr int FURTHER_ORDERS = 2;
-
-// Factor on the charges of the runs that hold such a gap.
-inline constexpr double FURTHER_CHARGES = 1.25;
 
 // ---------------------------------------------------------------- sizes of steps
 
@@ -122,12 +107,13 @@ inline constexpr double HELD_BACK = 0.03;
 // Longest steps (0.6 λ_min) that the first step of a flow through the model may go.
 inline constexpr double FIRST_REACH = 12.0;
 
-// Longest steps (0.1 λ_min); where the model is wrong sooner the next step is a short one.
-inline constexpr double LEAST_REACH = 2.0;
-
 // Of the reach at which the error would be what is allowed: that of a tangent grows as its
 // square.
 inline constexpr double REACH_SAFETY = 0.8;
+
+// Share of a gap or patch by which each of its edges may shorten it in a long step: with that of
+// short steps descents took a tenth more of them.
+inline constexpr double LONG_CLOSING = 0.45;
 
 // C_c on a flat piece. Error of an opening of the model that is allowed in balance. With a
 // fiftieth of it a descent over 20 λ_min took 32 fields instead of 9, and ended alike.
@@ -143,15 +129,6 @@ inline constexpr double FORCES_FELL = 8.0;
 
 // Of the distance of an opening from its critical value: the error that is allowed in addition.
 inline constexpr double MODEL_SHARE = 0.1;
-
-// Share of a gap or patch by which each of its edges may shorten it in a long step.
-inline constexpr double LONG_CLOSING = 0.45;
-
-// Steps through the model in one step of a descent.
-inline constexpr int MODEL_STEPS = 200;
-
-// Longest steps; a shorter one ends the flow through the model.
-inline constexpr double RUNNING_ENDS = 0.01;
 
 // Longest steps; edges that Newton's step of all edges, or the model, moves further run.
 inline constexpr double FOLLOWING = 0.2;
@@ -176,19 +153,13 @@ inline constexpr double FURTHEST_FOLLOWING = 5.0;
 // a loss of 30 patches was wrong by 1.6 %, unmarked.
 inline constexpr double COMPARABLE = 0.3;
 
-// Safety factor on the closing that the nodes of the field show.
-inline constexpr double CLOSING_SAFETY = 1.5;
-
-// Share of a clearance that must surely be left, else the gap is searched again.
-inline constexpr double CLEARANCE_LEFT = 0.3;
+// Share of a clearance that must be left by the nodes of the field, else the gap is searched again.
+inline constexpr double CLEARANCE_LEFT = 0.5;
 
 // λ_min. Nearer to the ends of a gap openings are small; only a negative one is looked at.
 inline constexpr double NO_MINIMUM_WITHIN = 0.12;
 
-// Of the parabola's rise over its half-width: lower minima are located more finely.
-inline constexpr double MINIMUM_IS_LOW = 0.1;
-
-// So many estimated errors above zero a minimum is surely open.
+// So many estimated errors above zero a minimum is surely open; lower ones are located more finely.
 inline constexpr double MINIMUM_DOUBT = 3.0;
 
 // Parabolas by which a low minimum is located, each an eighth as wide as the one before.
@@ -196,11 +167,9 @@ inline constexpr int MINIMUM_REFINEMENTS = 3;
 
 // ---------------------------------------------------------------- continuation of a branch
 
-// Distances between its points beyond which a predictor is not trusted.
-inline constexpr double PREDICTION_TRUSTED = 4.0;
-
-// Likewise for a fold of the cubic, in motions of the leading edge.
-inline constexpr double CUBIC_TRUSTED = 5.0;
+// Distances between its points, in d or of the leading edge, beyond which a predictor is not
+// trusted.
+inline constexpr double PREDICTION_TRUSTED = 5.0;
 
 // Likewise for the cubics of the other edges.
 inline constexpr double CUBIC_OF_OTHERS_TRUSTED = 1.5;

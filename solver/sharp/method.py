@@ -46,16 +46,14 @@ from adhesis.solver.sharp.tolerances import (
     FIELD_ACCURACY,
     FIELD_RESOLVES,
     FIELD_SHARE,
-    FINER_UNDER_LOAD,
     JUMP_RESOLUTION,
     LARGEST_FIELD_TOLERANCE,
     LARGEST_WORK_OF_STEP,
     LATE_DROP,
     LEAST_DROP,
-    LEAST_FIELD_TOLERANCE,
-    LEAST_JUMP_RESOLUTION,
     LONGEST_STEP,
     PLACED_BY_PROFILE,
+    ROUNDING,
     TRAPEZOID,
     WEAKNESS_POWER,
     WORK_OF_STEP,
@@ -130,25 +128,25 @@ class SharpMethod(Method):
         # Under a load s goes like a square root before a fold, and the loss of contact depends on
         # it.
         load = problem.control.is_load
-        finer = FINER_UNDER_LOAD if load else 1.0
+        finer = FIELD_ACCURACY if load else 1.0
         tolerance = FIELD_ACCURACY * accuracy * weak**2 * finer
-        tolerance = float(np.clip(tolerance, LEAST_FIELD_TOLERANCE, LARGEST_FIELD_TOLERANCE))
+        tolerance = float(np.clip(tolerance, ROUNDING, LARGEST_FIELD_TOLERANCE))
         # The profile alone fixes the position of a last gap, by openings so much smaller than C_c.
         if ratio > 0:
-            tolerance = max(min(tolerance, PLACED_BY_PROFILE / ratio), LEAST_FIELD_TOLERANCE)
+            tolerance = max(min(tolerance, PLACED_BY_PROFILE / ratio), ROUNDING)
         # Steps whose work is compared with the energy need an energy that is as exact.
         work = math.inf
         if math.isfinite(problem.strength):
             share = min(WORK_OF_STEP * weak**WEAKNESS_POWER, LARGEST_WORK_OF_STEP)
             work = share * accuracy * problem.work_of_adhesion
-            exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
+            exact = max(work / problem.full_contact_energy, ROUNDING)
             tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance, problem.measure)
         pinning = math.sqrt(1 + problem.pinning / problem.work_of_adhesion) - 1 if critical else 0.0
         device = loading_device(problem)
         self.edges = EdgeMechanics(source, critical, tolerance, device, pinning)
         self.states = States(problem, source, self.edges.count)
-        finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)
+        finest = max(FIELD_RESOLVES * tolerance, ROUNDING)
         self.resolution = Resolution(
             jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
             bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**WEAKNESS_POWER),

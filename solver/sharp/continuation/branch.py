@@ -21,11 +21,10 @@ from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
     ORDER_RESOLVED,
+    OTHER_MINIMUM,
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
-    TWO_FOLDS_SEEN,
-    UNMOVED_BY_JUMP,
     WORK_RESOLVED,
     WORK_STALLED,
 )
@@ -276,7 +275,7 @@ class Branch:
             return after
         longest = PREDICTED_MOTION * self._edges.wave
         remaining = self._target.at - before.at
-        near = UNMOVED_BY_JUMP * self._edges.wave
+        near = OTHER_MINIMUM * self._edges.wave
         for earlier in self._passed:
             if (before.at - earlier.at) * remaining <= 0 or len(earlier.gaps) != len(before.gaps):
                 continue
@@ -351,13 +350,10 @@ class Branch:
         be seen too far away.
         """
         predictor, resolution = self._predictor, self._resolution.jump
-        first = predictor.fold_distance
-        if not first < TWO_FOLDS_SEEN * resolution:
-            return
         other = predictor.other_fold()
         if math.isinf(other.distance):
             return
-        now = other.distance - first
+        now = other.distance - predictor.fold_distance
         apart, self._folds_apart = min(now, self._folds_apart), now
         self._two_folds = None
         if apart < resolution:

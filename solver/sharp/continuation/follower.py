@@ -33,7 +33,6 @@ from adhesis.solver.sharp.tolerances import (
     DESCENT_HANDS_OVER,
     EQUAL,
     LATE_REFINEMENT,
-    LEAST_REFINEMENT,
     LONGEST_STEP,
     SECOND_FOLD_DISPLACED,
 )
@@ -324,7 +323,7 @@ class Follower:
         drop = jump.jump.energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
         if late > allowed and finest > self.resolution.finest:
-            share = max(LATE_REFINEMENT * allowed / late, LEAST_REFINEMENT)
+            share = LATE_REFINEMENT * allowed / late
             return None, max(share * min(way, finest), self.resolution.finest)
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))

@@ -22,7 +22,6 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.tolerances import (
     BEYOND_FOLD,
-    LEAST_LEFT_BEFORE_FOLD,
     LEFT_BEFORE_FOLD,
 )
 
@@ -91,7 +90,7 @@ class Predictor:
             straight = abs(self.way) * most * polynomial
         else:
             straight = self.fold_distance
-        left = max(LEFT_BEFORE_FOLD * self.fold_distance, LEAST_LEFT_BEFORE_FOLD * finest)
+        left = max(LEFT_BEFORE_FOLD * self.fold_distance, BEYOND_FOLD * finest)
         return float(min(straight, self.fold_distance - left))
 
     def across(self, finest: float) -> float:

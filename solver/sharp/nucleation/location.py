@@ -20,8 +20,7 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
-    BISECTION_EVERY,
-    CLEAR_TRIALS,
+    BISECTION_AFTER,
     CLOSING_BY_MOTION,
     LONGEST_STEP,
     TRIAL_FROM_END,
@@ -207,10 +206,10 @@ def locate(
         if criterion.is_located(hit_value, abs(clear.at - hit.at) <= resolution):
             break
         share = 0.5
-        if tracked is not None and trials % BISECTION_EVERY:
+        if tracked is not None and trials % BISECTION_AFTER:
             share = tracked.next_trial(clear.at, hit.at, -0.2 * criterion.tolerance)
         # The least value may be that of another candidate than the hit: then a secant creeps.
-        elif tracked is None and np.isfinite(clear_value) and cleared < CLEAR_TRIALS:
+        elif tracked is None and np.isfinite(clear_value) and cleared < BISECTION_AFTER:
             share = secant_share(clear_value, hit_value, criterion.tolerance)
         trial = clear.at + (hit.at - clear.at) * share
         if trial in (clear.at, hit.at):  # there its value differs by the error of the field
