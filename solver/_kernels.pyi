@@ -1,5 +1,6 @@
 """Kernels of the methods sharp and grid."""
 
+from collections.abc import Callable
 import enum
 from typing import Annotated, overload
 
@@ -12,21 +13,15 @@ COMPILER: str
 class Panels:
     """The full-contact stress of a profile, compressed on panels."""
 
-    def __init__(self, *, width: float, finest_count: int, x: NDArray[numpy.float64], w: NDArray[numpy.float64], stress: NDArray[numpy.float64], slope: NDArray[numpy.float64], tilt: NDArray[numpy.float64], half_plane: NDArray[numpy.float64], weights: NDArray[numpy.float64], level_start: NDArray[numpy.int64], end_x: NDArray[numpy.float64], end_w: NDArray[numpy.float64], short_count: int, length_x: NDArray[numpy.float64], length_w: NDArray[numpy.float64], length_before: NDArray[numpy.float64], top: int) -> None: ...
+    def __init__(self, *, width: float, finest_count: int, x: NDArray[numpy.float64], w: NDArray[numpy.float64], stress: NDArray[numpy.float64], slope: NDArray[numpy.float64], tilt: NDArray[numpy.float64], pattern: NDArray[numpy.float64], half_plane: NDArray[numpy.float64], weights: NDArray[numpy.float64], level_start: NDArray[numpy.int64], end_x: NDArray[numpy.float64], end_w: NDArray[numpy.float64], short_count: int, length_x: NDArray[numpy.float64], length_w: NDArray[numpy.float64], length_before: NDArray[numpy.float64], top: int) -> None: ...
 
     def stress(self, theta: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """Evaluate S and S' at any angles."""
-
-    def measure(self, theta: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
-        """Evaluate sqrt(1 + h'²) and its θ-derivative."""
 
     def half_plane_opening(self, theta: NDArray[numpy.float64], side: int) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """
         Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.
         """
-
-    def contact_length(self, gaps: NDArray[numpy.float64]) -> float:
-        """Integrate sqrt(1 + h'²) dθ over the patches between gaps."""
 
 class LoadingDevice:
     """
@@ -55,11 +50,42 @@ class FieldModel:
     @property
     def panels(self) -> Panels: ...
 
+class Adhesion:
+    """Works of adhesion of edges; the contract is in edge_law.hpp."""
+
+    @property
+    def pins(self) -> bool: ...
+
+    @property
+    def least(self) -> float: ...
+
+    @property
+    def largest(self) -> float: ...
+
+    def work(self, theta: float, recedes: bool) -> tuple[float, float]:
+        """Evaluate w of an edge that advances or recedes at θ, and dw/dθ."""
+
+    def work_up_to(self, theta: float, recedes: bool) -> float:
+        """Integrate w dθ from 0 to θ."""
+
+    def contact_work(self, gaps: NDArray[numpy.float64], recedes: bool = False) -> float:
+        """Integrate w dθ over the patches between gaps."""
+
+class ProfileAdhesion(Adhesion):
+    """γ along the profile, and a constant ratio γ_open/γ."""
+
+    def __init__(self, panels: Panels, ratio: float = 1.0, least: float = 1.0, largest: float = 1.0) -> None: ...
+
+class PythonAdhesion(Adhesion):
+    """A law of Python functions."""
+
+    def __init__(self, pins: bool, least: float, largest: float, work: Callable[[float, bool], tuple[float, float]], work_up_to: Callable[[float, bool], float]) -> None: ...
+
 class EdgeLaw:
     """Law by which the edges move, with the tolerances of one problem."""
 
     @overload
-    def __init__(self, *, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, overlap_limit: float, force_error: float, pinning: float) -> None: ...
+    def __init__(self, *, adhesion: Adhesion, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, overlap_limit: float, force_error: float) -> None: ...
 
     @overload
     def __init__(self, arg: EdgeLaw, /) -> None: ...
@@ -113,12 +139,6 @@ class EdgeLaw:
     def force_error(self, arg: float, /) -> None: ...
 
     @property
-    def pinning(self) -> float: ...
-
-    @pinning.setter
-    def pinning(self, arg: float, /) -> None: ...
-
-    @property
     def memory(self) -> NDArray[numpy.float64]:
         """Gaps at the last state."""
 
@@ -126,12 +146,12 @@ class EdgeLaw:
     def memory(self, arg: NDArray[numpy.float64], /) -> None: ...
 
     def at_memory(self, gaps: NDArray[numpy.float64]) -> NDArray[numpy.bool_]:
-        """Mark the edges at their memory; none with one work of adhesion."""
+        """Mark the edges at their memory; none where edges are not pinned."""
 
-    def critical_of(self, gaps: NDArray[numpy.float64], opening: NDArray[numpy.float64], panels: Panels) -> NDArray[numpy.float64]:
+    def critical_of(self, gaps: NDArray[numpy.float64], opening: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
         """Compute C_c at every edge with the opening C."""
 
-    def critical_openings(self, theta: NDArray[numpy.float64], panels: Panels) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    def critical_openings(self, theta: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """Evaluate C_c of edges that advance, and its θ-derivative."""
 
 def map_gaps(gaps: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
@@ -554,6 +574,6 @@ def distance_to_minimum(hessian: NDArray[numpy.float64], force: NDArray[numpy.fl
     Compute the largest motion to the minimum of a quadratic model; infinite without one.
     """
 
-def model_error(flow: ModelFlow, residual: NDArray[numpy.float64], edges: NDArray[numpy.int64], gaps: NDArray[numpy.float64], law: EdgeLaw, panels: Panels) -> float: ...
+def model_error(flow: ModelFlow, residual: NDArray[numpy.float64], edges: NDArray[numpy.int64], gaps: NDArray[numpy.float64], law: EdgeLaw) -> float: ...
 
 def next_reach(before: float, length: float, error: float) -> float: ...

@@ -274,7 +274,7 @@ def _recomputed(result: Result) -> dict[str, Any]:
     values: dict[str, Any] = {
         "penetration": result.problem.penetration(result.separation),
         "loss_from_drops": dissipated(
-            result.problem, result.jumps, result.states_before_jumps(), result.receded
+            result.problem, result.jumps, result.states_before_jumps(), result.edge_friction
         ),
     }
     if isinstance(result, LoopResult):

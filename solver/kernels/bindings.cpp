@@ -183,15 +183,38 @@ Openings rising(FineOpening fine) {
           array_of(fine.modes)};
 }
 
+using WorkFunction = nb::typed<nb::callable, std::pair<double, double>(double, bool)>;
+using IntegralFunction = nb::typed<nb::callable, double(double, bool)>;
+
+// A law of Python functions.
+class PythonAdhesion : public Adhesion {
+ public:
+  PythonAdhesion(bool pins, double least, double largest, WorkFunction work, IntegralFunction up_to)
+      : Adhesion(pins, least, largest), work_(std::move(work)), up_to_(std::move(up_to)) {}
+
+  std::pair<double, double> work(double theta, bool recedes) const override {
+    nb::gil_scoped_acquire held;
+    return nb::cast<std::pair<double, double>>(work_(theta, recedes));
+  }
+
+  double work_up_to(double theta, bool recedes) const override {
+    nb::gil_scoped_acquire held;
+    return nb::cast<double>(up_to_(theta, recedes));
+  }
+
+ private:
+  nb::callable work_, up_to_;
+};
+
 void bind_model(nb::module_& m) {
   nb::class_<Panels>(m, "Panels", "The full-contact stress of a profile, compressed on panels.")
       .def(
           "__init__",
           [](Panels* panels, double width, int finest_count, const Array& x, const Array& w,
-             const Array& stress, const Array& slope, const Array& tilt, const Array& half_plane,
-             const Array& weights, const IntegerArray& level_start, const Array& end_x,
-             const Array& end_w, int short_count, const Array& length_x, const Array& length_w,
-             const Array& length_before, int top) {
+             const Array& stress, const Array& slope, const Array& tilt, const Array& pattern,
+             const Array& half_plane, const Array& weights, const IntegerArray& level_start,
+             const Array& end_x, const Array& end_w, int short_count, const Array& length_x,
+             const Array& length_w, const Array& length_before, int top) {
             const double* half = half_plane.data() + half_plane.size() / 2;
             const double* of_slope = weights.data() + weights.size() / 2;
             new (panels) Panels{
@@ -202,6 +225,7 @@ void bind_model(nb::module_& m) {
                 vector_of(stress),
                 vector_of(slope),
                 vector_of(tilt),
+                vector_of(pattern),
                 {Vector(half_plane.data(), half), Vector(half, half + half_plane.size() / 2)},
                 {Vector(weights.data(), of_slope), Vector(of_slope, of_slope + weights.size() / 2)},
                 integers_of(level_start),
@@ -212,8 +236,8 @@ void bind_model(nb::module_& m) {
                 top};
           },
           nb::kw_only(), "width"_a, "finest_count"_a, "x"_a, "w"_a, "stress"_a, "slope"_a, "tilt"_a,
-          "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a, "end_w"_a, "short_count"_a,
-          "length_x"_a, "length_w"_a, "length_before"_a, "top"_a)
+          "pattern"_a, "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a, "end_w"_a,
+          "short_count"_a, "length_x"_a, "length_w"_a, "length_before"_a, "top"_a)
       .def(
           "stress",
           [](const Panels& p, const Array& theta) {
@@ -224,22 +248,12 @@ void bind_model(nb::module_& m) {
           },
           "theta"_a, "Evaluate S and S' at any angles.")
       .def(
-          "measure",
-          [](const Panels& p, const Array& theta) {
-            return evaluate_at(theta, [&](double at) { return measure_at(at, p); });
-          },
-          "theta"_a, "Evaluate sqrt(1 + h'²) and its θ-derivative.")
-      .def(
           "half_plane_opening",
           [](const Panels& p, const Array& theta, int side) {
             return evaluate_at(theta, [&](double at) { return half_plane_opening(at, side, p); });
           },
           "theta"_a, "side"_a,
-          "Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.")
-      .def(
-          "contact_length",
-          [](const Panels& p, const Array& gaps) { return contact_length(vector_of(gaps), p); },
-          "gaps"_a, "Integrate sqrt(1 + h'²) dθ over the patches between gaps.");
+          "Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.");
   nb::class_<Device>(m, "LoadingDevice",
                      "Device that prescribes the value d = separation_weight·q0 s - compliance·p.")
       .def(nb::init<double, double>(), "separation_weight"_a, "compliance"_a)
@@ -258,18 +272,41 @@ void bind_model(nb::module_& m) {
       .def_prop_ro("panels", [](const Model& model) {
         return std::const_pointer_cast<Panels>(model.panels);
       });
+  nb::class_<Adhesion>(m, "Adhesion",
+                       "Works of adhesion of edges; the contract is in edge_law.hpp.")
+      .def_ro("pins", &Adhesion::pins)
+      .def_ro("least", &Adhesion::least)
+      .def_ro("largest", &Adhesion::largest)
+      .def("work", &Adhesion::work, "theta"_a, "recedes"_a,
+           "Evaluate w of an edge that advances or recedes at θ, and dw/dθ.")
+      .def("work_up_to", &Adhesion::work_up_to, "theta"_a, "recedes"_a,
+           "Integrate w dθ from 0 to θ.")
+      .def(
+          "contact_work",
+          [](const Adhesion& adhesion, const Array& gaps, bool recedes) {
+            return contact_work(vector_of(gaps), recedes, adhesion);
+          },
+          "gaps"_a, "recedes"_a = false, "Integrate w dθ over the patches between gaps.");
+  nb::class_<ProfileAdhesion, Adhesion>(m, "ProfileAdhesion",
+                                        "γ along the profile, and a constant ratio γ_open/γ.")
+      .def(nb::init<std::shared_ptr<const Panels>, double, double, double>(), "panels"_a,
+           "ratio"_a = 1.0, "least"_a = 1.0, "largest"_a = 1.0);
+  nb::class_<PythonAdhesion, Adhesion>(m, "PythonAdhesion", "A law of Python functions.")
+      .def(nb::init<bool, double, double, WorkFunction, IntegralFunction>(), "pins"_a, "least"_a,
+           "largest"_a, "work"_a, "work_up_to"_a);
   nb::class_<EdgeLaw>(m, "EdgeLaw",
                       "Law by which the edges move, with the tolerances of one problem.")
       .def(
           "__init__",
-          [](EdgeLaw* law, double critical, double newton_tolerance, double field_error,
-             double rest_step, double longest_step, double smallest, double overlap_limit,
-             double force_error, double pinning) {
-            new (law) EdgeLaw{critical, newton_tolerance, field_error, rest_step, longest_step,
-                              smallest, overlap_limit,    force_error, pinning,   {}};
+          [](EdgeLaw* law, std::shared_ptr<const Adhesion> adhesion, double critical,
+             double newton_tolerance, double field_error, double rest_step, double longest_step,
+             double smallest, double overlap_limit, double force_error) {
+            new (law)
+                EdgeLaw{std::move(adhesion), critical, newton_tolerance, field_error, rest_step,
+                        longest_step,        smallest, overlap_limit,    force_error, {}};
           },
-          nb::kw_only(), "critical"_a, "newton_tolerance"_a, "field_error"_a, "rest_step"_a,
-          "longest_step"_a, "smallest"_a, "overlap_limit"_a, "force_error"_a, "pinning"_a)
+          nb::kw_only(), "adhesion"_a, "critical"_a, "newton_tolerance"_a, "field_error"_a,
+          "rest_step"_a, "longest_step"_a, "smallest"_a, "overlap_limit"_a, "force_error"_a)
       .def(nb::init<const EdgeLaw&>())
       .def_rw("critical", &EdgeLaw::critical)
       .def_rw("newton_tolerance", &EdgeLaw::newton_tolerance)
@@ -279,7 +316,6 @@ void bind_model(nb::module_& m) {
       .def_rw("smallest", &EdgeLaw::smallest)
       .def_rw("overlap_limit", &EdgeLaw::overlap_limit)
       .def_rw("force_error", &EdgeLaw::force_error)
-      .def_rw("pinning", &EdgeLaw::pinning)
       .def_prop_rw(
           "memory", [](const EdgeLaw& law) { return pairs_of(law.memory); },
           [](EdgeLaw& law, const Array& gaps) { law.memory = vector_of(gaps); },
@@ -293,22 +329,22 @@ void bind_model(nb::module_& m) {
                               [](void* p) noexcept { delete static_cast<std::vector<char>*>(p); });
             return Truth(reinterpret_cast<bool*>(kept->data()), {kept->size()}, owner);
           },
-          "gaps"_a, "Mark the edges at their memory; none with one work of adhesion.")
+          "gaps"_a, "Mark the edges at their memory; none where edges are not pinned.")
       .def(
           "critical_of",
-          [](const EdgeLaw& law, const Array& gaps, const Array& opening, const Panels& panels) {
+          [](const EdgeLaw& law, const Array& gaps, const Array& opening) {
             Vector out, ends = vector_of(gaps);
             for (int e = 0; e < int(ends.size()); ++e)
-              out.push_back(critical_of(e, ends[e], opening.data()[e], law, panels).value);
+              out.push_back(critical_of(e, ends[e], opening.data()[e], law).value);
             return array_of(out);
           },
-          "gaps"_a, "opening"_a, "panels"_a, "Compute C_c at every edge with the opening C.")
+          "gaps"_a, "opening"_a, "Compute C_c at every edge with the opening C.")
       .def(
           "critical_openings",
-          [](const EdgeLaw& law, const Array& theta, const Panels& panels) {
-            return evaluate_at(theta, [&](double at) { return critical_opening(at, law, panels); });
+          [](const EdgeLaw& law, const Array& theta) {
+            return evaluate_at(theta, [&](double at) { return critical_opening(at, law); });
           },
-          "theta"_a, "panels"_a, "Evaluate C_c of edges that advance, and its θ-derivative.");
+          "theta"_a, "Evaluate C_c of edges that advance, and its θ-derivative.");
   m.def(
       "map_gaps", [](const Array& gaps) { return table_of(map_gaps(vector_of(gaps))); }, "gaps"_a,
       "Make the table of gaps: both ends, widths of the patches beside them, α.");
@@ -548,12 +584,12 @@ void bind_response(nb::module_& m) {
             return array_of(unlocked([&] {
               Flags held = at_memory(ends, law);
               for (int e : some) held[e] = true;
-              condense_gaps(r, hold_edges(r, ends, held, law), law);
+              condense_gaps(r, hold_edges(r, ends, held, law));
               const ResponseSolution now = r.solve(prescribed, law, model.device);
               Matrix out = HeldEdges(r, some, now, model.device).tangent();
               for (int c = 0; c < out.n; ++c) {
                 const Edge& edge = r.edges[some[c]];
-                if (edge.recedes) out(c, c) -= law.pinning * edge.drift;
+                if (edge.recedes) out(c, c) -= edge.pinning_range.slope;
               }
               return out;
             }));
@@ -954,11 +990,10 @@ void bind_parts(nb::module_& m) {
   m.def(
       "model_error",
       [](const ModelFlow& flow, const Array& residual, const IntegerArray& edges, const Array& gaps,
-         const EdgeLaw& law, const Panels& panels) {
-        return model_error(flow, vector_of(residual), integers_of(edges), vector_of(gaps), law,
-                           panels);
+         const EdgeLaw& law) {
+        return model_error(flow, vector_of(residual), integers_of(edges), vector_of(gaps), law);
       },
-      "flow"_a, "residual"_a, "edges"_a, "gaps"_a, "law"_a, "panels"_a);
+      "flow"_a, "residual"_a, "edges"_a, "gaps"_a, "law"_a);
   m.def("next_reach", &next_reach, "before"_a, "length"_a, "error"_a);
 }
 

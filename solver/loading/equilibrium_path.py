@@ -75,9 +75,9 @@ class EquilibriumPath(ByValue, ResultViews):
     loss_from_drops : float
         Sum of the energy drops at the jumps, in J/m² of nominal area; with two works of adhesion
         also the friction of the edges between the jumps.
-    receded : array or None
-        Length along the profile, in m, over which edges have receded on the way to each state;
-        None with one work of adhesion.
+    edge_friction : array or None
+        Energy in J/m, per period, that receding edges have dissipated on the way to each state;
+        None if there is none, as with one work of adhesion.
     loss_error : float
         Estimated numerical error of the loss or work, in J/m² (docs/methods.md, "Error of the
         loss").
@@ -122,7 +122,7 @@ class EquilibriumPath(ByValue, ResultViews):
     method: MethodReport = field(compare=False)
     contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
     new_method: Callable[[], Method] | None = field(default=None, compare=False)
-    receded: Array | None = None
+    edge_friction: Array | None = None
     interior: InteriorTension | None = None
     narrowest_length: float = float("nan")
     turn_range: float = float("nan")
@@ -142,10 +142,8 @@ class EquilibriumPath(ByValue, ResultViews):
 
         By so much do the two works of adhesion differ, within jumps and between them; 0 for one.
         """
-        if self.receded is None:
-            return 0.0
-        pinning, period = self.problem.pinning, self.problem.profile.period
-        return float(pinning / period * (self.receded[-1] - self.receded[0]))
+        found = self.edge_friction
+        return 0.0 if found is None else float(found[-1] - found[0]) / self.problem.profile.period
 
     @property
     def largest_contact_fraction(self) -> float:
@@ -169,16 +167,17 @@ class EquilibriumPath(ByValue, ResultViews):
     def valid_range(self) -> float:
         """Range of adhesion in m below which no patch opens from inside, γ/σ_in.
 
+        γ is the least one of the profile, as in :attr:`edge_range`.
         Infinite if no patch is in tension inside (docs/zero-range.md).
         """
         if self.interior is None:
             return math.inf
-        return self.problem.work_of_adhesion / self.interior.tension
+        return self.problem.least_work_of_adhesion / self.interior.tension
 
     @property
     def edge_range(self) -> float:
         """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
-        gamma, modulus = self.problem.work_of_adhesion, self.problem.half_space.modulus
+        gamma, modulus = self.problem.least_work_of_adhesion, self.problem.half_space.modulus
         return math.sqrt(4 * gamma * self.narrowest_length / (math.pi * modulus))
 
     @property
@@ -376,7 +375,7 @@ class EquilibriumPath(ByValue, ResultViews):
             *("contact_fraction", "patches", "energy", "elastic_energy", "adhesion_energy"),
             *self._columns,
         )
-        names += ("receded",) if self.receded is not None else ()
+        names += ("edge_friction",) if self.edge_friction is not None else ()
         return {name: getattr(self, name) for name in names}
 
     def jump_rows(self) -> list[dict[str, Any]]:
@@ -410,7 +409,7 @@ def path_fields(method: Method, record: Record, started: float) -> dict[str, Any
     problem = method.problem
     report = method.report()  # of the path alone
     interior = interior_tension(method, record)
-    separation = record.column("separation")
+    separation, friction = record.column("separation"), record.column("edge_friction")
     arrays = ("mean_stress", "contact_fraction", "elastic_energy", "adhesion_energy")
     return {
         "problem": problem,
@@ -423,7 +422,7 @@ def path_fields(method: Method, record: Record, started: float) -> dict[str, Any
         "patches": record.column("patches").astype(np.int64),
         "jumps": tuple(record.jumps),
         "loss_from_drops": record.dissipated(problem),
-        "receded": record.column("receded") if problem.pinning else None,
+        "edge_friction": friction if friction.any() else None,
         "seconds": process_time() - started,
         "method": report,
         "contact_states": tuple(record.states),

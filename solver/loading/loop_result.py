@@ -218,8 +218,7 @@ class LoopResult(EquilibriumPath):
             *self.outer_ranges,
         )
         found += opening_warnings(self.jumps, self.loss)
-        profile = self.problem.profile
-        alike = profile.equal_parts > 1 or profile.mirror_axes.size > 0
+        alike = self.problem.equal_parts > 1 or self.problem.mirror_axes.size > 0
         if self.problem.pinning > 0 and alike and self.patches.max() > 1:
             found.append(
                 "parts of the profile are alike, and with two works of adhesion it is not settled "

@@ -125,9 +125,10 @@ class Record:
 
     def dissipated(self, problem: Problem) -> float:
         """Sum the energy drops at the jumps, and the friction of edges between them, in J/m²."""
-        if problem.pinning == 0:
+        friction = self.column("edge_friction")
+        if not friction.any():
             return dissipated(problem, self.jumps, (), None)
-        return dissipated(problem, self.jumps, self.before_jumps(), self.column("receded"))
+        return dissipated(problem, self.jumps, self.before_jumps(), friction)
 
     def work(self, problem: Problem) -> float:
         """Compute the work of the driving device, -∫ Y dx over the states, in J/m².
@@ -181,7 +182,7 @@ def dissipated(
     problem: Problem,
     jumps: Sequence[Jump],
     before: Sequence[int],
-    receded: Array | None,
+    edge_friction: Array | None,
 ) -> float:
     """Sum the energy drops at jumps, and the friction of edges between them, in J/m².
 
@@ -190,16 +191,15 @@ def dissipated(
     problem : Problem
     jumps : sequence of Jump
     before : sequence of int
-        Index of the state before each jump; not needed with one work of adhesion.
-    receded : array, shape (states,), optional
-        Length in m over which edges have receded; None with one work of adhesion.
+        Index of the state before each jump; not needed without friction.
+    edge_friction : array, shape (states,), optional
+        Energy in J/m that receding edges have dissipated so far; None if there is none.
     """
     drops = float(sum(jump.energy_drop for jump in jumps))
-    if receded is None:
+    if edge_friction is None:
         return drops
-    in_jumps = sum(receded[i + 1] - receded[i] for i in before)
-    between = float(receded[-1] - receded[0] - in_jumps)
-    return drops + problem.pinning / problem.profile.period * between
+    in_jumps = sum(edge_friction[i + 1] - edge_friction[i] for i in before)
+    return drops + float(edge_friction[-1] - edge_friction[0] - in_jumps) / problem.profile.period
 
 
 def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:

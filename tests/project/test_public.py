@@ -18,6 +18,7 @@ import adhesis
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 PUBLIC = [
+    "AdhesionPattern",
     "Campaign",
     "ContactState",
     "Control",
@@ -47,6 +48,7 @@ PUBLIC = [
     "run_path",
     "self_affine_profile",
     "single_wave",
+    "stripes",
 ]
 BESIDE = ["open"]
 """Public as well, but not taken by a star import: it would replace a built-in name."""

@@ -56,8 +56,8 @@ class Jumps:
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
-        profile = states.problem.profile
-        self.mirror = MirrorCheck(edges, profile.q0 * profile.mirror_axes)
+        problem = states.problem
+        self.mirror = MirrorCheck(edges, problem.profile.q0 * problem.mirror_axes)
 
     def compute(
         self,
