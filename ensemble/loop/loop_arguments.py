@@ -68,6 +68,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
     trace_arguments.add_open_argument(contact)
     trace_arguments.add_measure_argument(contact)
+    contact.add_argument(
+        "--stripes",
+        type=int,
+        metavar="N",
+        help="the work of adhesion varies N times along the period, about --work-of-adhesion",
+    )
+    contact.add_argument(
+        "--stripe-amplitude", type=float, metavar="EPS", help="by this share of it, below 1"
+    )
+    contact.add_argument(
+        "--stripe-phase",
+        type=float,
+        metavar="PHI",
+        help="in rad: γ(x) = γ (1 + EPS cos(2π N x/L + PHI)) (default 0)",
+    )
     trace_arguments.add_cycle_arguments(contact)
     contact.add_argument(
         "--path",

@@ -118,7 +118,7 @@ def loop_summary(result: LoopResult) -> str:
             f"profile     period {profile.period:.6g} m, harmonics {present[0]} to {present[-1]}, "
             f"h_rms {profile.h_rms:.4g} m, h_max {profile.h_max:.4g} m, m2 {profile.m2:.4g}",
             f"contact     E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
-            f"work of adhesion {problem.work_of_adhesion:.4g} J/m²",
+            f"work of adhesion {problem.adhesion_text}",
             f"cycle       {_turn(result)} in {result.load_steps} load steps, detached by "
             f"{result.pull_off_penetration:.4g} h_max; largest contact fraction "
             f"{result.contact_fraction.max():.4g}, most patches {result.patches.max()}",

@@ -141,7 +141,7 @@ def _rows_of_result(result: Result) -> list[tuple[str, str]]:
         ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
         *(("friction", text) for text in (result.friction_summary(),) if text),
         ("jumps", str(len(result.jumps))),
-        ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),
+        ("work of adhesion γ", problem.adhesion_text),
         ("h_max", f"{problem.profile.h_max:.4g} m"),
         ("largest contact fraction A/A0", f"{result.largest_contact_fraction:.4g}"),
         ("method", result.method.name),

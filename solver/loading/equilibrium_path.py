@@ -338,7 +338,8 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return the single numbers of the problem and the result by name, in SI units.
 
         None stands for infinity, and for the stiffness of a fixed separation. With one work of
-        adhesion ``work_of_adhesion_open`` is that one.
+        adhesion ``work_of_adhesion_open`` is that one, and ``least_work_of_adhesion`` without a
+        pattern.
         ``pandas.DataFrame([loop.numbers() for loop in loops])`` compares loops.
         """
         problem, half_space = self.problem, self.problem.half_space
@@ -352,6 +353,7 @@ class EquilibriumPath(ByValue, ResultViews):
             "young": half_space.young,
             "poisson": half_space.poisson,
             "work_of_adhesion": gamma,
+            "least_work_of_adhesion": problem.least_work_of_adhesion,
             "work_of_adhesion_open": problem.gamma_open,
             "stiffness": finite(problem.control.stiffness),
             "strength": finite(problem.strength),

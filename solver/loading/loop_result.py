@@ -259,7 +259,7 @@ class LoopResult(EquilibriumPath):
             (
                 f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
                 f"period {profile.period:.4g} m",
-                f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
+                f"loop       γ = {self.problem.adhesion_text}, "
                 f"{self._opening_text}"
                 f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",

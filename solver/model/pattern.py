@@ -8,11 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.checks import FINITE, HARMONIC, Bounds, real, row, whole
+from adhesis.solver.checks import FINITE, HARMONIC, SHARE, real, row, whole
 from adhesis.solver.model.profile import EQUAL_CRESTS, MIRRORED, Array, Profile
 from adhesis.solver.values import ByValue
-
-_AMPLITUDE = Bounds(0.0, 1.0, without_high=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,7 +119,7 @@ def stripes(count: int, amplitude: float, phase: float = 0.0) -> AdhesionPattern
     amplitude : float
         ε, dimensionless, from 0 to 1, which is excluded.
     phase : float
-        φ in rad: 0 for a stripe of the largest γ about x = 0.
+        φ in rad, dimensionless: 0 for a stripe of the largest γ about x = 0.
 
     Raises
     ------
@@ -130,5 +128,26 @@ def stripes(count: int, amplitude: float, phase: float = 0.0) -> AdhesionPattern
     """
     coefficients = np.zeros(whole("count", count, HARMONIC) + 1, dtype=np.complex128)
     phase = real("phase", phase, FINITE)
-    coefficients[-1] = 0.5 * real("amplitude", amplitude, _AMPLITUDE) * np.exp(1j * phase)
+    coefficients[-1] = 0.5 * real("amplitude", amplitude, SHARE) * np.exp(1j * phase)
     return AdhesionPattern(coefficients)
+
+
+def stripes_of(
+    count: int | None, amplitude: float | None, phase: float | None
+) -> AdhesionPattern | None:
+    """Make the stripes of options, or None where neither number nor amplitude is given.
+
+    Raises
+    ------
+    ValueError
+        If only one of them is, or a phase alone.
+    """
+    if count is None and amplitude is None and not phase:
+        return None
+    if count is None or amplitude is None:
+        missing = "number" if count is None else "amplitude"
+        raise ValueError(
+            f"the {missing} of stripes of the work of adhesion is missing: give both stripes and "
+            "stripe_amplitude, or neither"
+        )
+    return stripes(count, amplitude, phase or 0.0)

@@ -190,6 +190,15 @@ class Problem(ByValue):
             object.__setattr__(self, "pattern", None)
 
     @property
+    def adhesion_text(self) -> str:
+        """The work of adhesion in words, with its bounds along the profile where it varies."""
+        gamma, pattern = self.work_of_adhesion, self.pattern
+        if pattern is None:
+            return f"{gamma:.4g} J/m²"
+        least, largest = gamma * pattern.least, gamma * pattern.largest
+        return f"{gamma:.4g} J/m² ({least:.4g} to {largest:.4g} J/m² along the profile)"
+
+    @property
     def least_work_of_adhesion(self) -> float:
         """Least work of adhesion of a place of the profile, in J/m²."""
         return self.work_of_adhesion * (self.pattern.least if self.pattern else 1.0)

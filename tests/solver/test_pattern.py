@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
+import adhesis
 from adhesis import (
     AdhesionPattern,
     Control,
@@ -173,6 +174,17 @@ def test_a_range_of_a_loop_is_that_of_the_weakest_place():
     assert loop.valid_range == pytest.approx(weakest / loop.largest_interior_tension, rel=1e-6)
     area = 4 * weakest * loop.narrowest_length / (np.pi * SOLID.modulus)
     assert loop.edge_range == pytest.approx(np.sqrt(area), rel=1e-6)
+
+
+def test_a_saved_loop_keeps_its_pattern(tmp_path):
+    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, pattern=UNEVEN)
+    loop = loop_of(problem, 1e-2, load_steps=5)
+    loop.save(tmp_path / "loop.nc")
+    again = adhesis.load(tmp_path / "loop.nc")
+    assert again == loop
+    assert again.problem.pattern == UNEVEN
+    assert again.numbers() == loop.numbers()
+    assert f"({problem.least_work_of_adhesion:.4g} to " in str(loop)
 
 
 @pytest.mark.parametrize(
