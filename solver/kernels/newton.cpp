@@ -86,7 +86,8 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     if (law.pins()) {
       const Vector before = ends;
       ends = pin_edges(response, ends, pinned, out.at, law, model);
-      if (ends != before && out.corrections < most) {
+      if (ends != before) {
+        if (out.corrections >= most) break;
         last = infinity;
         continue;
       }

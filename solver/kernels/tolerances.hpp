@@ -9,7 +9,7 @@ inline constexpr int FEWEST_CHARGES = 4, MOST_CHARGES = 160;
 inline constexpr int MOST_RANK = 160;  // charges of a run, or nodes of a gap (at most 128)
 
 inline constexpr int MOST_CORRECTIONS = 8, PINNED_CORRECTIONS = 4;
-inline constexpr double PINNED_SLACK = 10.0;
+inline constexpr double PINNED_SLACK = 0.1;
 inline constexpr double STALLED_SHARE = 0.3, HIERARCHICAL_NEWTON_GROWTH = 0.7;
 inline constexpr double CLOSING_SHARE = 0.25;
 inline constexpr double REFERENCE_SHARE = 0.01, REFERENCE_SCALE = 0.1, SOFT_EDGE = 6.0;
