@@ -107,6 +107,20 @@ def test_a_minor_loop_within_the_pinned_range_is_reversible(control):
     assert path.friction > long.loss_from_drops
 
 
+def test_a_fold_of_receding_edges_is_not_passed():
+    """They were held beyond it: at 1e-3 it came late, at 1e-5 contact was never lost."""
+    heights = 1e-6 * np.array([0, 0.212617666 + 0.431181519j, -0.0647779269 + 0.108238956j])
+    problem = Problem(
+        Profile(PERIOD, heights), SOLID, 0.003851, work_of_adhesion_open=0.005139147130894255
+    )
+    coarse, fine, finest = (
+        run_loop(make_method("sharp", problem, accuracy=a), max_penetration=0.8668, load_steps=20)
+        for a in (1e-3, 1e-4, 1e-5)
+    )
+    assert abs(coarse.loss - finest.loss) < coarse.loss_error + finest.loss_error
+    assert abs(fine.loss - finest.loss) < fine.loss_error + finest.loss_error
+
+
 def test_a_leg_that_ends_in_contact_is_audited_with_its_friction():
     path = run_path(
         make_method("sharp", wave(2.0), accuracy=1e-4), [0.5, 0.2, 0.4], load_steps=20, out=False
