@@ -32,8 +32,8 @@
 // 4. w depends on the place alone. It is asked at any time, in any order, from any thread. A law of
 //    speed, or of other edges, is none of this kind, and one that acts over a range has more
 //    unknowns than edges.
-// 5. `least` and `largest` bound w, within a factor of two: seeds and lengths that count as nothing
-//    are set by the least, bounds of how fast gaps close by the largest.
+// 5. `least` and `largest` bound w where the profile is flat: seeds and lengths that count as
+//    nothing are set by the least, bounds of how fast gaps close by the largest.
 //
 // What remains of one γ are scales, not thresholds: `critical` in the tolerances below, the
 // accuracy of the field and the density of states by the strength of adhesion beside roughness.
