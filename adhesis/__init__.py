@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from adhesis.solver.model.control import Control
     from adhesis.solver.model.half_space import HalfSpace
     from adhesis.solver.model.jump import Jump
+    from adhesis.solver.model.pattern import AdhesionPattern, stripes
     from adhesis.solver.model.problem import Problem
     from adhesis.solver.model.profile import (
         Profile,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 # The same list for the running program; a test compares the two.
 _MODULES = {
+    "AdhesionPattern": "solver.model.pattern",
     "Campaign": "_campaign",
     "ContactState": "solver.method",
     "Control": "solver.model.control",
@@ -74,9 +76,11 @@ _MODULES = {
     "run_path": "solver.loading.path",
     "self_affine_profile": "solver.model.profile",
     "single_wave": "solver.model.profile",
+    "stripes": "solver.model.pattern",
 }
 
 __all__ = [
+    "AdhesionPattern",
     "Campaign",
     "ContactState",
     "Control",
@@ -106,6 +110,7 @@ __all__ = [
     "run_path",
     "self_affine_profile",
     "single_wave",
+    "stripes",
 ]
 
 # Figures and films of results are made outside of the mechanics, and loaded when they are made.

@@ -243,7 +243,7 @@ _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range touch_range turn_range "
     "position step length height_range adhesion_range tip_radius cut_off noise longest highest "
     "rise form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip "
-    "coefficient_real coefficient_imag narrowest_length receded",
+    "coefficient_real coefficient_imag narrowest_length",
     "m²": "m0",
     "1/m²": "m4",
     "m³": "power floor",
@@ -251,9 +251,10 @@ _NAMES = {
     "Pa": "young strength preload modulus mean_stress pull_off_stress stress_change max_stress "
     "tension largest_interior_tension turning_stress",
     "Pa/m": "stiffness",
-    "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
-    "J/m²": "work_of_adhesion work_of_adhesion_open friction loss loss_from_drops loss_error "
-    "energy_drop at_stake energy_at_stake barrier energy_change work work_gained work_spent "
+    "J/m": "energy elastic_energy adhesion_energy potential hold_energy edge_friction",
+    "J/m²": "work_of_adhesion work_of_adhesion_open least_work_of_adhesion friction loss "
+    "loss_from_drops loss_error energy_drop at_stake energy_at_stake barrier energy_change work "
+    "work_gained work_spent "
     "effective_work_of_approach effective_work_of_separation full_contact_energy",
     "s": "seconds expected_seconds wall",
 }

@@ -113,6 +113,8 @@ YOUNG = Bounds(1e-3, 1e15, unit="Pa")
 
 POISSON = Bounds(-1.0, 0.5, without_low=True)
 WORK_OF_ADHESION = Bounds(_LEAST, _MOST, or_zero=True, unit="J/m²")
+SHARE = Bounds(0.0, 1.0, without_high=True)
+"""Share of the work of adhesion by which it varies along the profile."""
 STRENGTH = Bounds(_LEAST, _MOST, or_infinite=True, unit="Pa")
 ADHESION_RANGE = Bounds(1e-15, 1.0, unit="m")
 """From the size of a nucleus to lengths that no adhesion has."""

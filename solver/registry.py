@@ -50,7 +50,7 @@ def make_method(
         check_pinning(name, nodes_per_wave)
     if nodes_per_wave is not None:
         nodes_per_wave = whole("nodes_per_wave", nodes_per_wave, NODES_PER_WAVE)
-        check_nodes(nodes_per_wave, problem.profile.highest_harmonic)
+        check_nodes(nodes_per_wave, problem.highest_harmonic)
         if name == "sharp":
             raise ValueError(
                 f"nodes_per_wave is {nodes_per_wave}: it belongs to the method 'grid' alone"

@@ -124,6 +124,19 @@ class MaterialTable:
         "adhesion acts on the length of the profile, or on its projection",
         "arc",
     )
+    stripes: int | None = _key(
+        number_in(checks.HARMONIC),
+        "the work of adhesion varies so many times along the period, about γ: "
+        "γ (1 + stripe_amplitude cos(2π stripes x/λ + stripe_phase))",
+        None,
+        axis="1",
+    )
+    stripe_amplitude: float | None = _key(
+        number_in(checks.SHARE), "share of γ by which it varies", None, axis="1"
+    )
+    stripe_phase: float = _key(
+        number_in(checks.FINITE), "phase of the stripes at x = 0, in rad", 0.0, axis="1"
+    )
 
     @property
     def opens(self) -> bool:

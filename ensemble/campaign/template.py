@@ -30,6 +30,8 @@ EXAMPLES = {
     "material.adhesion_range": '"0.3 nm"',
     "material.strength": "1e8",
     "material.work_of_adhesion_open": '"80 mJ/m2"',
+    "material.stripes": "8",
+    "material.stripe_amplitude": "0.3",
     "cycle.max_stress": "200",
     "cycle.preload": '"0.5 kPa"',
     "cycle.stiffness": "1e9",

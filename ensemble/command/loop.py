@@ -32,6 +32,7 @@ from adhesis.solver.loading.loop_state import field_nodes
 from adhesis.solver.loading.path import PathResult, run_path
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.pattern import stripes_of
 from adhesis.solver.model.problem import Problem, strength_of
 from adhesis.solver.model.profile import Profile, profile_from_heights, self_affine_profile
 from adhesis.solver.registry import make_method
@@ -48,7 +49,8 @@ def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
     taken = _take_defaults(args)
     _check_files(args)
-    with refused_as_input(vars(args), thickness="layer"):
+    options = {"count": "stripes", "amplitude": "stripe_amplitude", "phase": "stripe_phase"}
+    with refused_as_input(vars(args), thickness="layer", **options):
         profile, warnings = _profile(args)
         source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
@@ -58,6 +60,7 @@ def execute(args: argparse.Namespace) -> int:
             *(profile, half_space, args.work_of_adhesion, cycle.control, strength),
             measure=args.measure,
             work_of_adhesion_open=args.work_of_adhesion_open,
+            pattern=stripes_of(args.stripes, args.stripe_amplitude, args.stripe_phase),
         )
         cycle.check(problem)
     _check_film(args, cycle)

@@ -105,7 +105,7 @@ def summary_rows(result: LoopResult | PathResult) -> list[tuple[str, str]]:
         (
             "contact",
             f"E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
-            f"work of adhesion {problem.work_of_adhesion:.4g} J/m²",
+            f"work of adhesion {problem.adhesion_text}",
         ),
     ]
     if isinstance(result, PathResult):

@@ -27,6 +27,7 @@ from adhesis.solver.method import MethodReport
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.jump import Jump
+from adhesis.solver.model.pattern import AdhesionPattern
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile
 
@@ -52,6 +53,7 @@ _MEMBERS = frozenset(
         *(entry.name for kind in _KINDS.values() for entry in fields(kind)),
         *(f"{dim}_{entry.name}" for dim, part in _PARTS.values() for entry in fields(part)),
         *("coefficient_real", "coefficient_imag", "harmonic", "state", "jump", "minor"),
+        *("pattern_real", "pattern_imag", "pattern_harmonic"),
     )
 )
 
@@ -113,6 +115,10 @@ def to_xarray(result: Result) -> xr.Dataset:
     for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
         name = f"coefficient_{name}"
         variables[name] = _variable("harmonic", name, np.array(values))
+    if problem.pattern is not None:
+        waves = problem.pattern.coefficients
+        for name, values in (("pattern_real", waves.real), ("pattern_imag", waves.imag)):
+            variables[name] = _variable("pattern_harmonic", name, np.array(values))
     for name, value in result.numbers().items():
         if value is not None:
             about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
@@ -284,6 +290,12 @@ def _recomputed(result: Result) -> dict[str, Any]:
     return values
 
 
+def _pattern(found: xr.Dataset) -> AdhesionPattern | None:
+    if "pattern_real" not in found:
+        return None
+    return AdhesionPattern(found["pattern_real"].values + 1j * found["pattern_imag"].values)
+
+
 def _works(result: Result) -> dict[str, float]:
     """Compute the work of a result anew, in J/m² of nominal area."""
     ledger = result.ledger
@@ -343,5 +355,6 @@ def _result(found: xr.Dataset) -> Result:
         float(about.get("strength", math.inf)),
         work_of_adhesion_open=float(about["work_of_adhesion_open"]),
         measure=about.get("measure", "arc"),
+        pattern=_pattern(found),
     )
     return kind(problem=problem, method=method, **values)

@@ -30,6 +30,9 @@ _LABELS = {
     "adhesion_range": r"range of adhesion $\delta$",
     "strength": r"strength $\sigma_\mathrm{th}$",
     "work_of_adhesion_open": r"work of adhesion of receding edges $\gamma_\mathrm{open}$",
+    "stripes": "stripes of the work of adhesion in a period",
+    "stripe_amplitude": r"amplitude $\varepsilon$ of the stripes",
+    "stripe_phase": r"phase $\varphi$ of the stripes",
 }
 
 

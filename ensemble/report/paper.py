@@ -100,6 +100,7 @@ def is_reading(campaign: Campaign, hursts: Sequence[float]) -> bool:
         and _is(material.young, _YOUNG)
         and _is(material.poisson, _POISSON)
         and material.work_of_adhesion_open is None
+        and material.stripes is None
         and low - _NEAR <= cycle.max_penetration <= high + _NEAR
     )
 

@@ -18,6 +18,7 @@ from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.pattern import stripes_of
 from adhesis.solver.model.problem import Problem, strength_of
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.registry import make_method
@@ -43,6 +44,7 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
         strength,
         work_of_adhesion_open=material.work_of_adhesion_open,
         measure=material.measure,
+        pattern=stripes_of(material.stripes, material.stripe_amplitude, material.stripe_phase),
     )
 
 

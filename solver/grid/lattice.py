@@ -55,11 +55,11 @@ class Lattice:
             elastic,
             EdgeCompliance(elastic.kernel()),
             profile.heights(n),
-            problem.toughness(profile.slopes(n)),
+            problem.toughness(elastic.dx * np.arange(n, dtype=np.float64), profile.slopes(n)),
             problem.control,
             profile.h_max,
             round(profile.highest_point[0] / elastic.dx) % n,
-            profile.equal_parts,
+            problem.equal_parts,
         )
 
     @property

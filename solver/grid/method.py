@@ -100,14 +100,14 @@ class GridMethod(Method):
             raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1")
         profile = problem.profile
         self.accuracy = accuracy
-        self.nodes = _node_count(profile.highest_harmonic, accuracy, nodes_per_wave)
+        self.nodes = _node_count(problem.highest_harmonic, accuracy, nodes_per_wave)
         self.lattice = lattice = Lattice.of(problem, self.nodes)
         closing = lattice.closing_gap(problem.work_of_adhesion, float(np.sqrt(profile.m4)))
         self.solver = ContactSolver(lattice.elastic, lattice.height, closing, problem.control)
         self.relaxation = Relaxation(
             lattice,
             self.solver,
-            longest_step=max(1, int(0.1 * profile.shortest_wavelength / lattice.dx)),
+            longest_step=max(1, int(0.1 * problem.shortest_wavelength / lattice.dx)),
             loose=0.02,
             tight=1e-4,
         )
@@ -164,7 +164,7 @@ class GridMethod(Method):
         if not state.patches:
             return []
         profile = self.problem.profile
-        toughness = self.problem.toughness(profile.at(state.edges, derivative=1))
+        toughness = self.problem.toughness(state.edges, profile.at(state.edges, derivative=1))
         coefficient = 4 * np.sqrt(toughness / (np.pi * self.problem.half_space.modulus))
         fields = self.fields(state, self.nodes)
         return openings_between(state.edges, fields, coefficient, profile.period)
@@ -175,7 +175,7 @@ class GridMethod(Method):
             name=self.name,
             chosen=self.chosen,
             nodes=self.nodes,
-            nodes_per_wave=self.nodes / max(self.problem.profile.highest_harmonic, 1),
+            nodes_per_wave=self.nodes / max(self.problem.highest_harmonic, 1),
             accuracy=self.accuracy,
             longest_step=self.relaxation.longest_step,
             sweeps=self.relaxation.sweeps,

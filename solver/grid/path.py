@@ -92,7 +92,7 @@ class Steps:
             self.least_drop = _UNSEEN * problem.work_of_adhesion * width / self.period
         # Displacement, in nodes, beyond which an edge has run and two end states are different
         # minima.
-        wave = self.profile.shortest_wavelength / self.lattice.dx
+        wave = problem.shortest_wavelength / self.lattice.dx
         self.min_displacement = max(_FEWEST_NODES_APART, _LEAST_DISPLACEMENT * wave)
 
     def first_touch(self, separation: float) -> Contact:
@@ -102,7 +102,7 @@ class Steps:
         self.states.append(before)
         position = self.profile.crests().position
         if self.adhesion_scale:
-            position = position[self.profile.first_of_equal(position)]
+            position = position[self.profile.first_of_equal(position, self.problem.equal_parts)]
         crests = np.rint(position / self.lattice.dx).astype(np.intp)
         contact.mask[crests % self.lattice.n] = True
         self.solver.solve(contact, self.relaxation.tight)

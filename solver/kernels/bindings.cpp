@@ -162,23 +162,46 @@ Matrix tangent_between(LinearResponse& r, const Vector& ends, const Integers& so
                        double prescribed, const EdgeLaw& law, const Model& model) {
   Flags held = at_memory(ends, law);
   for (int e : some) held[e] = true;
-  condense_gaps(r, hold_edges(r, ends, held, law), law);
+  condense_gaps(r, hold_edges(r, ends, held, law));
   const ResponseSolution now = r.solve(prescribed, law, model.device);
   Matrix out = HeldEdges(r, some, now, model.device).tangent();
   for (int c = 0; c < out.n; ++c) {
     const Edge& edge = r.edges[some[c]];
-    if (edge.recedes) out(c, c) -= law.pinning * edge.drift;
+    if (edge.recedes) out(c, c) -= edge.pinning_range.slope;
   }
   return out;
 }
 
+using WorkFunction = nb::typed<nb::callable, std::pair<double, double>(double, bool)>;
+using IntegralFunction = nb::typed<nb::callable, double(double, bool)>;
+
+// A law of Python functions.
+class PythonAdhesion : public Adhesion {
+ public:
+  PythonAdhesion(bool pins, double least, double largest, WorkFunction work, IntegralFunction up_to)
+      : Adhesion(pins, least, largest), work_(std::move(work)), up_to_(std::move(up_to)) {}
+
+  std::pair<double, double> work(double theta, bool recedes) const override {
+    nb::gil_scoped_acquire held;
+    return nb::cast<std::pair<double, double>>(work_(theta, recedes));
+  }
+
+  double work_up_to(double theta, bool recedes) const override {
+    nb::gil_scoped_acquire held;
+    return nb::cast<double>(up_to_(theta, recedes));
+  }
+
+ private:
+  nb::callable work_, up_to_;
+};
+
 void bind_model(nb::module_& m) {
   nb::class_<Panels>(m, "Panels", "The full-contact stress of a profile, compressed on panels.")
-      .def(nb::init<double, int, Vector, Vector, Vector, Vector, Vector, Pair, Pair, Integers,
-                    Vector, Vector, int, Vector, Vector, Vector, int>(),
+      .def(nb::init<double, int, Vector, Vector, Vector, Vector, Vector, Vector, Pair, Pair,
+                    Integers, Vector, Vector, int, Vector, Vector, Vector, int>(),
            nb::kw_only(), "width"_a, "finest_count"_a, "x"_a, "w"_a, "stress"_a, "slope"_a,
-           "tilt"_a, "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a, "end_w"_a,
-           "short_count"_a, "length_x"_a, "length_w"_a, "length_before"_a, "top"_a)
+           "tilt"_a, "pattern"_a, "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a,
+           "end_w"_a, "short_count"_a, "length_x"_a, "length_w"_a, "length_before"_a, "top"_a)
       .def(
           "stress",
           [](const Panels& p, const Vector& theta) {
@@ -189,22 +212,12 @@ void bind_model(nb::module_& m) {
           },
           "theta"_a, "Evaluate S and S' at any angles.")
       .def(
-          "measure",
-          [](const Panels& p, const Vector& theta) {
-            return evaluate_at(theta, [&](double at) { return measure_at(at, p); });
-          },
-          "theta"_a, "Evaluate sqrt(1 + h'²) and its θ-derivative.")
-      .def(
           "half_plane_opening",
           [](const Panels& p, const Vector& theta, int side) {
             return evaluate_at(theta, [&](double at) { return half_plane_opening(at, side, p); });
           },
           "theta"_a, "side"_a,
-          "Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.")
-      .def(
-          "contact_length",
-          [](const Panels& p, const Vector& gaps) { return contact_length(gaps, p); }, "gaps"_a,
-          "Integrate sqrt(1 + h'²) dθ over the patches between gaps.");
+          "Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.");
   nb::class_<Device>(m, "LoadingDevice",
                      "Device that prescribes the value d = separation_weight·q0 s - compliance·p.")
       .def(nb::init<double, double>(), "separation_weight"_a, "compliance"_a)
@@ -216,17 +229,39 @@ void bind_model(nb::module_& m) {
       .def_ro("device", &Model::device)
       .def_ro("digits", &Model::digits)
       .def_ro("panels", &Model::panels);
+  nb::class_<Adhesion>(m, "Adhesion",
+                       "Works of adhesion of edges; the contract is in edge_law.hpp.")
+      .def_ro("pins", &Adhesion::pins)
+      .def_ro("least", &Adhesion::least)
+      .def_ro("largest", &Adhesion::largest)
+      .def("work", &Adhesion::work, "theta"_a, "recedes"_a,
+           "Evaluate w of an edge that advances or recedes at θ, and dw/dθ.")
+      .def("work_up_to", &Adhesion::work_up_to, "theta"_a, "recedes"_a,
+           "Integrate w dθ from 0 to θ.")
+      .def(
+          "contact_work",
+          [](const Adhesion& adhesion, const Vector& gaps, bool recedes) {
+            return contact_work(gaps, recedes, adhesion);
+          },
+          "gaps"_a, "recedes"_a = false, "Integrate w dθ over the patches between gaps.");
+  nb::class_<ProfileAdhesion, Adhesion>(m, "ProfileAdhesion",
+                                        "γ along the profile, and a constant ratio γ_open/γ.")
+      .def(nb::init<std::shared_ptr<const Panels>, double, double, double>(), "panels"_a,
+           "ratio"_a = 1.0, "least"_a = 1.0, "largest"_a = 1.0);
+  nb::class_<PythonAdhesion, Adhesion>(m, "PythonAdhesion", "A law of Python functions.")
+      .def(nb::init<bool, double, double, WorkFunction, IntegralFunction>(), "pins"_a, "least"_a,
+           "largest"_a, "work"_a, "work_up_to"_a);
   nb::class_<EdgeLaw>(m, "EdgeLaw",
                       "Law by which the edges move, with the tolerances of one problem.")
-      .def(nb::init<double, double, double, double, double, double, double, double, double>(),
-           nb::kw_only(), "critical"_a, "newton_tolerance"_a, "field_error"_a, "rest_step"_a,
-           "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a, "pinning"_a)
+      .def(nb::init<std::shared_ptr<const Adhesion>, double, double, double, double, double, double,
+                    double, double>(),
+           nb::kw_only(), "adhesion"_a, "critical"_a, "newton_tolerance"_a, "field_error"_a,
+           "rest_step"_a, "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a)
       .def(nb::init<const EdgeLaw&>())
       .def_ro("critical", &EdgeLaw::critical)
       .def_ro("rest_step", &EdgeLaw::rest_step)
       .def_rw("longest_step", &EdgeLaw::longest_step)
       .def_rw("smallest", &EdgeLaw::smallest)
-      .def_ro("pinning", &EdgeLaw::pinning)
       .def_prop_rw(
           "memory", [](const EdgeLaw& law) { return pairs_of(law.memory); },
           [](EdgeLaw& law, const Vector& gaps) { law.memory = gaps; }, nb::for_getter(new_array),
@@ -240,22 +275,22 @@ void bind_model(nb::module_& m) {
               if (!held[e]) out.push_back(e);
             return out;
           },
-          "gaps"_a, "Find the edges that are not at their memory; all with one work of adhesion.")
+          "gaps"_a, "Find the edges that are not at their memory; all where edges are not pinned.")
       .def(
           "critical_of",
-          [](const EdgeLaw& law, const Vector& gaps, const Vector& opening, const Panels& panels) {
+          [](const EdgeLaw& law, const Vector& gaps, const Vector& opening) {
             Vector out;
             for (int e = 0; e < int(gaps.size()); ++e)
-              out.push_back(critical_of(e, gaps[e], opening[e], law, panels).value);
+              out.push_back(critical_of(e, gaps[e], opening[e], law).value);
             return out;
           },
-          "gaps"_a, "opening"_a, "panels"_a, "Compute C_c at every edge with the opening C.")
+          "gaps"_a, "opening"_a, "Compute C_c at every edge with the opening C.")
       .def(
           "critical_openings",
-          [](const EdgeLaw& law, const Vector& theta, const Panels& panels) {
-            return evaluate_at(theta, [&](double at) { return critical_opening(at, law, panels); });
+          [](const EdgeLaw& law, const Vector& theta) {
+            return evaluate_at(theta, [&](double at) { return critical_opening(at, law); });
           },
-          "theta"_a, "panels"_a, "Evaluate C_c of edges that advance, and its θ-derivative.");
+          "theta"_a, "Evaluate C_c of edges that advance, and its θ-derivative.");
   m.def("shortest_length", &shortest_length, "gaps"_a,
         "Find the length of the shortest gap or patch.");
 }
@@ -604,7 +639,7 @@ void bind_parts(nb::module_& m) {
         for (Vector& potential : out.potential) potential.resize(out.tree.size());
         for (int run = count; run < out.tree.run_count(); ++run) out.tree.place_charges(run);
         out.charges.fill(Charges(out.tree.size()));
-        for (int k = 0; k < count; ++k) out.condense(k, law.pinning);
+        for (int k = 0; k < count; ++k) out.condense(k);
         out.factor_runs(Flags(count, true));
         out.solve(prescribed, law, model.device);
         return out;
@@ -659,8 +694,7 @@ void bind_parts(nb::module_& m) {
       },
       "hessian"_a, "force"_a,
       "Compute the largest motion to the minimum of a quadratic model; infinite without one.");
-  m.def("model_error", &model_error, "flow"_a, "residual"_a, "edges"_a, "gaps"_a, "law"_a,
-        "panels"_a);
+  m.def("model_error", &model_error, "flow"_a, "residual"_a, "edges"_a, "gaps"_a, "law"_a);
   m.def("next_reach", &next_reach, "before"_a, "length"_a, "error"_a);
 }
 

@@ -11,12 +11,12 @@ namespace {
 
 // Compute the norm of the forces C_c² - C |C| from C - C_c at some edges.
 double force_at(const Vector& residual, const Integers& edges, const Vector& ends,
-                const EdgeLaw& law, const Panels& panels) {
+                const EdgeLaw& law) {
   double square = 0;
   for (size_t i = 0; i < edges.size(); ++i) {
     const int e = edges[i];
-    const double opening = residual[i] + critical_opening(ends[e], law, panels).value;
-    const double critical = critical_of(e, ends[e], opening, law, panels).value;
+    const double opening = residual[i] + critical_opening(ends[e], law).value;
+    const double critical = critical_of(e, ends[e], opening, law).value;
     const double force = critical * critical - opening * std::abs(opening);
     square += force * force;
   }
@@ -58,8 +58,8 @@ bool run_more(Flags& runs, const LinearResponse& response, const ResponseSolutio
   bool more = false;
   for (int e = 0; e < int(runs.size()); ++e) {
     const Edge& edge = response.edges[e];
-    const bool pinned = law.pinning > 0 && edge.held;
-    const double residual = edge.imbalance(e % 2, law.pinning).value;
+    const bool pinned = law.pins() && edge.held;
+    const double residual = edge.imbalance(e % 2).value;
     const bool unbalanced = std::abs(residual) > UNBALANCED * law.critical && !pinned;
     const bool far = std::abs(now.motion[e] - edge.here) > FOLLOWING * law.longest_step;
     if ((unbalanced || (none && far)) && !runs[e]) runs[e] = more = true;
@@ -74,7 +74,7 @@ bool run_far(Flags& runs, const LinearResponse& response, const Vector& way, con
   for (int e = 0; e < int(runs.size()); ++e) {
     // written so that NaN is too far
     bool near = std::abs(way[e]) <= FURTHEST_FOLLOWING * law.longest_step;
-    if (law.pinning > 0) {
+    if (law.pins()) {
       const double gone = way_from_memory(e, ends[e], law);
       near = near && gone * (gone + way[e]) >= 0;
     }
@@ -120,7 +120,7 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
                   const Vector& ends, double& strongest, double reach, bool equal_speeds,
                   const EdgeLaw& law, const Panels& panels) {
   const int count = int(edges.size());
-  const double force = force_at(residual, edges, ends, law, panels);
+  const double force = force_at(residual, edges, ends, law);
   strongest = std::max(strongest, force);
   const std::vector<Gap> gaps = map_gaps(ends);
   bool is_long = reach > 1 && !near_balance(force, strongest, law);
@@ -187,7 +187,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   while (out.steps < most_steps) {
     check_signals();
     if (!moved) {
-      condense_gaps(response, hold_edges(response, ends, held, law), law);
+      condense_gaps(response, hold_edges(response, ends, held, law));
     } else if (!move_references(response, ends, held, pressure, prescribed, law, model)) {
       out.event = DescentEvent::outgrown;
       break;
@@ -204,7 +204,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
     const Vector residual = condensed.residual();
     if (judges) {
       judges = false;
-      const double error = model_error(flow, residual, edges, ends, law, panels);
+      const double error = model_error(flow, residual, edges, ends, law);
       const double length = largest(flow.motion) / law.longest_step;
       reach = std::max(next_reach(reach, length, error), MODEL_SHORT_STEP);
       if (error > 1 && length > 1.5 * MODEL_SHORT_STEP) {

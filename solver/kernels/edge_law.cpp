@@ -2,20 +2,26 @@
 
 namespace adhesis {
 
-CriticalOpening critical_of(int edge, double theta, double opening, const EdgeLaw& law,
-                            const Panels& panels) {
-  const auto [critical, drift] = critical_opening(theta, law, panels);
-  if (law.pinning == 0) return {critical, drift, false};
-  const double way = way_from_memory(edge, theta, law), receding = critical * (1 + law.pinning);
+double contact_work(const Vector& ends, bool recedes, const Adhesion& adhesion) {
+  double total = adhesion.work_up_to(2 * pi, recedes);
+  for (size_t e = 0; e < ends.size(); ++e)
+    total += (e % 2 == 0 ? 1 : -1) * adhesion.work_up_to(ends[e], recedes);
+  return total;
+}
+
+CriticalOpening critical_of(int edge, double theta, double opening, const EdgeLaw& law) {
+  const auto [critical, drift] = critical_opening(theta, law);
+  if (!law.pins()) return {critical, drift, false};
+  const double way = way_from_memory(edge, theta, law);
+  const auto [receding, receding_drift] = critical_opening(theta, law, true);
   if (way == 0 && critical <= opening && opening <= receding) return {opening, 0, true};
-  if (way < 0 || (way == 0 && opening > receding))
-    return {receding, drift * (1 + law.pinning), false};
+  if (way < 0 || (way == 0 && opening > receding)) return {receding, receding_drift, false};
   return {critical, drift, false};
 }
 
 Flags at_memory(const Vector& ends, const EdgeLaw& law) {
   Flags out(ends.size());
-  if (law.pinning > 0)
+  if (law.pins())
     for (int e = 0; e < int(ends.size()); ++e) out[e] = way_from_memory(e, ends[e], law) == 0;
   return out;
 }

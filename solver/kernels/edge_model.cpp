@@ -79,7 +79,7 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
     MovingEdge& edge = edges[i];
     edge.edge = numbers[i];
     edge.theta = ends[edge.edge];
-    auto [critical, drift] = critical_opening(edge.theta, law, panels);
+    auto [critical, drift] = critical_opening(edge.theta, law);
     edge.half_plane = half_plane_opening(edge.theta, edge.edge % 2, panels);
     edge.opening = residual[i] + critical;
     edge.own = tangent(i, i) + outwards(edge.edge) * (drift - edge.half_plane.slope);
@@ -102,7 +102,7 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
 }
 
 void EdgeModel::evaluate(MovingEdge& edge) const {
-  auto [critical, drift, pinned] = critical_of(edge.edge, edge.theta, edge.opening, law_, panels_);
+  auto [critical, drift, pinned] = critical_of(edge.edge, edge.theta, edge.opening, law_);
   edge.pinned = pinned;
   edge.rate = edge.own + outwards(edge.edge) * edge.half_plane.slope;
   edge.critical = critical;
@@ -185,7 +185,7 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
     if (is_long ? near_balance(total, strongest, law) : FORCES_FELL * total < first) break;
     model.hessian(hessian);
     Vector step = implicit_step(hessian, force, longest, equal_speeds);
-    if (law.pinning > 0) stop_at_memory(model, force, step, law);
+    if (law.pins()) stop_at_memory(model, force, step, law);
     if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
                                         total < law.force_error || largest(step) == 0))
       break;

@@ -74,7 +74,7 @@ void load_gap(const LinearResponse& response, int k, const GaussRule& rule, Spac
 
 }  // namespace
 
-WIDE void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& model) {
+WIDE void LinearResponse::linearise(int k, const EdgeLaw& law) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   const double* own = &inverse[nodes.square[k]];
@@ -105,11 +105,14 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& mode
 
   for (int side = 0; side < 2; ++side) {
     Edge& edge = edges[2 * k + side];
-    auto [critical, drift] = critical_opening(nodes.gaps[k].end[side], law, *model.panels);
+    auto [critical, drift] = critical_opening(nodes.gaps[k].end[side], law);
     edge.opening = opening[side][by_field];
     edge.opening_by_pressure = opening[side][by_pressure];
     edge.residual = edge.opening - critical;
-    edge.drift = outwards(side) * drift;
+    if (law.pins()) {
+      const auto [range, by_theta] = pinning_range(nodes.gaps[k].end[side], law);
+      edge.pinning_range = {range, outwards(side) * by_theta};
+    }
     // by the opening of the other end
     const double far = opening[side][by_left_end + 1 - side] + std::sqrt(nodes.slope[k][side] / 2);
     edge.tangent[1 - side] = far * strength[1 - side];
@@ -126,10 +129,10 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law, const Model& mode
       charge_by_edge[side][first + i] =
           strength[side] * (w * space.solved[by_left_end + side][i] + space.singular[side][i]);
   }
-  condense(k, law.pinning);
+  condense(k);
 }
 
-WIDE void LinearResponse::condense(int k, double pinning) {
+WIDE void LinearResponse::condense(int k) {
   const Vector& w = gauss_rules()[nodes.orders[k]].weights;
   const int m = nodes.size_of(k), first = nodes.offset[k];
   const double pressure = about_pressure[k];
@@ -138,8 +141,8 @@ WIDE void LinearResponse::condense(int k, double pinning) {
   negative = 0;
   nearest = 1;
   left.compliance = right.compliance = {0, 0};
-  const auto [residual_left, a] = left.imbalance(0, pinning);
-  const auto [residual_right, d] = right.imbalance(1, pinning);
+  const auto [residual_left, a] = left.imbalance(0);
+  const auto [residual_right, d] = right.imbalance(1);
   const double b = left.tangent[1], c = right.tangent[0];
   if (!(left.held || right.held)) {
     const double det = a * d - b * c;

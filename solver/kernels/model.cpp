@@ -59,7 +59,10 @@ ShortRule::ShortRule(int count) : minus(count), plus(count), eta(count), sine(co
 ValueAndSlope measure_at(double theta, const Panels& panels) {
   auto [tilt, rate] = evaluate_series(panels.tilt, theta, panels);
   double measure = std::sqrt(1 + tilt * tilt);
-  return {measure, tilt / measure * rate};
+  ValueAndSlope length = {measure, tilt / measure * rate};
+  if (panels.pattern.empty()) return length;
+  auto [share, slope] = evaluate_series(panels.pattern, theta, panels);
+  return {length.value * share, length.slope * share + length.value * slope};
 }
 
 double length_up_to(double theta, const Panels& panels) {
@@ -74,13 +77,6 @@ double length_up_to(double theta, const Panels& panels) {
   double part = 0;
   for (size_t i = 0; i < at.size(); ++i) part += rule.weights[i] * std::sqrt(1 + tilt[i] * tilt[i]);
   return turns * rule.before.back() + rule.before[panel] + part * share * panels.width;
-}
-
-double contact_length(const Vector& ends, const Panels& panels) {
-  double total = length_up_to(2 * pi, panels);
-  for (size_t e = 0; e < ends.size(); ++e)
-    total += (e % 2 == 0 ? 1 : -1) * length_up_to(ends[e], panels);
-  return total;
 }
 
 }  // namespace adhesis

@@ -14,7 +14,7 @@ struct ShortRule {
   ShortRule(int count);
 };
 
-// Rule on a finest panel from 0 to 1, and ∫ sqrt(1 + h'²) dθ from 0 to the start of each panel.
+// Rule on a finest panel from 0 to 1, and ∫ w dθ from 0 to the start of each panel.
 struct LengthRule {
   Vector nodes, weights, before;
 };
@@ -26,6 +26,7 @@ struct Panels {
   Vector x, w;                       // Gauss-Legendre rule of a panel
   Vector stress, slope;              // Chebyshev coefficients of S, S' on each panel
   Vector tilt;                       // of h'
+  Vector pattern;                    // of γ(θ)/γ; empty where that is 1
   std::array<Vector, 2> half_plane;  // of C of a half-plane crack that begins, ends at θ
   std::array<Vector, 2> weights;     // ω for S and S' of every panel of every level
   Integers level_start;              // row of the weights at which each level starts
@@ -60,14 +61,11 @@ ValueAndSlope evaluate_series(const Vector& coefficients, double theta, const Pa
 void interpolate(const Vector& coefficients, const double* position, int count,
                  const Panels& panels, double* out);
 
-// sqrt(1 + h'²) and its derivative by θ.
+// w = sqrt(1 + h'²) γ(θ)/γ, the work of adhesion of a projected length over γ, and dw/dθ.
 ValueAndSlope measure_at(double theta, const Panels& panels);
 
-// Integrate sqrt(1 + h'²) dθ from 0 to θ.
+// Integrate w dθ from 0 to θ.
 double length_up_to(double theta, const Panels& panels);
-
-// Integrate it over the patches between gaps with these ends.
-double contact_length(const Vector& ends, const Panels& panels);
 
 // C and dC/dθ of a half-plane crack that begins (side 0) or ends (1) at θ.
 inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& panels) {

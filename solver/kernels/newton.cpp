@@ -31,13 +31,13 @@ Vector pin_edges(LinearResponse& response, const Vector& ends, Flags& pinned,
       pinned[e] = true;
     }
   }
-  const double slack = PINNED_SLACK * law.force_error / law.critical;
+  const double slack = law.force_error / law.critical;
   for (size_t c = 0; c < edges.size(); ++c) {
     const int e = edges[c];
-    const double critical = critical_opening(ends[e], law, *model.panels).value;
+    const double range = pinning_range(ends[e], law).value;
     const double released = outwards(e) * law.newton_tolerance;
     const bool advances = residual[c] < -slack;
-    if (!advances && !(residual[c] > law.pinning * critical + slack)) continue;
+    if (!advances && !(residual[c] > range + slack)) continue;
     out[e] = ends[e] + (advances ? released : -released);
     pinned[e] = false;
   }
@@ -55,9 +55,9 @@ void share_openings(Equilibrium& out, LinearResponse& response, const Flags& pin
   out.pinned_share.assign(out.ends.size(), not_a_number);
   out.pinned_rate = out.pinned_share;
   for (size_t c = 0; c < edges.size(); ++c) {
-    const double critical = critical_opening(out.ends[edges[c]], law, *model.panels).value;
-    out.pinned_share[edges[c]] = residual[c] / (law.pinning * critical);
-    out.pinned_rate[edges[c]] = -closing[c] * 2 * pi / by_pressure / (law.pinning * critical);
+    const double range = pinning_range(out.ends[edges[c]], law).value;
+    out.pinned_share[edges[c]] = residual[c] / range;
+    out.pinned_rate[edges[c]] = -closing[c] * 2 * pi / by_pressure / range;
   }
 }
 
@@ -82,10 +82,11 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     out.at = response.solve(prescribed, law, model.device);
     pressure = out.at.pressure;
     if (!std::isfinite(pressure)) break;
-    if (law.pinning > 0) {
+    if (law.pins()) {
       const Vector before = ends;
       ends = pin_edges(response, ends, pinned, out.at, law, model);
-      if (ends != before && out.corrections < MOST_CORRECTIONS) {
+      if (ends != before) {
+        if (out.corrections >= MOST_CORRECTIONS) break;
         last = infinity;
         continue;
       }
@@ -120,7 +121,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
   out.references = response.nodes.gaps;
   out.orders = response.nodes.orders;
   out.ends = ends;
-  if (out.found && law.pinning > 0) share_openings(out, response, pinned, law, model);
+  if (out.found && law.pins()) share_openings(out, response, pinned, law, model);
   return out;
 }
 

@@ -8,8 +8,8 @@ namespace {
 
 // Move the reference of a gap, filled in already, with the potential there; `old` is where it was.
 // Returns whether it has a field.
-bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure, const EdgeLaw& law,
-               const Model& model) {
+bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
+               const EdgeLaw& law) {
   const Nodes& nodes = response.nodes;
   Tree& tree = response.tree;
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
@@ -29,7 +29,7 @@ bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
   const int square = nodes.square[k];
   if (!invert_definite(&response.equations.blocks[square], m, &response.inverse[square]))
     return false;
-  response.linearise(k, law, model);
+  response.linearise(k, law);
   return true;
 }
 
@@ -77,8 +77,8 @@ Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, cons
   const double allowed = UNBALANCED * law.critical;
   for (int side = 0; side < 2; ++side) {
     const Edge& edge = response.edges[2 * k + side];
-    const bool pinned = law.pinning > 0 && edge.held;
-    const double residual = edge.imbalance(side, law.pinning).value;
+    const bool pinned = law.pins() && edge.held;
+    const double residual = edge.imbalance(side).value;
     if (std::abs(residual) * softness > allowed && allowed > 0 && !pinned) out.changed = true;
   }
   return out;
@@ -119,7 +119,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
     if (far[e / 2]) both[e] = true;
   const Flags others = hold_edges(response, ends, both, law);
   if (!any(changed)) {
-    condense_gaps(response, others, law);
+    condense_gaps(response, others);
     return true;
   }
   for (int k = 0; k < count; ++k)
@@ -128,9 +128,9 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
   Flags again(changed);
   for (int k = 0; k < count; ++k) {
     if (changed[k] && renewed) {
-      renewed = renew_gap(response, k, before[k], pressure, law, model);
+      renewed = renew_gap(response, k, before[k], pressure, law);
     } else if (others[k]) {
-      response.condense(k, law.pinning);
+      response.condense(k);
       again[k] = true;
     }
   }
@@ -146,7 +146,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
     pressure = response.solve(prescribed, law, model.device).pressure;
     hold_edges(response, ends, held, law);
     for (int k = 0; k < count; ++k)
-      if (far[k]) response.linearise_in_current_potential(k, pressure, law, model);
+      if (far[k]) response.linearise_in_current_potential(k, pressure, law);
     response.factor_runs(far);
   }
   return true;
@@ -159,7 +159,7 @@ Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held
   for (int e = 0; e < int(ends.size()); ++e) {
     Edge& edge = response.edges[e];
     const double here = held[e] ? motion[e] : 0;
-    const bool recedes = law.pinning > 0 && way_from_memory(e, ends[e], law) < 0;
+    const bool recedes = law.pins() && way_from_memory(e, ends[e], law) < 0;
     if (bool(held[e]) != edge.held || here != edge.here || recedes != edge.recedes)
       changed[e / 2] = true;
     edge.recedes = recedes;
@@ -169,9 +169,9 @@ Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held
   return changed;
 }
 
-void condense_gaps(LinearResponse& response, const Flags& some, const EdgeLaw& law) {
+void condense_gaps(LinearResponse& response, const Flags& some) {
   for (int k = 0; k < response.gap_count(); ++k)
-    if (some[k]) response.condense(k, law.pinning);
+    if (some[k]) response.condense(k);
   if (any(some)) response.factor_runs(some);
 }
 

@@ -40,7 +40,7 @@ Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held
                  const EdgeLaw& law);
 
 // Eliminate the edges of some gaps anew, and factor the runs that hold them.
-void condense_gaps(LinearResponse& response, const Flags& some, const EdgeLaw& law);
+void condense_gaps(LinearResponse& response, const Flags& some);
 
 // Renew the response for a known equilibrium; returns false as move_references does.
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,

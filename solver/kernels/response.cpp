@@ -108,12 +108,11 @@ Vector LinearResponse::motion_to(const Vector& ends) const {
   return motion;
 }
 
-void LinearResponse::linearise_in_current_potential(int k, double pressure, const EdgeLaw& law,
-                                                    const Model& model) {
+void LinearResponse::linearise_in_current_potential(int k, double pressure, const EdgeLaw& law) {
   about_pressure[k] = pressure;
   for (int i = nodes.offset[k]; i < nodes.offset[k + 1]; ++i)
     about[i] = potential[0][i] + pressure * potential[1][i];
-  linearise(k, law, model);
+  linearise(k, law);
 }
 
 }  // namespace adhesis

@@ -19,10 +19,10 @@ namespace adhesis {
 
 // An edge in its reference.
 struct Edge {
-  double opening = 0, residual = 0;  // C and C - C_c, C_c that of an edge that advances
-  double drift = 0;                  // ∂C_c/∂n
-  bool recedes = false;              // whether it is behind its memory, with two works of adhesion
-  double opening_by_pressure = 0;    // ∂C/∂p between held edges
+  double opening = 0, residual = 0;    // C and C - C_c, C_c that of an edge that advances
+  ValueAndSlope pinning_range = {};    // C_c of one that recedes less that, and its derivative by n
+  bool recedes = false;                // whether it is behind its memory
+  double opening_by_pressure = 0;      // ∂C/∂p between held edges
   std::array<double, 2> tangent = {};  // ∂(C - C_c)/∂n of both edges of its gap, at the others' g
   bool held = false;                   // whether it stays where it is,
   double here = 0;                     // so far from the reference; 0 if it is not held
@@ -32,9 +32,9 @@ struct Edge {
 
   // C - C_c and its derivative by the edge's own motion, by the law of where the edge is now. The
   // law is asked at every use, so a response stays valid where an edge begins to recede.
-  ValueAndSlope imbalance(int side, double pinning) const {
+  ValueAndSlope imbalance(int side) const {
     if (!recedes) return {residual, tangent[side]};
-    return {residual - pinning * (opening - residual), tangent[side] - pinning * drift};
+    return {residual - pinning_range.value, tangent[side] - pinning_range.slope};
   }
 };
 
@@ -70,14 +70,13 @@ struct LinearResponse {
   int gap_count() const { return nodes.gap_count(); }
 
   // Compute the response of gap k about its reference.
-  void linearise(int k, const EdgeLaw& law, const Model& model);
+  void linearise(int k, const EdgeLaw& law);
 
   // Linearise gap k about its potential in the last solution, and let its edges follow.
-  void linearise_in_current_potential(int k, double pressure, const EdgeLaw& law,
-                                      const Model& model);
+  void linearise_in_current_potential(int k, double pressure, const EdgeLaw& law);
 
   // Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
-  void condense(int k, double pinning);
+  void condense(int k);
 
   // Factor the runs that have changed, or hold gaps that have.
   void factor_runs(Flags changed);

@@ -122,8 +122,8 @@ NewResponse set_up_response(const Vector& ends, double prescribed, const Integer
   out.mean[1] = -field.unit_mean;
   out.mean[0] =
       dot(out.nodes.weight.data(), out.scaled_opening.data(), n) - field.pressure * out.mean[1];
-  for (Edge& edge : out.edges) edge.held = law.pinning > 0;  // which are pinned is not known yet
-  for (int k = 0; k < count; ++k) out.linearise(k, law, model);
+  for (Edge& edge : out.edges) edge.held = law.pins();  // which are pinned is not known yet
+  for (int k = 0; k < count; ++k) out.linearise(k, law);
   out.factor_runs(Flags(count, true));
   return made;
 }
@@ -184,15 +184,15 @@ NewResponse update_response(const LinearResponse& known, const Vector& ends, dou
     const int square = out.nodes.square[k];
     if (!invert_definite(&out.equations.blocks[square], out.nodes.size_of(k), &out.inverse[square]))
       return made;
-    out.linearise(k, law, model);
+    out.linearise(k, law);
   }
   out.factor_runs(changed);
   const double pressure = out.solve(prescribed, law, model.device).pressure;
   if (!std::isfinite(pressure)) return made;
   for (int k = 0; k < count; ++k) {
     if (new_gaps[k]) {
-      out.edges[2 * k].held = out.edges[2 * k + 1].held = law.pinning > 0;
-      out.linearise_in_current_potential(k, pressure, law, model);
+      out.edges[2 * k].held = out.edges[2 * k + 1].held = law.pins();
+      out.linearise_in_current_potential(k, pressure, law);
     }
   }
   out.factor_runs(new_gaps);

@@ -3,10 +3,10 @@
 namespace adhesis {
 
 double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
-                   const Vector& ends, const EdgeLaw& law, const Panels& panels) {
+                   const Vector& ends, const EdgeLaw& law) {
   double worst = 0;
   for (size_t e = 0; e < residual.size(); ++e) {
-    const double critical = critical_opening(ends[edges[e]], law, panels).value;
+    const double critical = critical_opening(ends[edges[e]], law).value;
     const double at_end = std::abs(residual[e] + critical - flow.opening[e]);
     for (size_t i = 0; i < flow.lengths.size(); ++i) {
       const double share = flow.lengths[i] / flow.lengths.back();

@@ -14,7 +14,7 @@ namespace adhesis {
 // `residual` is C - C_c of the field at the end. On the way the errors are taken to grow as the
 // square of its length, and far from balance more is allowed.
 double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
-                   const Vector& ends, const EdgeLaw& law, const Panels& panels);
+                   const Vector& ends, const EdgeLaw& law);
 
 // Choose the next reach after a long step of this length, in longest steps, and error.
 double next_reach(double before, double length, double error);

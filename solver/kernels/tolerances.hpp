@@ -33,10 +33,6 @@ inline constexpr int FEWEST_SINE_NODES = 64;
 // works of adhesion begin to move and are pinned on the way.
 inline constexpr int MOST_CORRECTIONS = 32;
 
-// Errors of a force by the field, by which the opening of a pinned edge may lie outside of both
-// critical ones: where a path turns back those of edges that moved are as accurate as that.
-inline constexpr double PINNED_SLACK = 100.0;
-
 // Share of the last correction. An iteration that shrinks less is given up early. Corrections no
 // longer than EdgeLaw.rest_step are not judged so: the error of references takes part in them. One
 // that shrinks less below EdgeLaw.field_error goes to and fro across a step of the field, where

@@ -45,7 +45,7 @@ _FALL_SHARE = 0.01
 _NEARLY_FULL = 0.99
 _ROUNDING = 1e-9  # of h_max: a separation that is less below it is at first touch
 _COLUMNS = ("mean_stress", "contact_fraction", "elastic_energy", "adhesion_energy")
-_ENTERED = (*_COLUMNS, "branch", "separation", "tangent", "receded")  # in the ledger
+_ENTERED = (*_COLUMNS, "branch", "separation", "tangent", "edge_friction")  # in the ledger
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
 
@@ -85,9 +85,9 @@ class EquilibriumPath(ByValue, ResultViews):
     loss_from_drops : float
         Sum of the energy drops at the jumps, in J/m² of nominal area; with two works of adhesion
         also the friction of the edges between the jumps.
-    receded : array or None
-        Length along the profile, in m, over which edges have receded on the way to each state;
-        None with one work of adhesion.
+    edge_friction : array or None
+        Energy in J/m, per period, that receding edges have dissipated on the way to each state;
+        None if there is none, as with one work of adhesion.
     loss_error : float
         Estimated numerical error of the loss or work, in J/m² (docs/methods.md, "Error of the
         loss").
@@ -132,7 +132,7 @@ class EquilibriumPath(ByValue, ResultViews):
     method: MethodReport = field(compare=False)
     contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
     new_method: Callable[[], Method] | None = field(default=None, compare=False)
-    receded: Array | None = None
+    edge_friction: Array | None = None
     interior: InteriorTension | None = None
     narrowest_length: float = float("nan")
     turn_range: float = float("nan")
@@ -181,16 +181,17 @@ class EquilibriumPath(ByValue, ResultViews):
     def valid_range(self) -> float:
         """Range of adhesion in m below which no patch opens from inside, γ/σ_in.
 
+        γ is the least one of the profile, as in :attr:`edge_range`.
         Infinite if no patch is in tension inside (docs/zero-range.md).
         """
         if self.interior is None:
             return math.inf
-        return self.problem.work_of_adhesion / self.interior.tension
+        return self.problem.least_work_of_adhesion / self.interior.tension
 
     @property
     def edge_range(self) -> float:
         """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
-        gamma, modulus = self.problem.work_of_adhesion, self.problem.half_space.modulus
+        gamma, modulus = self.problem.least_work_of_adhesion, self.problem.half_space.modulus
         return math.sqrt(4 * gamma * self.narrowest_length / (math.pi * modulus))
 
     @property
@@ -341,7 +342,8 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return the single numbers of the problem and the result by name, in SI units.
 
         None stands for infinity, and for the stiffness of a fixed separation. With one work of
-        adhesion ``work_of_adhesion_open`` is that one.
+        adhesion ``work_of_adhesion_open`` is that one, and ``least_work_of_adhesion`` without a
+        pattern.
         ``pandas.DataFrame([loop.numbers() for loop in loops])`` compares loops.
         """
         problem, half_space = self.problem, self.problem.half_space
@@ -355,6 +357,7 @@ class EquilibriumPath(ByValue, ResultViews):
             "young": half_space.young,
             "poisson": half_space.poisson,
             "work_of_adhesion": gamma,
+            "least_work_of_adhesion": problem.least_work_of_adhesion,
             "work_of_adhesion_open": problem.gamma_open,
             "stiffness": finite(problem.control.stiffness),
             "strength": finite(problem.strength),
@@ -378,7 +381,7 @@ class EquilibriumPath(ByValue, ResultViews):
             *("contact_fraction", "patches", "energy", "elastic_energy", "adhesion_energy"),
             *self._columns,
         )
-        names += ("receded",) if self.receded is not None else ()
+        names += ("edge_friction",) if self.edge_friction is not None else ()
         return {name: getattr(self, name) for name in names}
 
     def jump_rows(self) -> list[dict[str, Any]]:
@@ -453,11 +456,12 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
         )
     jumps = tuple(record.jumps)
     columns: dict[str, Any] = {name: record.column(name) for name in _COLUMNS}
+    friction = record.column("edge_friction")
     columns |= {
         "branch": np.array(record.branches),
         "separation": separation,
         "tangent": record.column("stiffness"),
-        "receded": record.column("receded") if problem.pinning else None,
+        "edge_friction": friction if friction.any() else None,
     }
     ledger = Ledger.of(problem, jumps, **columns)
     fields = columns | {

@@ -64,7 +64,7 @@ class Ledger:
         contact_fraction: Array,
         elastic_energy: Array,
         adhesion_energy: Array,
-        receded: Array | None,
+        edge_friction: Array | None,
     ) -> Self:
         """Enter the states of a path, arrays of shape (states,), and the jumps between them.
 
@@ -76,7 +76,7 @@ class Ledger:
         problem : Problem
         jumps : sequence of Jump
         branch, separation, mean_stress, tangent, contact_fraction, elastic_energy, \
-adhesion_energy, receded
+adhesion_energy, edge_friction
             As in :class:`~adhesis.solver.loading.equilibrium_path.EquilibriumPath`.
         """
         control, h_max, period = problem.control, problem.profile.h_max, problem.profile.period
@@ -87,8 +87,8 @@ adhesion_energy, receded
         lost_load = np.diff(mean_stress * (h_max - separation)) if control.is_load else 0.0
         energy = elastic_energy + adhesion_energy
         friction = np.zeros(len(step))
-        if receded is not None:
-            friction = problem.pinning / period * np.diff(receded)
+        if edge_friction is not None:
+            friction = np.diff(edge_friction) / period
         before = states_before_jumps(jumps, branch, separation, contact_fraction)
         losses = friction.copy()
         losses[before] = 0.0

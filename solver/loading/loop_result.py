@@ -209,8 +209,7 @@ class LoopResult(EquilibriumPath):
                 f"J/m², is larger than {most:g} of it, the relative error allowed"
             )
         found += self.range_warnings()
-        profile = self.problem.profile
-        alike = profile.equal_parts > 1 or profile.mirror_axes.size > 0
+        alike = self.problem.equal_parts > 1 or self.problem.mirror_axes.size > 0
         if self.problem.pinning > 0 and alike and self.patches.max() > 1:
             found.append(
                 "parts of the profile are alike, and with two works of adhesion it is not settled "
@@ -251,7 +250,7 @@ class LoopResult(EquilibriumPath):
             (
                 f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
                 f"period {profile.period:.4g} m",
-                f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
+                f"loop       γ = {self.problem.adhesion_text}, "
                 f"{self._opening_text}"
                 f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",

@@ -166,7 +166,7 @@ def _persistent_states(problem: Problem, record: Record) -> list[int]:
 
 def narrowest_length(problem: Problem, record: Record) -> float:
     """Return the shortest length in m that decides where edges stand; see the module."""
-    shortest = problem.profile.shortest_wavelength
+    shortest = problem.shortest_wavelength
     order = sorted(
         zip(record.jumps, record.before_jumps(), strict=True), key=lambda one: -one[0].energy_drop
     )

@@ -33,9 +33,9 @@ class ContactState(ByValue):
     stiffness : float
         dp̄/ds along the branch in Pa/m, or dY/dx if another quantity than the separation is
         prescribed (:mod:`adhesis.solver.model.control`); NaN if the method does not compute it.
-    receded : float
-        Length along the profile, in m, over which edges have receded on the way to the state, if
-        the method counts it: there they dissipate what the two works of adhesion differ by.
+    edge_friction : float
+        Energy in J/m, per period, that edges have dissipated on the way to the state as they
+        receded: what both works of adhesion differ by, over the length along the profile.
     hold_energy : float
         Contribution of the control to the potential, in J/m per period; 0 at fixed separation.
     internal : object
@@ -54,7 +54,7 @@ class ContactState(ByValue):
     contact_fraction: float
     stiffness: float = float("nan")
     hold_energy: float = 0.0
-    receded: float = 0.0
+    edge_friction: float = 0.0
     internal: Any = field(default=None, repr=False, compare=False)
 
     @classmethod

@@ -23,6 +23,7 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.control import Control, Value
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.pattern import AdhesionPattern
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
 
@@ -92,7 +93,7 @@ class Problem(ByValue):
         With an rms slope of at most 100; the theory is for slopes far below 1.
     half_space : HalfSpace
     work_of_adhesion : float
-        γ in J/m², 0 (contact without adhesion) or from 1e-30 to 1e30.
+        γ in J/m², 0 (contact without adhesion) or from 1e-30 to 1e30; with a pattern its mean.
     control : Control
         Prescribed quantity; the separation by default.
     strength : float
@@ -106,14 +107,16 @@ class Problem(ByValue):
     measure : {"arc", "flat"}
         γ counts for each length sqrt(1 + h'²) dx along the profile, or for each projected length
         dx. By keyword only.
+    pattern : AdhesionPattern, optional
+        Variation of γ, and with it of γ_open, along the profile. By keyword only.
 
     Raises
     ------
     ValueError
-        If γ or the strength is out of bounds, both strength and range are given, the strength is so
-        low that Griffith's crack at that tension is longer than a quarter of the shortest wave, or
-        the rms slope is far beyond small strain, as it is when heights and period have different
-        units.
+        If γ or the strength is out of bounds, both strength and range are given, or a strength or
+        γ = 0 beside a pattern, the strength is so low that Griffith's crack at that tension is
+        longer than a quarter of the shortest wave, or the rms slope is far beyond small strain, as
+        it is when heights and period have different units.
     TypeError
         If a part is of another class, or γ not a number.
 
@@ -130,6 +133,7 @@ class Problem(ByValue):
     adhesion_range: InitVar[float | None] = None
     work_of_adhesion_open: float | None = None
     measure: Measure = field(default="arc", kw_only=True)
+    pattern: AdhesionPattern | None = field(default=None, kw_only=True)
 
     def __post_init__(self, adhesion_range: float | None) -> None:
         instance("profile", self.profile, Profile, "single_wave or profile_from_heights")
@@ -142,6 +146,7 @@ class Problem(ByValue):
         object.__setattr__(self, "strength", strength_of(gamma, adhesion_range, self.strength))
         self._check_strength(adhesion_range)
         self._check_open()
+        self._check_pattern()
 
     @property
     def gamma_open(self) -> float:
@@ -170,6 +175,57 @@ class Problem(ByValue):
             )
         object.__setattr__(self, "work_of_adhesion_open", found if found > gamma else None)
 
+    def _check_pattern(self) -> None:
+        """Refuse a pattern beside a strength or without adhesion; leave out one without waves."""
+        if self.pattern is None:
+            return
+        instance("pattern", self.pattern, AdhesionPattern, "stripes(count, amplitude)")
+        if math.isfinite(self.strength) or self.work_of_adhesion == 0:
+            beside = f"a strength of {self.strength:g} Pa" if self.work_of_adhesion else "γ = 0"
+            raise ValueError(
+                f"a pattern of the work of adhesion is given beside {beside}: leave it out, "
+                "it is of edges of zero range with adhesion"
+            )
+        if not self.pattern.coefficients.any():
+            object.__setattr__(self, "pattern", None)
+
+    @property
+    def adhesion_text(self) -> str:
+        """The work of adhesion in words, with its bounds along the profile where it varies."""
+        gamma, pattern = self.work_of_adhesion, self.pattern
+        if pattern is None:
+            return f"{gamma:.4g} J/m²"
+        least, largest = gamma * pattern.least, gamma * pattern.largest
+        return f"{gamma:.4g} J/m² ({least:.4g} to {largest:.4g} J/m² along the profile)"
+
+    @property
+    def least_work_of_adhesion(self) -> float:
+        """Least work of adhesion of a place of the profile, in J/m²."""
+        return self.work_of_adhesion * (self.pattern.least if self.pattern else 1.0)
+
+    @property
+    def highest_harmonic(self) -> int:
+        """Largest number of waves in a period, of heights or of the work of adhesion."""
+        own = self.profile.highest_harmonic
+        return max(own, self.pattern.highest_harmonic) if self.pattern else own
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """Wavelength in m of the shortest of these waves."""
+        return self.profile.period / self.highest_harmonic
+
+    @property
+    def equal_parts(self) -> int:
+        """Number of equal parts of the period, in heights and in the work of adhesion."""
+        own = self.profile.equal_parts
+        return self.pattern.equal_parts(own) if self.pattern else own
+
+    @property
+    def mirror_axes(self) -> Array:
+        """Places x in m about which heights and work of adhesion are mirror images; λ/2 apart."""
+        axes = self.profile.mirror_axes
+        return axes[self.pattern.is_mirrored(self.profile.q0 * axes)] if self.pattern else axes
+
     def _check_strength(self, adhesion_range: float | None) -> None:
         """Refuse a strength at which a crack as long as the waves would have to be put."""
         most = LONGEST_GRIFFITH_CRACK * self.profile.shortest_wavelength
@@ -187,9 +243,11 @@ class Problem(ByValue):
             "of zero range do not describe it"
         )
 
-    def toughness(self, slope: Array) -> Array:
-        """Compute the work of adhesion for each projected length, in J/m², at slopes h'."""
-        stretch = np.sqrt(1 + slope**2) if self.measure == "arc" else np.ones_like(slope)
+    def toughness(self, x: Array, slope: Array) -> Array:
+        """Compute γ for each projected length, in J/m², at x in m where the slopes are h'."""
+        stretch: Array = np.sqrt(1 + slope**2) if self.measure == "arc" else np.ones_like(slope)
+        if self.pattern is not None:
+            stretch = stretch * self.pattern.at(self.profile.q0 * x)
         return np.asarray(self.work_of_adhesion * stretch)
 
     @property

@@ -60,8 +60,8 @@ EQUAL_CRESTS = 1e-9
 """Crests whose heights differ by less than this share of h_max are equal. Waves whose amplitude is
 below it make no two parts of a period differ."""
 
-# Of h_max: waves may be so far from their mirror image. Jumps are hardly located more finely.
-_MIRRORED = 1e-6
+MIRRORED = 1e-6
+"""Of h_max: waves may be so far from their mirror image. Jumps are hardly located more finely."""
 
 # Of the shortest wave: places in equal parts of the period that differ by less are copies.
 _SAME_PLACE = 1e-3
@@ -299,7 +299,7 @@ class Profile(ByValue):
     @cached_property
     def mirror_axes(self) -> Array:
         """Places x in m, from 0 to λ/2, about which the profile is nearly its own mirror image."""
-        harmonics, allowed = self._harmonics, _MIRRORED * self.h_max
+        harmonics, allowed = self._harmonics, MIRRORED * self.h_max
         first = int(harmonics[0])
         angle = (np.pi * np.arange(first) - np.angle(self.coefficients[first])) / first
         for m in harmonics[1:]:
@@ -312,14 +312,14 @@ class Profile(ByValue):
         """Harmonics whose amplitude makes parts of the profile differ, rising."""
         return np.flatnonzero(np.abs(self.coefficients) > EQUAL_CRESTS * self.h_max)
 
-    def first_of_equal(self, position: Array) -> NDArray[np.intp]:
+    def first_of_equal(self, position: Array, equal_parts: int) -> NDArray[np.intp]:
         """Choose, of places in m where contact may begin alike, those where it does begin.
 
-        See :func:`first_of_equal`.
+        See :func:`first_of_equal`; of so many equal parts the period of a problem consists.
         """
         near = _SAME_PLACE * self.shortest_wavelength
         return first_of_equal(
-            position, self.highest_point[0], self.period / self.equal_parts, self.period, near
+            position, self.highest_point[0], self.period / equal_parts, self.period, near
         )
 
     # ------------------------------------------------------------------ transformations

@@ -56,8 +56,8 @@ class ExactWave(Method):
 
     def __init__(self, problem: Problem, *, states_per_step: int = 32) -> None:
         super().__init__(problem)
-        if problem.profile.highest_harmonic != 1:
-            raise ValueError("the exact wave needs a profile of harmonic 1 alone")
+        if problem.highest_harmonic != 1 or problem.pattern is not None:
+            raise ValueError("the exact wave needs a profile of harmonic 1 alone, and one γ")
         self.states_per_step = states_per_step
         self.crest, amplitude = problem.profile.highest_point
         self.wave = SingleWave(

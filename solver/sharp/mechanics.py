@@ -266,7 +266,7 @@ class EdgeMechanics(EdgeProblem):
     def _force_along(self, gaps: Array, step: Array, prescribed: float, law: EdgeLaw) -> float:
         """Compute the force along a ``step`` at its end: positive where the energy falls."""
         opening = self.solution(gaps, prescribed).opening
-        residual = imbalance(opening, gaps, law, self.source.panels)
+        residual = imbalance(opening, gaps, law)
         return -float((residual * (2 * opening - residual)) @ step)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
@@ -295,7 +295,7 @@ class EdgeMechanics(EdgeProblem):
         minimum: the flow stands still there. A minimum draws the edge back.
         """
         opening = self.solution(gaps, prescribed).opening
-        residual = imbalance(opening, gaps, law, self.source.panels)
+        residual = imbalance(opening, gaps, law)
         e = int(np.argmax(np.abs(residual)))
         length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]

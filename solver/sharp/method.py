@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from adhesis.solver._kernels import Adhesion, ProfileAdhesion
 from adhesis.solver.method import (
     ContactState,
     Fields,
@@ -90,6 +91,14 @@ def _adhesion_ratio(profile: Profile, critical: float) -> float:
     return float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
 
 
+def _adhesion_of(problem: Problem, source: StressSource) -> Adhesion:
+    """Return the law of a problem's edges."""
+    ratio = problem.gamma_open / problem.work_of_adhesion if problem.pinning > 0 else 1.0
+    pattern = problem.pattern
+    bounds = (pattern.least, pattern.largest) if pattern else (1.0, 1.0)
+    return ProfileAdhesion(source.panels, ratio, *bounds)
+
+
 class SharpMethod(Method):
     """Contact states with real-valued edges.
 
@@ -101,6 +110,9 @@ class SharpMethod(Method):
         separation of jumps and the density of the states.
     chosen : str, optional
         See ``method.Method``.
+    adhesion : Adhesion, optional
+        Law of the edges, in units of the problem's γ (``kernels/edge_law.hpp``); by default that
+        of the problem.
     """
 
     name = "sharp"
@@ -111,7 +123,12 @@ class SharpMethod(Method):
     resolved_adhesion: ClassVar[tuple[float, float]] = (1e-8, 1e10)
 
     def __init__(
-        self, problem: Problem, *, accuracy: float = 1e-3, chosen: str | None = None
+        self,
+        problem: Problem,
+        *,
+        accuracy: float = 1e-3,
+        chosen: str | None = None,
+        adhesion: Adhesion | None = None,
     ) -> None:
         super().__init__(problem, chosen=chosen)
         keep_freed()
@@ -141,11 +158,11 @@ class SharpMethod(Method):
             work = share * accuracy * problem.work_of_adhesion
             exact = max(work / problem.full_contact_energy, ROUNDING)
             tolerance = min(tolerance, exact)
-        source = StressSource(profile, tolerance, problem.measure)
-        pinning = math.sqrt(1 + problem.pinning / problem.work_of_adhesion) - 1 if critical else 0.0
+        source = StressSource(profile, tolerance, problem.measure, problem.pattern)
         device = loading_device(problem)
-        self.edges = EdgeMechanics(source, critical, tolerance, device, pinning)
-        self.states = States(problem, source, self.edges.count)
+        adhesion = adhesion or _adhesion_of(problem, source)
+        self.edges = EdgeMechanics(source, critical, tolerance, device, adhesion)
+        self.states = States(problem, self.edges)
         finest = max(FIELD_RESOLVES * tolerance, ROUNDING)
         self.resolution = Resolution(
             jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
@@ -219,7 +236,7 @@ class SharpMethod(Method):
             ) from failed
         states = history.states
         if self.edges.pins:
-            states = self.states.with_receded(state, states)
+            states = self.states.with_friction(state, states)
         return Path(tuple(states), tuple(history.jumps), self._error(history))
 
     def _error(self, history: History) -> float:

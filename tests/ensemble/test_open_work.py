@@ -56,7 +56,7 @@ def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     drops = sum(jump["energy_drop"] for jump in data["jumps"])
     assert drops < 0.99 * data["loss"]  # the rest is friction between jumps
     assert data["provenance"]["units"]["friction"] == "J/m²"
-    assert np.all(np.diff([state["receded"] for state in data["states"]]) >= 0)
+    assert np.all(np.diff([state["edge_friction"] for state in data["states"]]) >= 0)
     line = f"friction    {data['friction']:.6g} J/m² at edges, which recede at 0.08 J/m²; "
     line += f"{data['loss'] - data['friction']:.6g} J/m² lost by instability"
     assert line in capsys.readouterr().out.splitlines()

@@ -62,7 +62,7 @@ class Solved(NamedTuple):
     @property
     def residual(self) -> np.ndarray:
         """C - C_c."""
-        return imbalance(self.solution.opening, self.gaps, self.edges.law, self.edges.model.panels)
+        return imbalance(self.solution.opening, self.gaps, self.edges.law)
 
     @property
     def force(self) -> np.ndarray:
@@ -172,7 +172,7 @@ def test_the_model_is_that_of_the_tangent_about_its_edges(rough):
     np.testing.assert_allclose(matrix, matrix.T)
     # C² - C_c² from C - C_c: 2 C dC - 2 C_c dC_c
     by_tangent = 2 * opening[:, None] * rough.tangent
-    _, drift = rough.edges.law.critical_openings(rough.gaps.ravel(), rough.edges.model.panels)
+    _, drift = rough.edges.law.critical_openings(rough.gaps.ravel())
     drift = drift * np.tile([1, -1], len(rough.gaps))
     by_tangent[np.diag_indices(edges)] += 2 * rough.residual * drift
     is_open = opening > 0  # edges beside an overlap act on no others
@@ -203,7 +203,7 @@ def exact_flow_through(rough: Solved, limit: np.ndarray) -> np.ndarray:
         length = lengths(theta)
         for e, f in enumerate(after):
             coupling[[e, f], [f, e]] *= lengths(places)[e] / length[e]
-        critical, _ = law.critical_openings(theta, panels)
+        critical, _ = law.critical_openings(theta)
         slopes = np.stack([panels.half_plane_opening(theta, side)[1] for side in (0, 1)])
         rate = own + sides * slopes[np.arange(edges) % 2, np.arange(edges)]
         speed = critical**2 - now * np.abs(now)
@@ -277,7 +277,7 @@ def test_a_model_without_a_minimum_has_none_at_any_distance():
 
 
 def test_openings_of_the_model_may_be_wrong_by_more_far_from_balance(rough):
-    law, panels, edges = rough.edges.law, rough.edges.model.panels, np.arange(2)
+    law, edges = rough.edges.law, np.arange(2)
     opening = rough.solution.opening[:2]
     wrong = opening + np.array([0.01 * law.critical, 0.0])
 
@@ -286,7 +286,7 @@ def test_openings_of_the_model_may_be_wrong_by_more_far_from_balance(rough):
         lengths = np.arange(1.0, 1 + count) / count
         residuals = law.critical * np.transpose([unbalance, np.ones(count)])
         flow = ModelFlow(np.ones(2), opened, lengths, residuals)
-        return float(model_error(flow, rough.residual[:2], edges, rough.gaps, law, panels))
+        return float(model_error(flow, rough.residual[:2], edges, rough.gaps, law))
 
     assert error(wrong, 0.0) > 1 > error(wrong, 1.0)
     # balanced half way

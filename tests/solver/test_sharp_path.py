@@ -18,6 +18,7 @@ from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation import branch as stable_branch
 from adhesis.solver.sharp.continuation.predictor import Predictor
+from adhesis.solver.sharp.gap.full_contact_stress import patches_between
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.nucleation.location import field_at_fixed_edges, locate
 from tests.support.explicit_solution import explicit_openings
@@ -231,9 +232,8 @@ def test_a_steep_profile_is_measured_exactly():
     measure = np.sqrt(1 + profile.at(x, 1) ** 2)
     exact = np.trapezoid(measure, x * profile.q0, axis=1).sum()
     gaps = np.array([[1.1, 2.0], [5.9, 0.3 + 2 * np.pi]])
-    patches, measured = method.states.source.contact_between(gaps)
-    assert patches == pytest.approx(np.stack([left, right], axis=1), rel=1e-14)
-    assert measured == pytest.approx(exact, rel=1e-8)
+    assert patches_between(gaps) == pytest.approx(np.stack([left, right], axis=1), rel=1e-14)
+    assert method.edges.adhesion.contact_work(gaps) == pytest.approx(exact, rel=1e-8)
 
 
 def test_a_slope_of_37_ends_in_a_loss_and_a_warning():

@@ -50,7 +50,7 @@ def dense_residual(
 ) -> Array:
     """Compute C_e - C_c at all edges."""
     opening = solve_densely(gaps, prescribed, edges.model, orders).opening
-    return imbalance(opening, gaps, edges.law, edges.model.panels)
+    return imbalance(opening, gaps, edges.law)
 
 
 def dense_tangent(gaps: Array, prescribed: float, edges: EdgeMechanics) -> Array:

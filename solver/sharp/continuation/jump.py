@@ -105,8 +105,8 @@ class Jumps:
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
-        profile = states.problem.profile
-        self.mirror = MirrorCheck(edges, profile.q0 * profile.mirror_axes)
+        problem = states.problem
+        self.mirror = MirrorCheck(edges, problem.profile.q0 * problem.mirror_axes)
         # Under a load edges help each other: in which order they run decides nothing.
         self._may_race = edges.critical > 0 and not edges.is_load
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver._kernels import CLOSING_SHARE, EdgeLaw, Panels
+from adhesis.solver._kernels import CLOSING_SHARE, EdgeLaw
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.ends import lengths_of, outward
 from adhesis.solver.sharp.tolerances import EQUAL
 
 
-def imbalance(opening: Array, gaps: Array, law: EdgeLaw, panels: Panels) -> Array:
+def imbalance(opening: Array, gaps: Array, law: EdgeLaw) -> Array:
     """Compute C_e - C_c from C at every edge, positive where contact recedes, shape (2L,)."""
-    return np.asarray(opening - law.critical_of(gaps, opening, panels))
+    return np.asarray(opening - law.critical_of(gaps, opening))
 
 
 def move_edges(gaps: Array, step: Array) -> Array:

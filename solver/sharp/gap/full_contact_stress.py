@@ -14,6 +14,7 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 from adhesis.solver._kernels import Panels
+from adhesis.solver.model.pattern import AdhesionPattern
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import Array, Profile
 
@@ -42,11 +43,15 @@ class StressSource:
         Wanted accuracy of moments and values, relative to the stress of the shortest waves.
     measure : {"arc", "flat"}
         Length on which adhesion acts.
+    pattern : AdhesionPattern, optional
+        Variation of γ along the profile.
 
     Attributes
     ----------
     top : int
-        Highest harmonic.
+        Highest harmonic, of profile and pattern.
+    is_patterned : bool
+        Whether γ varies.
     m2 : float
         Mean square slope.
     sharpest : float
@@ -56,10 +61,18 @@ class StressSource:
     panels : Panels
     """
 
-    def __init__(self, profile: Profile, tolerance: float = 0.0, measure: Measure = "arc") -> None:
-        self.top = top = profile.highest_harmonic
+    def __init__(
+        self,
+        profile: Profile,
+        tolerance: float = 0.0,
+        measure: Measure = "arc",
+        pattern: AdhesionPattern | None = None,
+    ) -> None:
+        top = profile.highest_harmonic
+        self.top = max(top, pattern.highest_harmonic) if pattern else top
+        self.is_patterned = pattern is not None
         p = next(nodes for limit, nodes in _NODES if tolerance >= limit)
-        count = 1 << int(np.ceil(np.log2(max(2 * top + 1, 16))))
+        count = 1 << int(np.ceil(np.log2(max(2 * self.top + 1, 16))))
         width = 2 * np.pi / count
         x, w = legendre.leggauss(p)
         m = np.arange(profile.coefficients.size)
@@ -73,6 +86,9 @@ class StressSource:
         tilt = _on_panels(1j * m * h, y, count) @ _to_chebyshev(y)
         if measure == "flat":
             tilt[:] = 0.0  # sqrt(1 + h'²) is then 1
+        shares = np.empty((0, _TILT_NODES))  # γ(θ)/γ
+        if pattern is not None:
+            shares = (1 + _on_panels(pattern.coefficients, y, count)) @ _to_chebyshev(y)
         t, _ = legendre.leggauss(_HALF_PLANE_NODES)
         half_plane = [a @ _to_chebyshev(t) for a in _half_plane_openings(m * h, t, count)]
 
@@ -83,9 +99,11 @@ class StressSource:
         start = np.arange(pieces)[:, None]
         piece_x = ((start + (y + 1) / 2) / pieces).ravel()
         piece_w = np.tile(v / (2 * pieces), pieces)
-        # ∫ sqrt(1 + h'²) dθ from 0 to the start of each finest panel
-        on_nodes = chebyshev.chebval(2 * piece_x - 1, tilt.T)
-        whole = np.sqrt(1 + on_nodes**2) @ piece_w
+        # ∫ sqrt(1 + h'²) γ(θ)/γ dθ from 0 to the start of each finest panel
+        stretch = np.sqrt(1 + chebyshev.chebval(2 * piece_x - 1, tilt.T) ** 2)
+        if pattern is not None:
+            stretch *= chebyshev.chebval(2 * piece_x - 1, shares.T)
+        whole = stretch @ piece_w
 
         # ω of the finest level, then each parent from its two children: exact for polynomials.
         to_left, to_right = (_lagrange(x, (x + side) / 2) for side in (-1.0, 1.0))
@@ -104,6 +122,7 @@ class StressSource:
             stress=np.ascontiguousarray(stress @ to_chebyshev),
             slope=np.ascontiguousarray(slope @ to_chebyshev),
             tilt=np.ascontiguousarray(tilt),
+            pattern=np.ascontiguousarray(shares),
             half_plane=half_plane,
             weights=list(np.ascontiguousarray(np.concatenate(levels, axis=1))),
             level_start=np.cumsum([0, *sizes[:-1]]),
@@ -116,17 +135,14 @@ class StressSource:
             top=top,
         )
 
-    def contact_between(self, gaps: Array) -> tuple[Array, float]:
-        """Return the patches between gaps, and the sum of ∫ sqrt(1 + h'²) dθ over them.
 
-        Patches have shape (L, 2), by their left edges, which lie in [0, 2π).
-        """
-        ends = gaps.ravel()
-        patches = np.concatenate([ends[-1:] - 2 * np.pi, ends[:-1]]).reshape(-1, 2)
-        patches -= np.floor(patches[:, :1] / (2 * np.pi)) * 2 * np.pi
-        first = int(np.argmin(patches[:, 0]))
-        length = self.panels.contact_length(gaps)
-        return np.concatenate([patches[first:], patches[:first]]), length
+def patches_between(gaps: Array) -> Array:
+    """Return the patches between gaps, shape (L, 2), by their left edges, which are in [0, 2π)."""
+    ends = gaps.ravel()
+    patches = np.concatenate([ends[-1:] - 2 * np.pi, ends[:-1]]).reshape(-1, 2)
+    patches -= np.floor(patches[:, :1] / (2 * np.pi)) * 2 * np.pi
+    first = int(np.argmin(patches[:, 0]))
+    return np.concatenate([patches[first:], patches[:first]])
 
 
 def _to_chebyshev(nodes: Array) -> Array:

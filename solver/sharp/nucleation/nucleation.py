@@ -9,7 +9,6 @@ touch: its seed is put when the overlap is large enough for the narrowest patch 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -70,7 +69,7 @@ class Nucleation:
         self._lengths = SearchLengths(
             wave=float(edges.wave),
             closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
-            surface=math.pi * edges.critical**2 / 8,  # Γ
+            surface=edges.surface,
             narrowest=float(3 * edges.smallest),
             widest=float(edges.longest_step),
         )
@@ -113,7 +112,8 @@ class Nucleation:
     def _choose(self, position: Array) -> Integers:
         """Choose those of equal touches at which contact begins; without adhesion all."""
         if self.edges.critical > 0:
-            return self.problem.profile.first_of_equal(position)
+            parts = self.problem.equal_parts
+            return self.problem.profile.first_of_equal(position, parts)
         return np.arange(len(position))
 
     def minimum(self, field: GapField) -> tuple[float, Minima]:

@@ -123,13 +123,13 @@ class Openings:
     ) -> Crack:
         """Judge one maximum of tension."""
         wave, critical = self.edges.wave, self.edges.critical
-        measure = float(field.source.panels.measure(np.array([theta]))[0][0])
+        work, _ = self.edges.adhesion.work(theta, False)
         return judge_maximum(
             theta,
             tension,
             self.strength,
-            balanced=0.5 * critical**2 * measure,  # γ = π E* C_c²/(16 q0), σ = E* S/2
-            toughness=measure,
+            balanced=0.5 * critical**2 * work,  # γ = π E* C_c²/(16 q0), σ = E* S/2
+            toughness=work,
             release=lambda half: self._release(field, theta, half),
             shortest=0.5 * SHORTEST_CRACK * wave,
             longest=min(LONGEST_TRIAL_HALF_LENGTH * wave, IN_PATCH * refined.edge_distance(theta)),
@@ -141,5 +141,5 @@ class Openings:
         middle = (gaps.mean(axis=1) - theta + np.pi) % (2 * np.pi) - np.pi
         crack = int(np.argmin(np.abs(middle)))
         opening = self.edges.field(gaps, field.prescribed).opening[crack]
-        critical = self.edges.critical**2 * field.source.panels.measure(gaps[crack])[0]
-        return float((np.maximum(opening, 0.0) ** 2 / critical).min())
+        work = np.array([self.edges.adhesion.work(tip, False)[0] for tip in gaps[crack]])
+        return float((np.maximum(opening, 0.0) ** 2 / (self.edges.critical**2 * work)).min())

@@ -12,11 +12,11 @@ from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
 from adhesis.solver.sharp.gap.ends import union_of
-from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.full_contact_stress import patches_between
+from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.values import with_values
 
 
@@ -70,12 +70,11 @@ class States:
     Parameters
     ----------
     problem : Problem
-    source : StressSource
-    count : Counters
+    edges : EdgeProblem
     """
 
-    def __init__(self, problem: Problem, source: StressSource, count: Counters) -> None:
-        self.problem, self.source, self.count = problem, source, count
+    def __init__(self, problem: Problem, edges: EdgeProblem) -> None:
+        self.problem, self.adhesion, self.count = problem, edges.adhesion, edges.count
         profile = problem.profile
         self.q0 = profile.q0
         self.period = profile.period
@@ -145,14 +144,14 @@ class States:
         if separation is None:
             separation = at / self.q0
         mean_stress = pressure * half
-        patches, measure = self.source.contact_between(gaps)
+        patches, closed = patches_between(gaps), self.adhesion.contact_work(gaps)
         elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * at * pressure
         return ContactState(
             separation=separation,
             edges=patches / self.q0,
             mean_stress=mean_stress,
             elastic_energy=elastic * half / self.q0**2,
-            adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
+            adhesion_energy=-self.problem.work_of_adhesion * closed / self.q0,
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             stiffness=slope * self._stiffness_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
@@ -180,23 +179,25 @@ class States:
             internal=replace(state.internal, gaps=gap_field.gaps, clearance=0.0, branch_data=None),
         )
 
-    def with_receded(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
-        """Return states with the length over which edges have receded since a state before."""
-        out, total = [], before.receded
+    def with_friction(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
+        """Return states with the energy that receding edges have dissipated since one before."""
+        out, total = [], before.edge_friction
         for state in states:
             if before.patches:
-                lost = self._contact_measure(before.internal.gaps)
+                lost = self._friction_of(before.internal.gaps)
                 if state.patches:
-                    both = union_of(before.internal.gaps, state.internal.gaps)
-                    lost -= self._contact_measure(both)
-                total += max(lost, 0.0) / self.q0
-            out.append(with_values(state, receded=total))
+                    lost -= self._friction_of(union_of(before.internal.gaps, state.internal.gaps))
+                total += max(lost, 0.0)
+            out.append(with_values(state, edge_friction=total))
             before = state
         return out
 
-    def _contact_measure(self, gaps: Array) -> float:
-        """Length along the profile, in θ, of the contact between gaps; 0 if they leave none."""
-        return self.source.contact_between(gaps)[1] if len(gaps) else 0.0
+    def _friction_of(self, gaps: Array) -> float:
+        """Energy in J/m that edges dissipate as they recede from the contact between gaps."""
+        if not len(gaps):
+            return 0.0  # they leave none
+        both = self.adhesion.contact_work(gaps, True), self.adhesion.contact_work(gaps)
+        return self.problem.work_of_adhesion * (both[0] - both[1]) / self.q0
 
     def work(self, before: ContactState, after: ContactState, way: float) -> float:
         """Compute |Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver._kernels import EdgeLaw, FieldModel, LoadingDevice
+from adhesis.solver._kernels import (
+    Adhesion,
+    EdgeLaw,
+    FieldModel,
+    LoadingDevice,
+    ProfileAdhesion,
+)
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -27,13 +33,13 @@ class EdgeProblem:
     ----------
     source : StressSource
     critical : float
-        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
+        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece where γ(x) = γ.
     tolerance : float
         Relative accuracy of the field.
     device : LoadingDevice
         What prescribes the quantity d.
-    pinning : float
-        sqrt(γ_open/γ) - 1; 0 for one work of adhesion.
+    adhesion : Adhesion, optional
+        Law of the edges (``kernels/edge_law.hpp``); by default that of one work of adhesion.
 
     Attributes
     ----------
@@ -45,6 +51,8 @@ class EdgeProblem:
         Displacement of an equilibrium that the error of the field can cause.
     smallest : float
         Narrower patches and gaps are removed.
+    surface : float
+        Γ = 2γ q0/E* where adhesion is weakest.
     law : EdgeLaw
     model : FieldModel
     count : Counters
@@ -56,20 +64,24 @@ class EdgeProblem:
         critical: float,
         tolerance: float,
         device: LoadingDevice = FIXED_SEPARATION,
-        pinning: float = 0.0,
+        adhesion: Adhesion | None = None,
     ) -> None:
         self.source, self.critical, self.tolerance = source, critical, tolerance
+        self.adhesion = adhesion or ProfileAdhesion(source.panels)
         self.wave = 2 * np.pi / source.top
         self.settled = SETTLED * self.wave
         self.coarse = max(self.settled, COARSE_FIELD * tolerance * self.wave)
         self.longest_step = LONGEST_STEP * self.wave
         # far below the width at which a patch on the sharpest crest first comes to rest,
-        # (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8
-        seed = (2 * critical**2 / source.sharpest**2) ** (1 / 3)
+        # (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8, where adhesion is weakest
+        weakest = critical**2 * self.adhesion.least
+        self.surface = np.pi * weakest / 8  # Γ
+        seed = (2 * weakest / source.sharpest**2) ** (1 / 3)
         self.smallest = SMALLEST_LENGTH * self.wave
         if critical > 0:
             self.smallest = min(self.smallest, SMALLEST_OF_SEED * seed)
         self.law = EdgeLaw(
+            adhesion=self.adhesion,
             critical=float(critical),
             newton_tolerance=self.settled,
             field_error=self.coarse,
@@ -78,7 +90,6 @@ class EdgeProblem:
             smallest=float(self.smallest),
             rough_rate=float(max(critical, np.sqrt(source.m2 * self.wave)) / self.wave),
             force_error=float(tolerance * critical**2),
-            pinning=float(pinning),
         )
         self.model = FieldModel(
             device=device,
@@ -90,7 +101,7 @@ class EdgeProblem:
     @property
     def pins(self) -> bool:
         """Whether edges are pinned, as works of adhesion differ."""
-        return self.law.pinning > 0
+        return self.adhesion.pins
 
     def law_at(self, memory: Array) -> EdgeLaw:
         """Return the law of edges that were at ``memory`` in the state before."""
@@ -102,8 +113,8 @@ class EdgeProblem:
 
     @property
     def largest_opening(self) -> float:
-        """Critical opening on a flat piece of an edge that recedes."""
-        return self.critical * (1 + self.law.pinning)
+        """Largest critical opening of an edge, on a flat piece."""
+        return float(self.critical * np.sqrt(self.adhesion.largest))
 
     @property
     def is_fixed(self) -> bool:

@@ -1,0 +1,153 @@
+"""Work of adhesion that varies along the rigid profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.checks import FINITE, HARMONIC, SHARE, real, row, whole
+from adhesis.solver.model.profile import EQUAL_CRESTS, MIRRORED, Array, Profile
+from adhesis.solver.values import ByValue
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AdhesionPattern(ByValue):
+    """Variation of the work of adhesion along one period of a profile, about its mean γ.
+
+        γ(x)/γ = 1 + Σ_m c_m exp(i m q0 x),   c_-m = conj(c_m),   c_0 = 0
+
+    It belongs to the rigid profile: where the soft solid slides along it, γ(x) stays behind. Two
+    patterns are equal if all their coefficients are.
+
+    Parameters
+    ----------
+    coefficients : complex array, shape (M + 1,)
+        c_0 … c_M, dimensionless, as those of a :class:`Profile`: an amplitude ε of wave m is
+        |c_m| = ε/2. Those of values at x_j = j λ/n are their ``numpy.fft.rfft`` over n and over
+        their mean, with c_0 set to 0.
+
+    Raises
+    ------
+    ValueError
+        If c_0 is not 0, a coefficient is not finite, or γ(x) is not positive everywhere.
+    TypeError
+        If the coefficients are not a row of numbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> pattern = AdhesionPattern([0, 0.25])
+    >>> pattern.at(np.array([0.0, np.pi]))
+    array([1.5, 0.5])
+    >>> pattern == stripes(1, 0.5)
+    True
+    """
+
+    coefficients: NDArray[np.complex128]
+
+    def __post_init__(self) -> None:
+        name = "coefficients of a pattern"
+        c = row(name, self.coefficients, entry="coefficient", imaginary=True).astype(np.complex128)
+        bad = np.flatnonzero(~np.isfinite(c))
+        if bad.size:
+            raise ValueError(f"{name} hold {c[bad[0]]} at {bad[0]}: all must be finite")
+        if c.size and c[0] != 0:
+            raise ValueError(f"c_0 of a pattern is {c[0]}: it must be 0, as γ is the mean")
+        object.__setattr__(self, "coefficients", c)
+        super().__post_init__()
+        if not self.least > 0:
+            raise ValueError(
+                f"the pattern lowers the work of adhesion to {self.least:.4g} of its mean: it must "
+                "stay positive along the whole period"
+            )
+
+    @cached_property
+    def _variation(self) -> Profile | None:
+        """γ(x)/γ - 1 as a profile over θ, or None where nothing varies."""
+        return Profile(2 * np.pi, self.coefficients) if self.coefficients.any() else None
+
+    @cached_property
+    def least(self) -> float:
+        """Least γ(x)/γ."""
+        return 1.0 - self._variation.scaled(-1.0).h_max if self._variation else 1.0
+
+    @cached_property
+    def largest(self) -> float:
+        """Largest γ(x)/γ."""
+        return 1.0 + self._variation.h_max if self._variation else 1.0
+
+    @property
+    def highest_harmonic(self) -> int:
+        """Largest m with c_m ≠ 0; 0 where nothing varies."""
+        return self._variation.highest_harmonic if self._variation else 0
+
+    def at(self, theta: Array) -> Array:
+        """Evaluate γ(x)/γ at θ = q0 x."""
+        return 1.0 + self._variation.at(theta) if self._variation else np.ones_like(theta)
+
+    def equal_parts(self, of_profile: int) -> int:
+        """Number of equal parts of a period whose profile has so many of them."""
+        waves = np.flatnonzero(np.abs(self.coefficients) > EQUAL_CRESTS)
+        return int(np.gcd.reduce(np.append(waves, of_profile)))
+
+    def is_mirrored(self, theta: Array) -> NDArray[np.bool_]:
+        """Whether γ(x) is nearly its own mirror image about each of these places."""
+        turn = np.exp(1j * np.multiply.outer(theta, np.arange(self.coefficients.size)))
+        odd = np.abs(np.imag(self.coefficients * turn)).max(axis=-1)
+        return np.asarray(odd < MIRRORED)
+
+    def shifted(self, share: float) -> AdhesionPattern:
+        """Return the pattern moved by a ``share`` of the period towards positive x."""
+        turn = np.exp(-2j * np.pi * np.arange(self.coefficients.size) * real("share", share))
+        return AdhesionPattern(self.coefficients * turn)
+
+    def mirrored(self) -> AdhesionPattern:
+        """Return the pattern γ(-x)."""
+        return AdhesionPattern(np.conj(self.coefficients))
+
+
+def stripes(count: int, amplitude: float, phase: float = 0.0) -> AdhesionPattern:
+    """Make the pattern γ(x) = γ (1 + ε cos(n q0 x + φ)).
+
+    Parameters
+    ----------
+    count : int
+        n, stripes of the larger γ in a period, from 1.
+    amplitude : float
+        ε, dimensionless, from 0 to 1, which is excluded.
+    phase : float
+        φ in rad, dimensionless: 0 for a stripe of the largest γ about x = 0.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If one of them breaks these rules.
+    """
+    coefficients = np.zeros(whole("count", count, HARMONIC) + 1, dtype=np.complex128)
+    phase = real("phase", phase, FINITE)
+    coefficients[-1] = 0.5 * real("amplitude", amplitude, SHARE) * np.exp(1j * phase)
+    return AdhesionPattern(coefficients)
+
+
+def stripes_of(
+    count: int | None, amplitude: float | None, phase: float | None
+) -> AdhesionPattern | None:
+    """Make the stripes of options, or None where neither number nor amplitude is given.
+
+    Raises
+    ------
+    ValueError
+        If only one of them is, or a phase alone.
+    """
+    if count is None and amplitude is None and not phase:
+        return None
+    if count is None or amplitude is None:
+        missing = "number" if count is None else "amplitude"
+        raise ValueError(
+            f"the {missing} of stripes of the work of adhesion is missing: give both stripes and "
+            "stripe_amplitude, or neither"
+        )
+    return stripes(count, amplitude, phase or 0.0)
