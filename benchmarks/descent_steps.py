@@ -31,8 +31,7 @@ DIFFERENT = 3e-4
 def loop_of(problem: Problem, share: float) -> LoopResult:
     """Follow a loop with steps ``share`` times as long."""
     method = SharpMethod(problem, accuracy=1e-3)
-    law = method.edges.law
-    method.edges.law = law._replace(longest_step=share * law.longest_step)
+    method.edges.law.longest_step *= share
     return run_loop(method, max_penetration=0.9, load_steps=20)
 
 
