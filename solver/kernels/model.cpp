@@ -74,8 +74,12 @@ double length_up_to(double theta, const Panels& panels) {
   Vector at(rule.nodes), tilt(at.size());
   for (double& node : at) node = panel + share * node;
   interpolate(panels.tilt, at.data(), int(at.size()), panels, tilt.data());
+  Vector works(at.size(), 1.0);
+  if (!panels.pattern.empty())
+    interpolate(panels.pattern, at.data(), int(at.size()), panels, works.data());
   double part = 0;
-  for (size_t i = 0; i < at.size(); ++i) part += rule.weights[i] * std::sqrt(1 + tilt[i] * tilt[i]);
+  for (size_t i = 0; i < at.size(); ++i)
+    part += rule.weights[i] * std::sqrt(1 + tilt[i] * tilt[i]) * works[i];
   return turns * rule.before.back() + rule.before[panel] + part * share * panels.width;
 }
 

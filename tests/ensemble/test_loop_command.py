@@ -133,7 +133,7 @@ DIMENSIONAL = {
         *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),
         *("energy_at_stake", "barrier", "work_gained", "work_spent", "full_contact_energy"),
         *("effective_work_of_approach", "effective_work_of_separation"),
-        *("work_of_adhesion_open", "friction"),
+        *("work_of_adhesion_open", "least_work_of_adhesion", "friction"),
     },
     "Pa/m": {"stiffness"},
     "s": {"seconds"},

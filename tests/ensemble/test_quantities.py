@@ -100,7 +100,7 @@ def test_heights_of_a_metre_are_asked_about_and_a_nan_is_left_to_its_rule() -> N
 # Options that are numbers, but no quantities.
 NUMBERS = {
     *("--hurst", "--m2", "--c0", "--poisson"),
-    *("--accuracy", "--field-penetrations"),
+    *("--accuracy", "--field-penetrations", "--stripe-amplitude", "--stripe-phase"),
 }
 
 

@@ -286,7 +286,7 @@ def test_a_part_has_whole_loading_branches():
     keys = [{campaign.branch_of(tasks[row]) for row in part} for part in rows]
     assert sum(map(len, keys)) == len(set().union(*keys))
     assert {len(part) for part in rows} <= {6, 9}
-    assert campaign.tasks(parts[0]) == [tasks[row] for row in rows[0]]
+    assert list(campaign.tasks(parts[0])) == [tasks[row] for row in rows[0]]
 
 
 def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():

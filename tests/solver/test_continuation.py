@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import pytest
@@ -44,6 +44,7 @@ class Curve:
     closing_factor: float = 1.0
     asked: int = 0
     pins: bool = False
+    source: ClassVar[Any] = SimpleNamespace(is_patterned=False)
 
     def half_width(self, at: float) -> float:
         """Half of the gap's length."""

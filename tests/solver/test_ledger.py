@@ -51,7 +51,7 @@ def test_a_ledger_states_work_jump_and_friction_of_each_interval():
         contact_fraction=contact,
         elastic_energy=period * s**4,
         adhesion_energy=none,
-        receded=period * np.array([0.0, 1.0, 3.0, 6.0]),
+        edge_friction=1e-3 * period * np.array([0.0, 1.0, 3.0, 6.0]),
     )
     np.testing.assert_allclose(ledger.works, -np.diff(s**4) / 4, atol=1e-15)
     np.testing.assert_allclose(ledger.friction, 1e-3 * np.array([1.0, 2.0, 3.0]))
