@@ -47,9 +47,9 @@ LOOP = {
     "output": (1, 2, SHARP, "states and fields\nin SI units"),
     "continuation": (2, 2, SHARP, "predictor, steps,\nevents, jumps"),
     "system": (3, 2, SHARP, "numbers of one\nproblem, responses"),
-    "nucleation": (2, 1, SHARP, "first touch\nin a gap"),
+    "nucleation": (2, 1, SHARP, "first touch,\nfirst opening"),
     "equilibrium": (3, 1, SHARP, "balance of edges,\nways off a saddle"),
-    "gap": (1, 0, SHARP, "conformal map,\nquadrature, stress"),
+    "gap": (1, 0, SHARP, "ends of gaps,\nfull-contact stress"),
     "field": (2, 0, SHARP, "fields of given\nedges, openings"),
 }
 # from, to, what flows

@@ -29,9 +29,10 @@ using std::numbers::pi;
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
 inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-// Four numbers that are computed together, by whatever vectors the processor has. Their alignment is
-// given, or g++ takes 16 in a common function and 32 in one for wider vectors: numbers on the heap
-// that the first has placed crash the second. A template's argument loses it, hence no std::array.
+// Four numbers that are computed together, by whatever vectors the processor has. Their alignment
+// is given, or g++ takes 16 in a common function and 32 in one for wider vectors: numbers on the
+// heap that the first has placed crash the second. A template's argument loses it, hence no
+// std::array.
 typedef double Four __attribute__((vector_size(32), aligned(32)));
 static_assert(alignof(Four) == sizeof(Four));
 

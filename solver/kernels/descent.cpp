@@ -123,7 +123,7 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
   const double force = force_at(residual, edges, ends, law);
   strongest = std::max(strongest, force);
   const std::vector<Gap> gaps = map_gaps(ends);
-  bool is_long = reach > 1 && !near_balance(force, strongest, law);
+  bool is_long = reach >= LEAST_REACH && !near_balance(force, strongest, law);
   while (true) {
     EdgeModel openings(edges, ends, residual, tangent, law, panels);
     const double longest = (is_long ? reach : std::min(reach, 1.0)) * law.longest_step;

@@ -8,14 +8,15 @@
 // A law is an `Adhesion`. It states for a place θ of the profile the work of adhesion w of an edge
 // that advances there and of one that recedes, each with its slope, and both integrals; w is that
 // of a projected length over the γ of the problem, which is a unit and nothing else. All the rest
-// follows from it, and field, flow and continuation know no other γ:
+// follows from it, and field, flow and continuation ask for no other threshold:
 //
 // - threshold: an edge moves where its opening C is C_c = critical sqrt(w), Griffith's condition.
 //   Its slope ∂C_c/∂θ is part of the tangent of its gap, hence of stability and folds, and of the
 //   Hessian of a descent;
 // - side and memory: an edge ahead of its place in the state before advances, one behind it
 //   recedes, and at that place it is held while C lies between both thresholds. So a path depends
-//   on its past, and within a jump an edge that ran too far comes back as it went;
+//   on its past, and within a descent an edge that ran too far comes back as it went. The memory
+//   of a descent is where it began; after a touch, or where a patch or gap has vanished, anew;
 // - what begins next: of an edge that is held the share of C between both thresholds and the rate
 //   of that share, from which a branch predicts where the edge begins to move;
 // - energy: that of the contact is the integral of w of advancing edges over its patches. An edge
@@ -24,7 +25,7 @@
 // What a law has to keep, and nothing checks:
 //
 // 1. w is positive, of period 2π, and smooth over the shortest wave that `StressSource.top` states:
-//    steps of a descent are a tenth of that wave, and predictors are of third order.
+//    steps of a descent are a twentieth of that wave, and predictors are of third order.
 // 2. w of an edge that recedes is nowhere less than that of one that advances. If they differ
 //    anywhere `pins` is true; else edges have no memory, and the costs of one are saved.
 // 3. `work_up_to` is the integral of `work`: or the loop integral differs from the sum of drops and
@@ -34,6 +35,8 @@
 //    unknowns than edges.
 // 5. `least` and `largest` bound w where the profile is flat: seeds and lengths that count as
 //    nothing are set by the least, bounds of how fast gaps close by the largest.
+// 6. Equal parts, mirror axes and λ_min are those of the problem, of its profile and pattern: a law
+//    that varies otherwise must share them, or edges that differ are taken to be alike.
 //
 // What remains of one γ are scales, not thresholds: `critical` in the tolerances below, the
 // accuracy of the field and the density of states by the strength of adhesion beside roughness.

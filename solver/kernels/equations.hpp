@@ -1,7 +1,7 @@
 // Equation (1) of gap_field.py: nodes, diagonal blocks and loads of given gaps.
 //
 // A gap's own part depends on the gap alone. Between gaps acts the half-space kernel at their nodes
-// (cluster_tree.hpp).
+// (tree.hpp).
 #pragma once
 
 #include "model.hpp"
@@ -47,8 +47,8 @@ double periodic_images(double x);
 // 4 [α²/sinh²(αx) - 1/x²], x = Δη: the own kernel but for a straight crack in η.
 double mapped_kernel(double alpha, double x);
 
-// Load on the own gap, and charges, of the singular opening that an edge leaves when it moves
-// (weight_function.py); `density` is space for the nodes of the gap.
+// Load on the own gap, and charges, of the singular opening that an edge leaves when it moves;
+// `density` is space for the nodes of the gap.
 void end_charges(const Nodes& nodes, const Equations& equations, int k, int side,
                  const GaussRule& rule, double* density, double* load, double* charge);
 

@@ -33,7 +33,7 @@ struct Panels {
   Vector end_x, end_w;               // Gauss-Legendre rule on (0, 1) of an end piece
   ShortRule short_rule;              // of a short gap, unless it needs more nodes
   LengthRule length;
-  int top;  // highest harmonic of the profile
+  int top;  // highest harmonic of the profile and of γ(x)
 
   int nodes() const { return int(x.size()); }
 };
@@ -72,7 +72,7 @@ inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& pa
   return evaluate_series(panels.half_plane[side], theta, panels);
 }
 
-// Compute the moments of S, and with two columns of S', over a gap; see chebyshev_moments.py.
+// Compute the moments of S, and with two columns of S', over a gap; see gap_moments.cpp.
 //
 // `s` has `fields` rows and a column for each mode, `ends` both loads of each field:
 // ends[side][field].

@@ -12,7 +12,7 @@
 namespace adhesis {
 
 struct Outdated {
-  bool changed, far;  // whether a gap has left its reference, and by how far
+  bool changed, far;  // whether a gap has left its reference, and whether far
 };
 
 // Compare a gap with its reference. The response is wrong to second order, in which the motion

@@ -16,7 +16,7 @@
 // its potential g and the charges of both halves give g1 = c1 + D1 g and g2 = c2 + D2 g. Going up
 // the tree gives R, c and D of every run, going down the potentials at every gap. The work grows as
 // the number of gaps. The responses are symmetric, and the number of negative eigenvalues, that is
-// stability, is counted on the way up.
+// stability at a fixed mean stress, is counted on the way up.
 #pragma once
 
 #include "equations.hpp"

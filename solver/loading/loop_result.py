@@ -101,7 +101,7 @@ class LoopResult(EquilibriumPath):
 
     @property
     def audit_residual(self) -> float:
-        """(loop integral - sum of drops) / loop integral; 0 for a loop without loss.
+        """(loop integral - drops and friction) / loop integral; 0 for a loop without loss.
 
         Without adhesion there is no loss: the loop integral is only rounding, and counts as such in
         ``loss_error``.

@@ -23,7 +23,9 @@ HOW_METHOD = "make_method(name, problem)"
 """Call that makes a method, for error messages."""
 
 Progress = Callable[[Branch, float, ContactState], None]
-"""Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
+"""Called after each load step with branch, drive and state; may raise to stop.
+
+The drive is u_tot/h_max, at fixed separation the penetration Δ/h_max; under a load Pa."""
 
 OnState = Callable[[Branch, ContactState], None]
 """Called with every state of a path, in order."""

@@ -59,8 +59,9 @@ class Jump(NotebookDisplay):
     patch_length : float
         Length in m of the largest patch that the jump changed, before or after it.
     raced : bool
-        True if the end state depends on the assumed speeds of the edges, or on which of two events
-        comes first that are too near to each other to tell.
+        True if the end state depends on the assumed speeds of the edges, on which of two events
+        comes first that are too near to each other to tell, or on which of two mirror images is
+        taken.
     at_stake : float
         |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
         at the other speeds or in the other order; 0 unless ``raced``.

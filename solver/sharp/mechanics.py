@@ -238,7 +238,7 @@ class EdgeMechanics(EdgeProblem):
     def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.
 
-        Both directions along the softest modes are tried. That on which energy falls more is the
+        Both directions along the softest modes are tried. That on which the force is larger is the
         first, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """

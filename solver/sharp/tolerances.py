@@ -1,8 +1,9 @@
-"""Tolerances of method ``sharp``: one table, with unit, reason and the measurement behind each.
+"""Tolerances of method ``sharp``: one table, with units and reasons, and some measurements.
 
-Units: λ_min is the shortest wavelength of the profile, C_c the critical opening of an edge on a
-flat piece, h_max the highest crest, d the prescribed quantity in the units of the field. Those of
-the kernels stand in ``solver/kernels/tolerances.hpp``; Python takes from there what it needs.
+Units: λ_min is the shortest wavelength of the profile and of γ(x), C_c the critical opening of an
+edge on a flat piece, h_max the highest crest, d the prescribed quantity in the units of the field.
+Those of the kernels stand in ``solver/kernels/tolerances.hpp``; Python takes from there what it
+needs.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 # ---------------------------------------------------------------- equilibrium of the edges
 
 SETTLED = 1e-7
-"""λ_min. A correction this small ends Newton's iteration."""
+"""λ_min. An edge this near to the reference of its gap keeps it, which ends Newton's iteration."""
 COARSE_FIELD = 10.0
 """λ_min per relative error of the field: how far an equilibrium may move with that error."""
 SMALLEST_LENGTH = 0.005
@@ -29,8 +30,8 @@ RESPONSE_TRIALS = 4
 
 LONGEST_STEP = 0.05
 """λ_min. Length over which an edge is taken to follow its tangent: longest short step of a descent,
-longest correction of an equilibrium that is searched nearby, and longest predicted motion in the
-first step after a jump, which is straight."""
+longest correction of an equilibrium that is searched nearby, and longest predicted motion in a
+step from a point before which none is known, which is straight."""
 DESCENT_HANDS_OVER = 1e-3
 """λ_min. Shorter descent steps are left to Newton's iteration, and edges that a descent moves by
 less have not left their branch."""

@@ -128,7 +128,7 @@ class TwoFolds:
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """No stable equilibrium is found a smallest step beyond ``point``.
+    """No stable equilibrium is found beyond ``point``, by a smallest step or one across the fold.
 
     Attributes
     ----------
@@ -219,7 +219,7 @@ class Branch:
             self._passed.insert(0, point.previous)
         self.trail = Trail(point)
         self.steps = StepSize(resolution.jump)
-        # straight after a jump or turn: short steps there keep the integral exact
+        # straight where no point before is known: short steps there keep the integral exact
         self._predictor = Predictor(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
         self._free_step, self._begins_to_move = 0.0, False  # with two works of adhesion

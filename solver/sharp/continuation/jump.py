@@ -127,7 +127,7 @@ class Jumps:
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
         to a fold it may not be found again from its own edges. The jump raced, too, if another of
         two events that may come in either of ``orders`` leads elsewhere in the end, or if it ends
-        on one of two sides that are mirror images. Under a load neither is sought.
+        on one of two sides that are mirror images. Under a load no other order is sought.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals)

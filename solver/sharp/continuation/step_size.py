@@ -14,7 +14,8 @@ class StepSize:
     Parameters
     ----------
     finest : float
-        Separation to which a jump is located, in d; no shorter step is taken.
+        Separation to which a jump is located, in d: the smallest step, but across a fold or to the
+        target.
 
     Attributes
     ----------

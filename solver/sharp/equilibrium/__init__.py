@@ -1,4 +1,4 @@
-"""Equilibrium of the contact edges by Griffith's condition: Newton's iteration, stability, rates.
+"""Points of a branch, the balance of the edges, and steps off a saddle.
 
 Import from its modules.
 """

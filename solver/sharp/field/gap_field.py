@@ -25,9 +25,9 @@ At an edge T ≈ C sqrt(r), r the distance from the edge in θ, and
     C = sqrt(2 dη/dθ) [f(±1) - (s^± - Σ_{n<M} (±1)^n s_n)],      K = (E*/4) C sqrt(2π/q0),
     G = K²/(2E*) = π E* C² / (16 q0).
 
-K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. (1) is assembled in
-``kernels/equations.cpp`` and solved on a tree of the gaps (``kernels/tree.hpp``) in
-``kernels/field.cpp``.
+K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. The part of (1) that is
+each gap's own is assembled in ``kernels/equations.cpp``; ``kernels/field.cpp`` solves (1) on a tree
+of the gaps (``kernels/tree.hpp``).
 """
 
 from __future__ import annotations

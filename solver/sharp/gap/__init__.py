@@ -1,4 +1,4 @@
-"""Ends, conformal map, quadrature, full-contact stress and moments of a gap.
+"""Ends of gaps, and the full-contact stress on panels.
 
 Import from its modules.
 """

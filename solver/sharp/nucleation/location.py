@@ -176,7 +176,7 @@ def locate(
     clearance: float,
     ignored: float = 0.0,
 ) -> tuple[Located[Seed] | None, float]:
-    """Locate the first point of a trail at which a criterion is met, with its seeds.
+    """Locate where along a trail a criterion begins to be met, as it is at its end, with the seeds.
 
     Else None and the least value at the end of the trail. The trail starts at a point known to be
     clear, by ``clearance`` at least; between its points the search ends at ``resolution`` (d). A

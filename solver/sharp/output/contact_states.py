@@ -84,7 +84,7 @@ class States:
         self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
 
     def to_field_units(self, prescribed: float) -> float:
-        """Convert the prescribed value to d: q0 times a separation or u_tot, 2p̄/E* of a load."""
+        """Convert the prescribed value to d: q0 (s - p̄/k) at a stiffness k, -2p̄/E* of a load."""
         if self.problem.control.is_load:
             return prescribed / self._half
         return prescribed * self.q0

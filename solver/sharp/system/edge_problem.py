@@ -46,7 +46,7 @@ class EdgeProblem:
     wave : float
         λ_min in θ.
     settled : float
-        A correction this small ends Newton's iteration.
+        An edge this near to the reference of its gap keeps it.
     coarse : float
         Displacement of an equilibrium that the error of the field can cause.
     smallest : float
