@@ -280,7 +280,8 @@ def instance(name: str, value: T, kind: type[Any], how: str) -> T:
                 "%autoreload), which makes new classes: start Python anew, and leave adhesis out "
                 "of the reload"
             )
-        raise TypeError(_sentence(name, value, f"a {kind.__name__}; make one with {how}"))
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise TypeError(_sentence(name, value, f"{article} {kind.__name__}; make one with {how}"))
     return value
 
 

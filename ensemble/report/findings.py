@@ -73,6 +73,25 @@ def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
     return f"; {_from_to(share)} is friction of receding edges" if share else ""
 
 
+def pattern(data: Aggregate) -> list[str]:
+    """Report how γ varies along the profile; none where it does not."""
+    if data.campaign.material.stripes is None:
+        return []
+    cells = [cell.campaign.material for cell in data.cells]
+    ends = {
+        name: sorted({getattr(material, name) for material in cells})
+        for name in ("stripes", "stripe_amplitude", "stripe_phase")
+    }
+    count, amplitude, phase = (
+        " to ".join(dict.fromkeys(f"{value:g}" for value in (found[0], found[-1])))
+        for found in ends.values()
+    )
+    return [
+        f"The work of adhesion varies along the profile, {count} times in its period and by "
+        f"{amplitude} of γ (phase {phase} rad); γ is its mean."
+    ]
+
+
 def _from_to(shares: Sequence[float]) -> str:
     return percent(*sorted({min(shares), max(shares)}))
 

@@ -35,7 +35,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
     out = [
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
-        *_bullets([*findings.precision(data), *findings.missing(data)]),
+        *_bullets([*findings.pattern(data), *findings.precision(data), *findings.missing(data)]),
         _summary(data),
         left_out(data),
         shown_cells(data),

@@ -7,6 +7,7 @@ result, for their checksums.
 from __future__ import annotations
 
 import os
+import shlex
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -218,7 +219,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines += ["", f"{len(status['beyond_limit'])} losses are doubtful: {why}"]
         lines += _listed(status["beyond_limit"], _range_of)
     if status["failures"]:
-        lines += ["", *_failure_lines(status["failures"])]
+        lines += ["", *_failure_lines(status["failures"], status["file"])]
     return printable("\n".join(lines))
 
 
@@ -274,20 +275,20 @@ def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def _failure_lines(failures: list[dict[str, Any]]) -> list[str]:
+def _failure_lines(failures: list[dict[str, Any]], path: str) -> list[str]:
     errors = [f["error"] for f in failures]
     return [
         *(f"failed {count}×: {error}" for error, count in Counter(errors).most_common(5)),
-        *_listed(failures, lambda row: f", after {row['seconds']:.3g} s"),
-        advice_on_failures(errors),
+        *_listed(failures, lambda row: f", after {row['seconds']:.3g} s" if row["seconds"] else ""),
+        advice_on_failures(errors, path),
     ]
 
 
-def advice_on_failures(errors: Sequence[str]) -> str:
+def advice_on_failures(errors: Sequence[str], path: str) -> str:
     """Return what to do about failed tasks: those that the solver refused fail again."""
     recurring = sum(error.startswith("PathError") for error in errors)
     if not recurring:
-        return "again: adhesis run CAMPAIGN.toml --redo failed"
+        return f"again: adhesis run CAMPAIGN.toml --out {shlex.quote(path)} --redo failed"
     which = "they fail" if recurring == len(errors) else f"{recurring} of them fail"
     return (
         f"{which} again if they are computed again: follow the reason given, in a campaign with "

@@ -25,6 +25,7 @@ from adhesis.ensemble.run.batches import Batches
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.task.compute import check_task
 from adhesis.ensemble.versions import versions
+from adhesis.solver.checks import counted
 
 Group = tuple[float, ...]
 _MOST_SHOWN = 10
@@ -148,7 +149,7 @@ def prepare(
         if redo is not None:
             states = zip(results.tasks(), status.tolist(), strict=True)
             chosen = [row for row, (task, state) in enumerate(states) if redo.takes(task, state)]
-            say(f"{path}: {len(chosen)} tasks will be computed again")
+            say(f"{path}: {counted(len(chosen), 'task')} to be computed again")
             again += chosen
         status[again] = PENDING
         plan = _plan(results, status)

@@ -302,8 +302,10 @@ class EquilibriumPath(ByValue, ResultViews):
 
     def friction_summary(self) -> str:
         """Return in one line what is friction of edges; empty with one work of adhesion."""
-        gamma = self.problem.work_of_adhesion_open
-        return "" if gamma is None else friction_text(gamma, self.lost, self.friction)
+        gamma, pattern = self.problem.work_of_adhesion_open, self.problem.pattern
+        if gamma is None:
+            return ""
+        return friction_text(gamma, self.lost, self.friction, varies=pattern is not None)
 
     def range_summary(self) -> str:
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""
@@ -390,10 +392,16 @@ class EquilibriumPath(ByValue, ResultViews):
         return [asdict(jump) | {"penetration": penetration(jump.separation)} for jump in self.jumps]
 
 
-def friction_text(work_of_adhesion_open: float, lost: float, friction: float) -> str:
-    """Return in one line which part of a loss is friction of edges; values in J/m²."""
+def friction_text(
+    work_of_adhesion_open: float, lost: float, friction: float, *, varies: bool = False
+) -> str:
+    """Return in one line which part of a loss is friction of edges; values in J/m².
+
+    ``varies`` tells whether the works of adhesion vary along the profile.
+    """
+    mean = " in the mean" if varies else ""
     return (
-        f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²; "
+        f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²{mean}; "
         f"{lost - friction:.6g} J/m² lost by instability"
     )
 

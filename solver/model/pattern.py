@@ -147,7 +147,7 @@ def stripes_of(
     if count is None or amplitude is None:
         missing = "number" if count is None else "amplitude"
         raise ValueError(
-            f"the {missing} of stripes of the work of adhesion is missing: give both stripes and "
-            "stripe_amplitude, or neither"
+            f"the {missing} of stripes of the work of adhesion is missing: give stripes and "
+            "stripe_amplitude together, and stripe_phase with both, or none of them"
         )
     return stripes(count, amplitude, phase or 0.0)

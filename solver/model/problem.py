@@ -183,8 +183,8 @@ class Problem(ByValue):
         if math.isfinite(self.strength) or self.work_of_adhesion == 0:
             beside = f"a strength of {self.strength:g} Pa" if self.work_of_adhesion else "γ = 0"
             raise ValueError(
-                f"a pattern of the work of adhesion is given beside {beside}: leave it out, "
-                "it is of edges of zero range with adhesion"
+                f"a pattern of the work of adhesion is given beside {beside}: give one of them, "
+                "the work of adhesion varies at edges of zero range that adhere"
             )
         if not self.pattern.coefficients.any():
             object.__setattr__(self, "pattern", None)

@@ -200,11 +200,11 @@ def _run(
         summary = run_campaign(campaign, path, comm, options, log, engine)
     except Unresponsive as error:
         # Nobody can be waited for: what is in flight is lost, the results file is sound.
-        text = f"adhesis run: {error}; what was done is kept, run the same command again to resume"
+        text = f"adhesis run: {error}; what was done is kept, {_again(options)}"
         _end_job(comm, RESUME, text)
         return RESUME
     if comm.rank == 0:
-        _report_end(campaign, path, summary)
+        _report_end(campaign, path, summary, options)
     return _code(summary, options)
 
 
@@ -217,7 +217,14 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
-def _report_end(campaign: Campaign, path: Path, summary: Summary) -> None:
+def _again(options: Options) -> str:
+    """Return how a run is resumed; with --redo what it did would be computed once more."""
+    if options.redo is None:
+        return "run the same command again to resume"
+    return "run the command again without --redo to resume"
+
+
+def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Options) -> None:
     """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
@@ -238,8 +245,7 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary) -> None:
         log(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
     if summary.stopped:
         log(
-            f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "
-            "run the same command again to resume"
+            f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {_again(options)}"
         )
 
 
