@@ -75,7 +75,7 @@ LOOP_ARROWS = (
     ("references", "validate", "exact"),
     ("output", "sharp", "states"),
     ("continuation", "output", "points"),
-    ("system", "continuation", "responses"),
+    ("system", "continuation", "fields"),
     ("nucleation", "continuation", "touches"),
     ("equilibrium", "continuation", "points"),
     ("field", "equilibrium", "release rates"),

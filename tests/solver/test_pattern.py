@@ -213,7 +213,7 @@ def test_a_wrong_pattern_is_refused(make, message):
 
 def test_a_pattern_beside_a_strength_or_without_adhesion_is_refused():
     for gamma, beside in ((GAMMA, "a strength of 1e\\+07 Pa"), (0.0, "γ = 0")):
-        with pytest.raises(ValueError, match=f"is given beside {beside}: leave it out"):
+        with pytest.raises(ValueError, match=f"is given beside {beside}: give one of them"):
             Problem(single_wave(A, PERIOD), SOLID, gamma, strength=1e7, pattern=stripes(2, 0.1))
     with pytest.raises(TypeError, match=r"pattern is 0\.3"):
         Problem(single_wave(A, PERIOD), SOLID, GAMMA, pattern=0.3)
