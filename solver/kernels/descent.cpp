@@ -176,7 +176,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   const Device& device = model.device;
   Flags& runs = running.edges;
   Descent out;
-  double& reach = out.reach = running.reach;
+  double& reach = running.reach;
   Flags held = held_edges(runs, ends, law);
   Integers edges = indices(held);
   Vector before = ends;

@@ -24,17 +24,16 @@ struct Descent {
   DescentEvent event = DescentEvent::step_limit;
   Vector ends;
   int steps = 0;  // solutions of the linear response
-  double reach;   // of the next long step, in longest steps
   // Whether the order in which the edges ran may have decided where they ended: some took so much
   // force from others. Edges that increase each other's force end alike in any order.
   bool raced = false;
 };
 
-// What a descent knows of the way that its edges have come.
+// What a descent knows of the way that its edges have come, also after it has outgrown a response.
 struct Running {
   Flags edges;                 // those that run
   Vector start;                // ends where they began to run
-  double reach = FIRST_REACH;  // of the first long step, in longest steps
+  double reach = FIRST_REACH;  // of the next long step, in longest steps
 };
 
 // Descend until an event; `running.edges` follows. Without adhesion the edges are stable but where

@@ -176,11 +176,12 @@ class EdgeMechanics(EdgeProblem):
         orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            end, orders = self._descend(gaps, prescribed, left, orders, law, equal_speeds, start)
+            end, orders, left = self._descend(
+                gaps, prescribed, left, orders, law, equal_speeds, start
+            )
             if end is None or end.event == DescentEvent.NO_FIELD:
                 raise NoState("there is no field of these edges", prescribed)
             gaps, raced = end.gaps, raced or end.raced
-            left -= end.steps
             if end.event == DescentEvent.VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
@@ -216,8 +217,8 @@ class EdgeMechanics(EdgeProblem):
         law: EdgeLaw,
         equal_speeds: bool,
         start: Array,
-    ) -> tuple[Descent | None, Integers | None]:
-        """Descend on a linear response; returns the orders that it came to, too.
+    ) -> tuple[Descent | None, Integers | None, int]:
+        """Descend on linear responses; returns the orders that it came to and the steps left, too.
 
         None if the edges have no field.
         """
@@ -225,13 +226,14 @@ class EdgeMechanics(EdgeProblem):
         while True:
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
-                return None, orders
+                return None, orders, most
             end = near.response.descend(
                 gaps, prescribed, most, equal_speeds, running, law, self.model
             )
             self.count.add_descent(end.steps)
+            most -= end.steps
             if end.event != DescentEvent.OUTGROWN:
-                return end, near.response.orders
+                return end, near.response.orders, most
             gaps = end.gaps
             near.is_outgrown = True
 

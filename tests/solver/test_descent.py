@@ -338,6 +338,22 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
 
 
+def test_a_descent_in_pieces_keeps_the_reach_to_which_its_model_led(wave):
+    """Begun anew with the first reach it would take the same step too far, again and again."""
+    edges, ends = wave.edges, np.array(NARROW)
+    prescribed, running = 0.5 * 2 * np.pi * 1e-3, Running(np.array(NARROW))
+    for _ in range(30):
+        near = edges.responses.near(ends, prescribed, None)
+        assert near is not None
+        found = near.response.descend(ends, prescribed, 2, False, running, edges.law, edges.model)
+        near.is_outgrown, ends = found.event == DescentEvent.OUTGROWN, found.gaps
+        if found.event == DescentEvent.AT_REST:
+            break
+    assert found.event == DescentEvent.AT_REST
+    whole = run(wave, NARROW, 0.5, 1000)
+    np.testing.assert_allclose(ends, whole.gaps, atol=2 * edges.law.rest_step)
+
+
 def test_a_patch_vanishes_where_the_surfaces_are_far_apart(wave):
     found = run(wave, SLIVER, 5.0, 1000)
     assert found.event == DescentEvent.VANISHED
