@@ -36,6 +36,7 @@ from adhesis.solver.sharp.continuation.branch import Branch
 from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.field.patch_tension import RefinedTension
 from adhesis.solver.sharp.gap.ends import with_gaps
+from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
 
 PERIOD = 2e-3
 # Two troughs, of which the one at x = λ/2 is the shallower.
@@ -194,10 +195,26 @@ def test_a_difference_that_shorter_steps_keep_is_none_of_the_steps(error_of, jud
         _imbalance=lambda output, point: error_of(point.at),
         _resolution=SimpleNamespace(jump=1e-6, work=1.0),
         _work_before=(0.0, math.inf),
+        _work_of_fields=0.0,
     )
     start = SimpleNamespace(at=0.0)
     found = [Branch._work_error(branch, start, SimpleNamespace(at=at)) for at in (1.0, 0.5)]
     assert found == pytest.approx(judged)
+
+
+def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
+    """It halved each of them once, so that none grew again: such a loop did not end."""
+    branch = SimpleNamespace(
+        _imbalance=lambda output, point: 100.0,
+        _resolution=SimpleNamespace(jump=1e-6, work=1.0),
+        _work_before=(0.0, math.inf),
+        _work_of_fields=0.0,
+    )
+    start = SimpleNamespace(at=0.0)
+    for at in (1.0, 0.5):
+        Branch._work_error(branch, start, SimpleNamespace(at=at))
+    branch._work_before = (0.0, math.inf)  # the step was accepted
+    assert Branch._work_error(branch, start, SimpleNamespace(at=2.0)) == TRAPEZOID_FAR
 
 
 def test_energies_are_as_exact_as_the_work_they_are_compared_with():

@@ -222,6 +222,7 @@ class Branch:
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = Predictor(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
+        self._work_of_fields = 0.0  # largest difference that a shorter step did not reduce
         self._free_step, self._begins_to_move = 0.0, False  # with two works of adhesion
         self._two_folds: TwoFolds | None = None
         self._folds_apart = math.inf  # by the last prediction that saw two
@@ -385,7 +386,7 @@ class Branch:
 
         Zero for steps much shorter than the resolution of jumps. A difference that a shorter step
         does not reduce is no error of the step: energies differ by it where the number of modes of
-        a gap changes. It then lies between two states, and halves no further step.
+        a gap changes. No smaller one halves a further step of the branch.
         """
         span = abs(point.at - output.at)
         short = span < WORK_RESOLVED * self._resolution.jump
@@ -396,8 +397,9 @@ class Branch:
             return 0.0
         longer, larger = self._work_before
         self._work_before = span, error
-        stalled = span < longer and error > WORK_STALLED * larger
-        return min(error, TRAPEZOID_FAR) if stalled else error
+        if span < longer and error > WORK_STALLED * larger:
+            self._work_of_fields = max(error, self._work_of_fields)
+        return min(error, TRAPEZOID_FAR) if error <= self._work_of_fields else error
 
 
 def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | None:
