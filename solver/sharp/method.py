@@ -29,7 +29,7 @@ from adhesis.solver.method import (
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
-from adhesis.solver.runtime.threads import on_one_thread, one_at_a_time
+from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import History, Jumps
@@ -194,14 +194,12 @@ class SharpMethod(Method):
         )
 
     @one_at_a_time
-    @on_one_thread
     def fields(self, state: ContactState, n: int) -> Fields:
         """Compute stress, displacement and gap of ``state`` on n nodes, by quadrature over gaps."""
         field = self._field(state) if state.patches else None
         return fields_of(self.problem, field, state.separation, n)
 
     @one_at_a_time
-    @on_one_thread
     def largest_tension(self, states: Sequence[ContactState]) -> PatchTension | None:
         """Find the largest local maximum of tension inside patches; see the contract."""
         return largest_tension(self.problem, lambda i: self._field(states[i]), len(states))
@@ -216,7 +214,6 @@ class SharpMethod(Method):
         return self.edges.field(state.internal.gaps, self.states.prescribed_of(state))
 
     @one_at_a_time
-    @on_one_thread
     def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the quasi-static path; see the contract."""
         branch = self.problem.branch_to(state, prescribed)

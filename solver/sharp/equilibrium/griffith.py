@@ -6,6 +6,7 @@ import numpy as np
 
 from adhesis.solver._kernels import CLOSING_SHARE, EdgeLaw
 from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.threads import one_thread
 from adhesis.solver.sharp.gap.ends import lengths_of, outward
 from adhesis.solver.sharp.tolerances import EQUAL
 
@@ -40,7 +41,8 @@ def leaving_step(hessian: Array, limit: Array, order: Array) -> Array | None:
     first in ``order`` (positions). Where symmetry makes several modes equally soft, the step is the
     leading edge's projection on all of them: which of equivalent edges leads does not matter.
     """
-    values, vectors = np.linalg.eigh(hessian)
+    with one_thread():
+        values, vectors = np.linalg.eigh(hessian)
     if not values[0] < 0:
         return None
     soft = vectors[:, values <= min(values[0] + EQUAL * np.abs(values).max(), 0.0)]
