@@ -21,7 +21,7 @@ inline constexpr double CHARGE_MARGIN = 1.0;
 // run at an accuracy of 1e-14, and of 1e-17 at 1e-5.
 inline constexpr int MOST_CHARGES = 160;
 
-// Sine nodes per λ_min that bracket every local minimum of an opening, and for the energy.
+// Sine nodes per λ_min that bracket every local minimum of an opening.
 inline constexpr double SHAPE_NODES = 6.0;
 
 // Sine nodes of a gap beyond those by its length, for its ends.
