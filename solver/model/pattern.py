@@ -15,7 +15,9 @@ from adhesis.solver.values import ByValue
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdhesionPattern(ByValue):
-    """Variation of the work of adhesion along one period of a profile, about its mean γ::
+    """Variation of the work of adhesion along one period of a profile, about its mean γ.
+
+    ::
 
         γ(x)/γ = 1 + Σ_m c_m exp(i m q0 x),   c_-m = conj(c_m),   c_0 = 0
 
