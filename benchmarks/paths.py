@@ -2,7 +2,7 @@
 
     python benchmarks/paths.py [--profiles 3] [--turns 8]
 
-Prints the tables of docs/paths.md. CPU time of one process, after a first loop.
+Prints two tables. CPU time of one process, after a first loop.
 """
 
 from __future__ import annotations

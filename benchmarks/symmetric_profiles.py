@@ -1,6 +1,6 @@
 """Losses of random mirror-symmetric profiles beside those of profiles with one phase shifted.
 
-The page docs/methods.md, "Symmetry", states what comes out. Run from the repository:
+Those that exceed their reported error are named in docs/methods.md. Run from the repository:
 
     python benchmarks/symmetric_profiles.py --profiles 40
     python benchmarks/symmetric_profiles.py --profiles 4 --crests 16

@@ -26,6 +26,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["_build"]  # of an earlier site, with the pages that it hands out
 language = "en"
 smartquotes = False  # options begin with two hyphens
 

@@ -41,7 +41,7 @@ def make_method(
 
     References
     ----------
-    docs/methods.md, "Method `auto`"
+    docs/methods.md, "Which one"
     """
     choice("method", name, METHOD_NAMES)
     instance("problem", problem, Problem, "Problem(profile, half_space, work_of_adhesion)")

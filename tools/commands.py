@@ -34,7 +34,8 @@ def _command(name: str, described: dict[str, str]) -> Iterator[str]:
     """
     parser = parser_of(name)
     first, *_ = (parser.description or "").split("\n\n")
-    yield f"## adhesis {name}\n{markdown(' '.join(first.split()))}"
+    text = markdown(" ".join(first.split())).replace(r"\`\`", "`")  # names of commands, as code
+    yield f"## adhesis {name}\n{text}"
     yield f"```text\n{' '.join(_usage(name, parser._actions))}\n```"
     for group in parser._action_groups:
         shown = [a for a in group._group_actions if "--help" not in a.option_strings]

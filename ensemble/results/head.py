@@ -4,6 +4,11 @@ A run changes rows alone: what HDF5 keeps about the datasets, the root attribute
 scales and the tasks never change after the file is laid out. Their checksum stands, together with
 the places of the rows, in the text of the root attribute ``head``. It is found by its first words
 and compared before HDF5 reads the file, because HDF5 can crash over damaged bytes of its own.
+
+The text is 8192 characters long: its name, the CRC-32 as eight hexadecimal digits, the size of the
+file, and ranges of bytes, each as first byte + length. The CRC-32 is that of the text from the size
+on, and then of all bytes outside the ranges: those of the rows, of this text, and of four bytes
+that HDF5 sets while it writes.
 """
 
 from __future__ import annotations

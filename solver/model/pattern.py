@@ -17,6 +17,8 @@ from adhesis.solver.values import ByValue
 class AdhesionPattern(ByValue):
     """Variation of the work of adhesion along one period of a profile, about its mean γ.
 
+    ::
+
         γ(x)/γ = 1 + Σ_m c_m exp(i m q0 x),   c_-m = conj(c_m),   c_0 = 0
 
     It belongs to the rigid profile: where the soft solid slides along it, γ(x) stays behind. Two
