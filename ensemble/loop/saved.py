@@ -260,12 +260,10 @@ def _contradiction(found: xr.Dataset, result: Result) -> str | None:
     for name in (found.attrs.keys() | again.attrs.keys()) - {"adhesis_version"}:
         if not _alike(found.attrs.get(name), again.attrs.get(name)):
             return str(name)
-    for name, value in _recomputed(result).items():
-        if not _alike(getattr(result, name), value):
-            return name
     scale = float(np.sum(np.abs(result.mean_stress[1:] * np.diff(result.separation))))
-    for name, value in _works(result).items():
-        if not _alike(getattr(result, name), value, scale):
+    values, works = _recomputed(result)
+    for name, value in (values | works).items():
+        if not _alike(getattr(result, name), value, scale if name in works else 0.0):
             return name
     change = result.energy_change if isinstance(result, PathResult) else 0.0
     audited = abs(result.loss - change - result.loss_from_drops)
@@ -274,40 +272,33 @@ def _contradiction(found: xr.Dataset, result: Result) -> str | None:
     return None
 
 
-def _recomputed(result: Result) -> dict[str, Any]:
-    """Compute anew what a result keeps beside the states and jumps that it follows from."""
-    values: dict[str, Any] = {
-        "penetration": result.problem.penetration(result.separation),
-        "loss_from_drops": result.ledger.loss,
+def _recomputed(result: Result) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Compute anew what a result keeps beside the states and jumps that it follows from.
+
+    Returns numbers and arrays, and works in J/m² of nominal area.
+    """
+    problem, ledger = result.problem, result.ledger
+    values = {
+        "penetration": problem.penetration(result.separation),
+        "loss_from_drops": ledger.loss,
     }
     if isinstance(result, PathResult):
-        values["potential"] = result.ledger.stored * result.problem.profile.period
-    if isinstance(result, LoopResult):
-        deepest = result.penetration[_turn(result)]
-        is_fixed = result.problem.control.is_fixed
-        values["max_penetration"] = result.turning_point if is_fixed else deepest
-        values["loss_dimensionless"] = result.loss / result.problem.loss_scale
-    return values
+        values["potential"] = ledger.stored * problem.profile.period
+        return values, {"work": ledger.work, "energy_change": ledger.rise}
+    turn = int(result.states("unloading")[0])
+    is_fixed = problem.control.is_fixed
+    values["max_penetration"] = result.turning_point if is_fixed else result.penetration[turn]
+    values["loss_dimensionless"] = result.loss / problem.loss_scale
+    gained = -ledger.part(0, turn).displacement_work
+    return values, {
+        "loss": ledger.work,
+        "work_gained": gained,
+        "work_spent": ledger.work + gained,
+    }
 
 
-def _pattern(found: xr.Dataset) -> AdhesionPattern | None:
-    if "pattern_real" not in found:
-        return None
-    return AdhesionPattern(found["pattern_real"].values + 1j * found["pattern_imag"].values)
-
-
-def _works(result: Result) -> dict[str, float]:
-    """Compute the work of a result anew, in J/m² of nominal area."""
-    ledger = result.ledger
-    if isinstance(result, PathResult):
-        return {"work": ledger.work, "energy_change": ledger.rise}
-    gained = -ledger.part(0, _turn(result)).displacement_work
-    return {"loss": ledger.work, "work_gained": gained, "work_spent": ledger.work + gained}
-
-
-def _turn(result: LoopResult) -> int:
-    """Return the index of the first state of unloading."""
-    return int(result.states("unloading")[0])
+def _waves(found: xr.Dataset, name: str) -> Any:
+    return found[f"{name}_real"].values + 1j * found[f"{name}_imag"].values
 
 
 def _alike(one: Any, other: Any, scale: float = 0.0) -> bool:
@@ -344,17 +335,16 @@ def _result(found: xr.Dataset) -> Result:
             values[name] = InteriorTension(**json.loads(about[name])) if name in about else None
         elif name in about and name not in _NOT_KEPT:
             values[name] = np.asarray(about[name]).item()
-    coefficients = found["coefficient_real"].values + 1j * found["coefficient_imag"].values
     report = json.loads(about["method"])
     method = SavedReport(report.pop("name"), report.pop("chosen"), report)
     problem = Problem(
-        Profile(coefficients=coefficients, period=float(about["period"])),
+        Profile(coefficients=_waves(found, "coefficient"), period=float(about["period"])),
         HalfSpace(float(about["young"]), float(about["poisson"])),
         float(about["work_of_adhesion"]),
         Control(float(about["stiffness"])),
         float(about.get("strength", math.inf)),
         work_of_adhesion_open=float(about["work_of_adhesion_open"]),
         measure=about.get("measure", "arc"),
-        pattern=_pattern(found),
+        pattern=AdhesionPattern(_waves(found, "pattern")) if "pattern_real" in found else None,
     )
     return kind(problem=problem, method=method, **values)
