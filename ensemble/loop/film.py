@@ -27,7 +27,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError, one_of
 from adhesis.ensemble.loop.film_page import BODY, STYLE
-from adhesis.ensemble.loop.film_scenes import Scene, Scenes, scenes_of
+from adhesis.ensemble.loop.film_scenes import Scene, Scenes
 from adhesis.ensemble.outputs import check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.ensemble.report.html import whole_page
@@ -73,16 +73,6 @@ def check_film(name: str, path: str | os.PathLike[str]) -> Path:
             f"{name} is {path}: ffmpeg, which writes .mp4, is not installed, so take .html or .gif"
         )
     return path
-
-
-def film_of(
-    result: LoopResult | PathResult,
-    *,
-    frames: int = 120,
-    progress: Callable[[int, int], None] | None = None,
-) -> Film:
-    """Compute the film of a result; see :meth:`adhesis.LoopResult.film`."""
-    return Film(result, scenes_of(result, frames, progress))
 
 
 class Film:

@@ -32,6 +32,9 @@ _LEAST_SECONDS, _SECONDS_OF_WAVE, _SECONDS_OF_PATCH = 0.05, 1.5e-4, 1.7e-3
 _WAVES_POWER, _PATCHES_POWER = 0.24, 1.7
 # Crests are counted at so many penetrations, up to this one where the turning point is none.
 _LEVELS, _USUAL_PENETRATION = 18, 0.9
+TABLES = ("work of adhesion", "turning point")
+"""Groups of the loops that fill the tables, and measure no doubt."""
+
 # Loop without the crests and troughs that stand far out of all others.
 WITHOUT_FEATURES = "without single features"
 _START = 2.0  # seconds for a process to start
@@ -135,11 +138,9 @@ def _doubts(prepared: Prepared) -> list[Run]:
 
     for longer in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0), 1 / math.sqrt(2.0)):
         if longer * cut <= length / 4 if longer > 1 else longer * cut >= 2.5 * step:
-            name, described = (
-                f"cut-off × {longer:.3g}",
-                f"waves down to {length_text(longer * cut)}",
-            )
-            runs.append(Run(name, "cut-off", described, {"cut_off": longer * cut}))
+            described = f"waves down to {length_text(longer * cut)}"
+            shortest = {"cut_off": longer * cut}
+            runs.append(Run(f"cut-off × {longer:.3g}", "cut-off", described, shortest))
     variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
     for part in (0.05, 0.1):
         faded = f"both ends faded to the mean over {100 * part:.0f} %"
@@ -241,8 +242,8 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
             break
         factor *= 2
     if not quick:
-        tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]
-        saved = sum(plan.seconds[name] for name in tables) / max(plan.processes, 1)
+        tables = (plan.seconds[run.name] for run in plan.runs if run.group in TABLES)
+        saved = sum(tables) / max(plan.processes, 1)
         hints.append(
             f"{parameter('quick')} leaves the tables out and saves about {duration(saved)}"
         )
