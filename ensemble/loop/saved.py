@@ -47,6 +47,7 @@ _KIND_OF = {
     "Array": "f",
     "Array | None": "f",
 }
+_TYPES = {"float": float, "int": np.int64, "bool": bool}  # of jumps and minor loops; else texts
 # What a file may hold: variables of either kind of result, and their dimensions.
 _MEMBERS = frozenset(
     (
@@ -85,10 +86,6 @@ def to_dataframe(result: Result, of: str) -> Any:
     return with_units(pd.DataFrame(result.columns()))
 
 
-def _columns(kind: type, parts: tuple[Any, ...]) -> dict[str, Any]:
-    return {entry.name: [getattr(p, entry.name) for p in parts] for entry in fields(kind)}
-
-
 def to_xarray(result: Result) -> xr.Dataset:
     """Return a labelled dataset; see :meth:`adhesis.LoopResult.to_xarray`."""
     variables: dict[str, Any] = {}
@@ -100,8 +97,10 @@ def to_xarray(result: Result) -> xr.Dataset:
             continue
         if entry.name in _PARTS:
             dim, part = _PARTS[entry.name]
-            for name, values in _columns(part, value).items():
-                variables[f"{dim}_{name}"] = _variable(dim, name, _typed(values, part, name))
+            for column in fields(part):
+                entries = [getattr(one, column.name) for one in value]
+                array = np.array(entries, dtype=_TYPES.get(str(column.type), str))
+                variables[f"{dim}_{column.name}"] = _variable(dim, column.name, array)
         elif isinstance(value, np.ndarray):
             dim = "jump" if entry.name == "jump_leg" else "state"
             variables[entry.name] = _variable(dim, entry.name, value)
@@ -122,26 +121,14 @@ def to_xarray(result: Result) -> xr.Dataset:
     for name, value in result.numbers().items():
         if value is not None:
             about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
+    report = asdict(result.method)
+    report |= report.pop("details", {})  # of one that was saved before
     about |= {
         "stiffness": problem.control.stiffness,
         "strength": problem.strength,
-        "method": json.dumps(_as_json(result.method), default=lambda v: v.tolist()),
+        "method": json.dumps(report, default=lambda v: v.tolist()),
     }
     return xr.Dataset(variables, attrs=about)
-
-
-def _as_json(report: MethodReport) -> dict[str, Any]:
-    """Return a report as it was before it was first saved."""
-    values = asdict(report)
-    details: dict[str, Any] = values.pop("details", {})
-    return values | details
-
-
-def _typed(values: list[Any], part: type, name: str) -> Any:
-    """Return a column as an array, also of no parts: with the type that its entries have."""
-    annotation = str(next(entry.type for entry in fields(part) if entry.name == name))
-    kinds = {"float": float, "int": np.int64, "bool": bool}
-    return np.array(values, dtype=kinds.get(annotation, str))
 
 
 def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str]]:

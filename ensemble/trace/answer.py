@@ -17,7 +17,7 @@ from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
-from adhesis.ensemble.trace.job import Cycle
+from adhesis.ensemble.trace.job import MAX_PENETRATION, Cycle
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import TABLES, Plan, Run, default_tables, make_plan
@@ -90,8 +90,6 @@ _OF_ALL_LOOPS = (
 # The longest cut-offs are drawn, and no doubts.
 _FOR_THE_FIGURE = ("cut-off × 16", "cut-off × 8", "cut-off × 4", "cut-off × 2")
 
-# Turning point Δ/h_max of the answer where none is given.
-MAX_PENETRATION = 0.9
 Several = float | Sequence[float]
 
 

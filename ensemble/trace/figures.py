@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -31,29 +30,17 @@ from adhesis.solver.model.measured_profile import trace_spectrum
 _GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """Figure on disk, with title and caption."""
-
-    path: Path
-    title: str
-    caption: str
-
-
-def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
-    """Draw all figures for which the answer has data, as PNG and PDF."""
-    drawn = []
+def draw_all(answer: Answer, folder: Path) -> dict[str, str]:
+    """Draw all figures for which the answer has data, as PNG and PDF; return their captions."""
+    captions = {}
+    builders = (_trace, _spectrum, _loop, _cut_off, _tables)
     with style():
-        for (stem, title), build in zip(
-            FIGURES.items(), (_trace, _spectrum, _loop, _cut_off, _tables), strict=True
-        ):
+        for stem, build in zip(FIGURES, builders, strict=True):
             built = build(answer)
-            if built is None:
-                continue
-            figure, caption = built
-            path, _ = save(figure, folder / stem)
-            drawn.append(Drawn(path, title, caption))
-    return drawn
+            if built is not None:
+                figure, captions[stem] = built
+                save(figure, folder / stem)
+    return captions
 
 
 def _trace(answer: Answer) -> tuple[Figure, str]:

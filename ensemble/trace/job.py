@@ -17,6 +17,9 @@ from adhesis.solver.model.problem import Measure, Problem
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName, make_method
 
+MAX_PENETRATION = 0.9
+"""Turning point Δ/h_max where none is given."""
+
 
 @dataclass(frozen=True)
 class Cycle:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,14 @@ from adhesis.ensemble.trace.answer import (
     COVERAGE,
     DOUBTS,
     FIGURE_FILES,
+    FIGURES,
     LEAST,
     Answer,
     Uncertain,
     document,
     run_rows,
 )
-from adhesis.ensemble.trace.figures import Drawn, draw_all, draw_loop
+from adhesis.ensemble.trace.figures import draw_all, draw_loop
 from adhesis.ensemble.trace.variants import TABLES
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
@@ -179,14 +180,14 @@ def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) ->
     return f"{known}{unit}{share}"
 
 
-def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
-    """Return the page as Markdown, with those figures that were drawn."""
+def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
+    """Return the page as Markdown, with those figures that were drawn and have a caption."""
     prepared, cycle, plan = answer.prepared, answer.cycle, answer.plan
     trace, half_space = prepared.trace, cycle.half_space
     name = Path(trace.source).name
     images = {
-        drawn.path.stem: f"![{drawn.title}]({drawn.path.name})\n\n*{drawn.title}.* {drawn.caption}"
-        for drawn in figures
+        stem: f"![{FIGURES[stem]}]({stem}.png)\n\n*{FIGURES[stem]}.* {caption}"
+        for stem, caption in captions.items()
     }
     parts = [
         f"# From the trace {code_span(name)} to its loss",

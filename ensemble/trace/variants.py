@@ -12,7 +12,7 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
-from adhesis.ensemble.trace.job import Cycle, Job
+from adhesis.ensemble.trace.job import MAX_PENETRATION, Cycle, Job
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.checks import counted
@@ -30,13 +30,10 @@ _SECONDS_TO_HINT, _MIN_WAVES = 120.0, 50
 # 27,000 waves and 1 to 61 patches: right within a factor of 1.3 (rms), 3.3 at worst.
 _LEAST_SECONDS, _SECONDS_OF_WAVE, _SECONDS_OF_PATCH = 0.05, 1.5e-4, 1.7e-3
 _WAVES_POWER, _PATCHES_POWER = 0.24, 1.7
-# Crests are counted at so many penetrations, up to this one where the turning point is none.
-_LEVELS, _USUAL_PENETRATION = 18, 0.9
+_LEVELS = 18  # penetrations at which crests are counted
 TABLES = ("work of adhesion", "turning point")
 """Groups of the loops that fill the tables, and measure no doubt."""
 
-# Loop without the crests and troughs that stand far out of all others.
-WITHOUT_FEATURES = "without single features"
 _START = 2.0  # seconds for a process to start
 
 
@@ -156,7 +153,8 @@ def _doubts(prepared: Prepared) -> list[Run]:
         variant(f"degree {degree - 1}", "form", "one degree less off", degree=degree - 1)
     if prepared.features:
         bridged = f"{single_features_text(prepared.features)} bridged by straight lines"
-        variant(WITHOUT_FEATURES, "single features", bridged, without_features=True)
+        name = "without single features"
+        variant(name, "single features", bridged, without_features=True)
     if prepared.spectrum.noise > 0:
         described = "white noise of the instrument's size added"
         for seed in (1, 2) if factor == 1 else (1,):
@@ -212,7 +210,7 @@ def patches_of(job: Job) -> float:
     point is not known, those of the usual one count.
     """
     is_known = job.cycle.control.is_fixed and not job.cycle.at_preload
-    penetration = job.turning_point if is_known else _USUAL_PENETRATION
+    penetration = job.turning_point if is_known else MAX_PENETRATION
     by_adhesion = expected_patches(job.profile, job.cycle.half_space, job.work_of_adhesion)
     return min(by_adhesion, float(crests_reached(job.profile, penetration)))
 
