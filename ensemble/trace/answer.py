@@ -73,8 +73,6 @@ _SHORTER_WAVES = {
     "tip": "a sharper tip would resolve shorter waves",
     "given": "the trace holds shorter waves than the cut-off that was given",
 }
-# Groups of the loops with another decision about the trace.
-_DECISIONS = (*DOUBTS, "single features")
 # One patch that carries all contact is that of a single crest up to this share of the period.
 _ONE_PATCH = 0.25
 # Numbers of the document by their names: of the trace, of the answer's loop, of all loops alike.
@@ -260,13 +258,13 @@ class Answer(ByValue):
     def largest_changes(self) -> tuple[Change, ...]:
         """The decision about the trace that changes the loss most.
 
-        If it is a longer cut-off, the one of the other decisions that does so follows. A mirror
-        image does not count: it is another body.
+        If it is a longer cut-off, the one of the other decisions that does so follows.
         """
         changes = [
             Change(run, max(1 + change, 0.0))
             for run in self.plan.runs
-            if run.group in _DECISIONS and (change := self.change(run.name)) is not None
+            if run.group not in ("answer", *TABLES)
+            if (change := self.change(run.name)) is not None
         ]
         changes.sort(key=lambda change: min(change.factor, 1 / (change.factor or math.inf)))
         others = [change for change in changes[1:] if change.run.group != "cut-off"]

@@ -224,12 +224,6 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
         markdown_table(*_variant_rows(answer), left_columns=1),
         images.get("cut-off"),
     ]
-    mirror = answer.change("mirror")
-    if mirror is not None:
-        parts.append(
-            f"A mirror image instead changes the loss by {rounded_percent(mirror, sign='+')}. It "
-            "is not counted: it is a body of twice the period, and the loss grows with the period."
-        )
     sweep = _sweep_rows(answer)
     if len(sweep) > 2:
         heading = "## Against work of adhesion and turning point"

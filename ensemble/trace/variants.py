@@ -143,10 +143,6 @@ def _doubts(prepared: Prepared) -> list[Run]:
         faded = f"both ends faded to the mean over {100 * part:.0f} %"
         name = f"taper {100 * part:.0f} %"
         variant(name, "continuation", faded, continuation="taper", part=part)
-    if 2 * factor * cut <= length / 4:
-        described = "trace and mirror image, twice as long a period"
-        changes = {"continuation": "mirror", "cut_off": 2 * factor * cut}
-        runs.append(Run("mirror", "mirror", described, changes, f"cut-off × {2 * factor:.3g}"))
     degree = prepared.degree
     variant(f"degree {degree + 1}", "form", "one degree more off", degree=degree + 1)
     if degree > 1 and not prepared.form_is_sure:
