@@ -26,7 +26,7 @@ from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Measure
-from adhesis.solver.registry import MethodName
+from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
 from adhesis.solver.values import ByValue
 
 FIGURES = {
@@ -426,6 +426,8 @@ def make_cycle(
     """
     given = _several("work_of_adhesion", work_of_adhesion)
     cycle = Cycle(half_space, tuple(given), (), *settings, **named)
+    checks.choice("method", cycle.method, METHOD_NAMES)
+    checks.real("accuracy", cycle.accuracy, checks.ACCURACY)
     control = cycle.control
     if cycle.work_of_adhesion_open is not None and len(given) > 1:
         raise ValueError(
@@ -451,7 +453,8 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     checks.instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        cycle.method_for(profile, gamma)
+        if cycle.problem(profile, gamma).pinning > 0:
+            check_pinning(cycle.method, None)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:

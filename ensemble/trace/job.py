@@ -10,7 +10,6 @@ from adhesis.ensemble.quantities import stress_text
 from adhesis.solver.loading.cycle import turn_arguments
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.path_record import Progress
-from adhesis.solver.method import Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Measure, Problem
@@ -63,8 +62,8 @@ class Cycle:
             return f"p̄ = {stress_text(point, 4)}"
         return f"{self.turn_sign} = {point:g}" + ("" if is_fixed else f" of {held}")
 
-    def method_for(self, profile: Profile, work_of_adhesion: float) -> Method:
-        """Make the method for a profile and a work of adhesion in J/m² (TypeError, ValueError).
+    def problem(self, profile: Profile, work_of_adhesion: float) -> Problem:
+        """Make the problem of a profile and a work of adhesion in J/m² (TypeError, ValueError).
 
         The work of adhesion of receding edges is given for the answer; elsewhere both keep their
         ratio.
@@ -72,14 +71,13 @@ class Cycle:
         first, opening = self.works_of_adhesion[0], self.work_of_adhesion_open
         if opening is not None and work_of_adhesion != first:
             opening = opening / first * work_of_adhesion
-        problem = Problem(
+        return Problem(
             *(profile, self.half_space, work_of_adhesion, self.control),
             strength=math.inf if self.strength is None else self.strength,
             adhesion_range=self.adhesion_range,
             work_of_adhesion_open=opening,
             measure=self.measure,
         )
-        return make_method(self.method, problem, accuracy=self.accuracy)
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,8 @@ class Job:
 def run(job: Job, progress: Progress | None = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists."""
     cycle = job.cycle
-    method = cycle.method_for(job.profile, job.work_of_adhesion)
+    problem = cycle.problem(job.profile, job.work_of_adhesion)
+    method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
     turn = turn_arguments(cycle.control, job.turning_point, cycle.at_preload, cycle.latest)
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
     drops = loop.loss_from_drops - loop.closing_drop
