@@ -597,13 +597,12 @@ def _not_converged(answer: Answer) -> list[str]:
 
 def run_rows(answer: Answer) -> list[dict[str, Any]]:
     """Return the numbers of every loop of the plan, or why it failed."""
-    plan = answer.plan
     runs = []
-    for run in plan.runs:
+    for run in answer.plan.runs:
         found = answer.results.get(run.name)
         entry: dict[str, Any] = {
             **{"name": run.name, "group": run.group, "said": run.description},
-            **{"reference": run.reference, "expected_seconds": plan.seconds[run.name]},
+            **{"reference": run.reference, "expected_seconds": answer.plan.seconds[run.name]},
         }
         if isinstance(found, dict):
             entry |= {key: value for key, value in found.items() if key != "states"}

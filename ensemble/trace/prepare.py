@@ -294,7 +294,6 @@ def _within(begin: float, end: float, start: float, step: float, size: int) -> M
 
 
 def _excluded(work: _Work, heights: Array, ranges: Sequence[tuple[float, float]]) -> Mask:
-    """Return which heights are excluded."""
     trace = work.trace
     excluded = np.zeros(heights.size, dtype=bool)
     for begin, end in ranges:
