@@ -89,25 +89,20 @@ def make_plan(
     """
     processes = cores() if processes is None else processes
     runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]
-    jobs, seconds = {}, {}
-    profiles: dict[str, Profile] = {}
+    jobs, base = {}, prepared.profile()
     for run in runs:
-        key = repr(sorted(run.changes.items()))
-        if key not in profiles:
-            profiles[key] = prepared.profile(**run.changes)
         gamma, point = run.work_of_adhesion, run.turning_point
-        job = jobs[run.name] = Job(
-            *(run.name, profiles[key], cycle),
+        jobs[run.name] = Job(
+            *(run.name, prepared.profile(**run.changes) if run.changes else base, cycle),
             cycle.works_of_adhesion[0] if gamma is None else gamma,
             cycle.turning_points[0] if point is None else point,
         )
-        seconds[run.name] = expected_seconds(job)
-    base = profiles[repr([])]
-    order = sorted(runs, key=lambda run: -seconds[run.name])  # the longest first, for balance
+    seconds = {name: expected_seconds(job) for name, job in jobs.items()}
+    order = sorted(jobs, key=lambda name: -seconds[name])  # the longest first, for balance
     wall = max(sum(seconds.values()) / max(processes, 1), max(seconds.values()))
     plan = Plan(
         runs=tuple(runs),
-        jobs=tuple(jobs[run.name] for run in order),
+        jobs=tuple(jobs[name] for name in order),
         seconds=seconds,
         waves=base.highest_harmonic,
         patches=round(patches_of(jobs["answer"])),
