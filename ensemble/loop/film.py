@@ -202,11 +202,10 @@ class _Drawing:
     def _draw_shape(self, axes: Axes) -> None:
         x, height = self._scenes.x, 1e6 * self._scenes.height
         self._mm = 1e3 * x
-        floor = height.min() - 0.05 * np.ptp(height)
+        span = float(np.ptp(height))
+        floor = height.min() - 0.05 * span
         top = 1e6 * max(float(scene.surface.max()) for scene in self._scenes.scenes)
-        self._ceiling = min(top, floor + _MOST_RANGE * float(np.ptp(height))) + 0.1 * float(
-            np.ptp(height)
-        )
+        self._ceiling = min(top, floor + _MOST_RANGE * span) + 0.1 * span
         axes.fill_between(self._mm, height, floor, color="0.55", lw=0)
         (self._body,) = axes.fill(self._mm, height, fc="#56B4E9", ec="#0072B2", lw=1.0, alpha=0.55)
         (self._contact,) = axes.plot(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from adhesis.ensemble.loop.record import summary_rows
 from adhesis.ensemble.quantities import UNITS, drive_text, stress_text
@@ -20,9 +20,6 @@ from adhesis.solver.loading.path import PathResult
 from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, ContactState, Method
 from adhesis.solver.values import brief
-
-if TYPE_CHECKING:
-    from adhesis.ensemble.loop.film import Film
 
 Result = LoopResult | PathResult
 
@@ -40,7 +37,7 @@ def film(
     *,
     frames: int,
     progress: Callable[[int, int], None] | bool | None,
-) -> Film:
+) -> Any:
     """Make a film, and write it where a path is given; see :meth:`adhesis.LoopResult.film`."""
     from adhesis.ensemble.loop.film import Film, check_film
     from adhesis.ensemble.loop.film_scenes import scenes_of
