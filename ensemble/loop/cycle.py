@@ -53,13 +53,10 @@ class Cycle(Turns):
         """Check that the cycle can be followed; the ValueError gives the rule that it breaks."""
         if self.is_path:
             check_path(self.points, self.load_steps, problem, self.out)
-        elif self.are_preloads:
-            for preload in self.points:
-                latest = latest_turn(problem, preload, self.latest)
-                check_cycle(latest, self.load_steps, self.control)
-        else:
-            for turn in self.points:
-                check_cycle(turn, self.load_steps, self.control)
+            return
+        for turn in self.points:
+            end = latest_turn(problem, turn, self.latest) if self.are_preloads else turn
+            check_cycle(end, self.load_steps, self.control)
 
 
 def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
