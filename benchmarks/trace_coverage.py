@@ -191,12 +191,6 @@ def main() -> None:
     for way in ("answer", "blend 10 %", "taper 5 %", "taper 10 %"):
         off = [r["losses"][way] / r["loss"]["known"] - 1 for r in rows if way in r["losses"]]
         print(f"{way:<11} {np.mean(off):+.1%} ± {np.std(off, ddof=1):.1%}")
-    off = [
-        r["losses"]["mirror"] / r["losses"]["cut-off × 2"] - 1
-        for r in rows
-        if {"mirror", "cut-off × 2"} <= r["losses"].keys()
-    ]
-    print(f"mirror      {np.mean(off):+.1%} ± {np.std(off, ddof=1):.1%} (off the answer)")
     if args.json is not None:
         args.json.parent.mkdir(parents=True, exist_ok=True)
         args.json.write_text(json.dumps(rows, indent=1))

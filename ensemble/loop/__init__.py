@@ -1,4 +1,1 @@
-"""Read the input and write the output of ``adhesis loop``: one loop without a campaign.
-
-Import from its modules.
-"""
+"""Read the input and write the output of ``adhesis loop``: one loop without a campaign."""

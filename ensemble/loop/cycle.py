@@ -10,6 +10,7 @@ from typing import Any
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import STRESS, read_words, words_of
+from adhesis.ensemble.trace.job import MAX_PENETRATION
 from adhesis.ensemble.trace.options import given
 from adhesis.solver.loading.cycle import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
@@ -19,7 +20,6 @@ from adhesis.solver.model.problem import Problem
 
 _OUT = "out"
 _TURNS = ("max_penetration", "max_stress", "preload")
-_MAX_PENETRATION = 0.9
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,10 @@ class Cycle(Turns):
         """Check that the cycle can be followed; the ValueError gives the rule that it breaks."""
         if self.is_path:
             check_path(self.points, self.load_steps, problem, self.out)
-        elif self.are_preloads:
-            for preload in self.points:
-                latest = latest_turn(problem, preload, self.latest)
-                check_cycle(latest, self.load_steps, self.control)
-        else:
-            for turn in self.points:
-                check_cycle(turn, self.load_steps, self.control)
+            return
+        for turn in self.points:
+            end = latest_turn(problem, turn, self.latest) if self.are_preloads else turn
+            check_cycle(end, self.load_steps, self.control)
 
 
 def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
@@ -107,7 +104,7 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
     if args.max_penetration is not None:
         penetrations = _distinct("--max-penetration", args.max_penetration, float, rule)
     if args.preload is None:
-        return Turns((_MAX_PENETRATION,) if penetrations is None else penetrations)
+        return Turns((MAX_PENETRATION,) if penetrations is None else penetrations)
     if penetrations is not None and len(penetrations) > 1:
         raise InputError(
             f"--max-penetration is {args.max_penetration} beside --preload: it must be one number, "

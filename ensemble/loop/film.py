@@ -27,7 +27,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError, one_of
 from adhesis.ensemble.loop.film_page import BODY, STYLE
-from adhesis.ensemble.loop.film_scenes import Scene, Scenes, scenes_of
+from adhesis.ensemble.loop.film_scenes import Scene, Scenes
 from adhesis.ensemble.outputs import check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.ensemble.report.html import whole_page
@@ -73,16 +73,6 @@ def check_film(name: str, path: str | os.PathLike[str]) -> Path:
             f"{name} is {path}: ffmpeg, which writes .mp4, is not installed, so take .html or .gif"
         )
     return path
-
-
-def film_of(
-    result: LoopResult | PathResult,
-    *,
-    frames: int = 120,
-    progress: Callable[[int, int], None] | None = None,
-) -> Film:
-    """Compute the film of a result; see :meth:`adhesis.LoopResult.film`."""
-    return Film(result, scenes_of(result, frames, progress))
 
 
 class Film:
@@ -212,11 +202,10 @@ class _Drawing:
     def _draw_shape(self, axes: Axes) -> None:
         x, height = self._scenes.x, 1e6 * self._scenes.height
         self._mm = 1e3 * x
-        floor = height.min() - 0.05 * np.ptp(height)
+        span = float(np.ptp(height))
+        floor = height.min() - 0.05 * span
         top = 1e6 * max(float(scene.surface.max()) for scene in self._scenes.scenes)
-        self._ceiling = min(top, floor + _MOST_RANGE * float(np.ptp(height))) + 0.1 * float(
-            np.ptp(height)
-        )
+        self._ceiling = min(top, floor + _MOST_RANGE * span) + 0.1 * span
         axes.fill_between(self._mm, height, floor, color="0.55", lw=0)
         (self._body,) = axes.fill(self._mm, height, fc="#56B4E9", ec="#0072B2", lw=1.0, alpha=0.55)
         (self._contact,) = axes.plot(

@@ -18,8 +18,9 @@ from adhesis.ensemble.outputs import whole_file
 from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.loop_state import LoopState
 from adhesis.solver.loading.path import MinorLoop, PathResult
-from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
+from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
 
 
 def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
@@ -199,10 +200,6 @@ def _plain(value: Any) -> Any:
 # ---------------------------------------------------------------------- fields
 
 
-FieldsOfState = tuple[Branch, float, ContactState, Fields]
-"""Branch, penetration Δ/h_max, state and its fields."""
-
-
 def fields_at_penetrations(
     loop: LoopResult, method: Method, penetrations: Sequence[float], n: int
 ) -> dict[str, Any]:
@@ -211,13 +208,13 @@ def fields_at_penetrations(
     ``branch`` and ``penetration`` have shape (k,), ``x`` and ``height`` (n,), ``stress``,
     ``displacement`` and ``gap`` (k, n), ``edges`` (k, most patches, 2) with NaN for none.
     """
-    found: list[FieldsOfState] = []
+    found = []
     for branch in BRANCHES:
-        states = [loop.contact_states[k] for k in np.flatnonzero(loop.branch == branch)]
+        states = [loop.contact_states[k] for k in loop.states(branch)]
         for wanted in penetrations:
             state = _state_at(method, branch, states, wanted)
-            found.append((branch, wanted, state, method.fields(state, n)))
-    return _arrays(found)
+            found.append(LoopState(branch, False, wanted, state, method))
+    return _arrays(found, n)
 
 
 def _state_at(
@@ -242,36 +239,33 @@ def fields_at_stresses(loop: LoopResult, stresses: Sequence[float], n: int) -> d
 
     A branch that does not have a mean stress is left out; InputError if neither branch has it.
     """
-    found: list[FieldsOfState] = []
+    found = []
     absent = dict.fromkeys(stresses, 0)
     for branch in BRANCHES:
         for wanted in stresses:
             try:
-                here = loop.at_stress(wanted, branch)
+                found.append(loop.at_stress(wanted, branch))
             except ValueError as error:
                 absent[wanted] += 1
                 if absent[wanted] == len(BRANCHES):
                     raise InputError(f"--field-stresses: {error}") from None
-                continue
-            found.append((branch, here.penetration, here.state, here.fields(n)))
-    return _arrays(found)
+    return _arrays(found, n)
 
 
-def _arrays(found: Sequence[FieldsOfState]) -> dict[str, Any]:
-    edges = np.full((len(found), max(s.patches for _, _, s, _ in found), 2), np.nan)
-    for row, (_, _, state, _) in zip(edges, found, strict=True):
-        row[: state.patches] = state.edges
-    fields = [f for *_, f in found]
+def _arrays(found: Sequence[LoopState], n: int) -> dict[str, Any]:
+    edges = np.full((len(found), max(one.state.patches for one in found), 2), np.nan)
+    for row, one in zip(edges, found, strict=True):
+        row[: one.state.patches] = one.edges
+    fields = [one.fields(n) for one in found]
+    of_states = ("branch", "penetration", "separation", "mean_stress")
     return {
-        "branch": np.array([branch for branch, *_ in found]),
-        "penetration": np.array([penetration for _, penetration, *_ in found]),
-        "separation": np.array([state.separation for _, _, state, _ in found]),
-        "mean_stress": np.array([state.mean_stress for _, _, state, _ in found]),
+        **{name: np.array([getattr(one, name) for one in found]) for name in of_states},
         "x": fields[0].x,
         "height": fields[0].height,
-        "stress": np.array([f.stress for f in fields]),
-        "displacement": np.array([f.displacement for f in fields]),
-        "gap": np.array([f.gap for f in fields]),
+        **{
+            name: np.array([getattr(one, name) for one in fields])
+            for name in ("stress", "displacement", "gap")
+        },
         "edges": edges,
     }
 

@@ -47,6 +47,7 @@ _KIND_OF = {
     "Array": "f",
     "Array | None": "f",
 }
+_TYPES = {"float": float, "int": np.int64, "bool": bool}  # of jumps and minor loops; else texts
 # What a file may hold: variables of either kind of result, and their dimensions.
 _MEMBERS = frozenset(
     (
@@ -85,10 +86,6 @@ def to_dataframe(result: Result, of: str) -> Any:
     return with_units(pd.DataFrame(result.columns()))
 
 
-def _columns(kind: type, parts: tuple[Any, ...]) -> dict[str, Any]:
-    return {entry.name: [getattr(p, entry.name) for p in parts] for entry in fields(kind)}
-
-
 def to_xarray(result: Result) -> xr.Dataset:
     """Return a labelled dataset; see :meth:`adhesis.LoopResult.to_xarray`."""
     variables: dict[str, Any] = {}
@@ -100,8 +97,10 @@ def to_xarray(result: Result) -> xr.Dataset:
             continue
         if entry.name in _PARTS:
             dim, part = _PARTS[entry.name]
-            for name, values in _columns(part, value).items():
-                variables[f"{dim}_{name}"] = _variable(dim, name, _typed(values, part, name))
+            for column in fields(part):
+                entries = [getattr(one, column.name) for one in value]
+                array = np.array(entries, dtype=_TYPES.get(str(column.type), str))
+                variables[f"{dim}_{column.name}"] = _variable(dim, column.name, array)
         elif isinstance(value, np.ndarray):
             dim = "jump" if entry.name == "jump_leg" else "state"
             variables[entry.name] = _variable(dim, entry.name, value)
@@ -122,26 +121,14 @@ def to_xarray(result: Result) -> xr.Dataset:
     for name, value in result.numbers().items():
         if value is not None:
             about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
+    report = asdict(result.method)
+    report |= report.pop("details", {})  # of one that was saved before
     about |= {
         "stiffness": problem.control.stiffness,
         "strength": problem.strength,
-        "method": json.dumps(_as_json(result.method), default=lambda v: v.tolist()),
+        "method": json.dumps(report, default=lambda v: v.tolist()),
     }
     return xr.Dataset(variables, attrs=about)
-
-
-def _as_json(report: MethodReport) -> dict[str, Any]:
-    """Return a report as it was before it was first saved."""
-    values = asdict(report)
-    details: dict[str, Any] = values.pop("details", {})
-    return values | details
-
-
-def _typed(values: list[Any], part: type, name: str) -> Any:
-    """Return a column as an array, also of no parts: with the type that its entries have."""
-    annotation = str(next(entry.type for entry in fields(part) if entry.name == name))
-    kinds = {"float": float, "int": np.int64, "bool": bool}
-    return np.array(values, dtype=kinds.get(annotation, str))
 
 
 def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str]]:
@@ -260,12 +247,10 @@ def _contradiction(found: xr.Dataset, result: Result) -> str | None:
     for name in (found.attrs.keys() | again.attrs.keys()) - {"adhesis_version"}:
         if not _alike(found.attrs.get(name), again.attrs.get(name)):
             return str(name)
-    for name, value in _recomputed(result).items():
-        if not _alike(getattr(result, name), value):
-            return name
     scale = float(np.sum(np.abs(result.mean_stress[1:] * np.diff(result.separation))))
-    for name, value in _works(result).items():
-        if not _alike(getattr(result, name), value, scale):
+    values, works = _recomputed(result)
+    for name, value in (values | works).items():
+        if not _alike(getattr(result, name), value, scale if name in works else 0.0):
             return name
     change = result.energy_change if isinstance(result, PathResult) else 0.0
     audited = abs(result.loss - change - result.loss_from_drops)
@@ -274,40 +259,33 @@ def _contradiction(found: xr.Dataset, result: Result) -> str | None:
     return None
 
 
-def _recomputed(result: Result) -> dict[str, Any]:
-    """Compute anew what a result keeps beside the states and jumps that it follows from."""
-    values: dict[str, Any] = {
-        "penetration": result.problem.penetration(result.separation),
-        "loss_from_drops": result.ledger.loss,
+def _recomputed(result: Result) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Compute anew what a result keeps beside the states and jumps that it follows from.
+
+    Returns numbers and arrays, and works in J/m² of nominal area.
+    """
+    problem, ledger = result.problem, result.ledger
+    values = {
+        "penetration": problem.penetration(result.separation),
+        "loss_from_drops": ledger.loss,
     }
     if isinstance(result, PathResult):
-        values["potential"] = result.ledger.stored * result.problem.profile.period
-    if isinstance(result, LoopResult):
-        deepest = result.penetration[_turn(result)]
-        is_fixed = result.problem.control.is_fixed
-        values["max_penetration"] = result.turning_point if is_fixed else deepest
-        values["loss_dimensionless"] = result.loss / result.problem.loss_scale
-    return values
+        values["potential"] = ledger.stored * problem.profile.period
+        return values, {"work": ledger.work, "energy_change": ledger.rise}
+    turn = int(result.states("unloading")[0])
+    is_fixed = problem.control.is_fixed
+    values["max_penetration"] = result.turning_point if is_fixed else result.penetration[turn]
+    values["loss_dimensionless"] = result.loss / problem.loss_scale
+    gained = -ledger.part(0, turn).displacement_work
+    return values, {
+        "loss": ledger.work,
+        "work_gained": gained,
+        "work_spent": ledger.work + gained,
+    }
 
 
-def _pattern(found: xr.Dataset) -> AdhesionPattern | None:
-    if "pattern_real" not in found:
-        return None
-    return AdhesionPattern(found["pattern_real"].values + 1j * found["pattern_imag"].values)
-
-
-def _works(result: Result) -> dict[str, float]:
-    """Compute the work of a result anew, in J/m² of nominal area."""
-    ledger = result.ledger
-    if isinstance(result, PathResult):
-        return {"work": ledger.work, "energy_change": ledger.rise}
-    gained = -ledger.part(0, _turn(result)).displacement_work
-    return {"loss": ledger.work, "work_gained": gained, "work_spent": ledger.work + gained}
-
-
-def _turn(result: LoopResult) -> int:
-    """Return the index of the first state of unloading."""
-    return int(result.states("unloading")[0])
+def _waves(found: xr.Dataset, name: str) -> Any:
+    return found[f"{name}_real"].values + 1j * found[f"{name}_imag"].values
 
 
 def _alike(one: Any, other: Any, scale: float = 0.0) -> bool:
@@ -344,17 +322,16 @@ def _result(found: xr.Dataset) -> Result:
             values[name] = InteriorTension(**json.loads(about[name])) if name in about else None
         elif name in about and name not in _NOT_KEPT:
             values[name] = np.asarray(about[name]).item()
-    coefficients = found["coefficient_real"].values + 1j * found["coefficient_imag"].values
     report = json.loads(about["method"])
     method = SavedReport(report.pop("name"), report.pop("chosen"), report)
     problem = Problem(
-        Profile(coefficients=coefficients, period=float(about["period"])),
+        Profile(coefficients=_waves(found, "coefficient"), period=float(about["period"])),
         HalfSpace(float(about["young"]), float(about["poisson"])),
         float(about["work_of_adhesion"]),
         Control(float(about["stiffness"])),
         float(about.get("strength", math.inf)),
         work_of_adhesion_open=float(about["work_of_adhesion_open"]),
         measure=about.get("measure", "arc"),
-        pattern=_pattern(found),
+        pattern=AdhesionPattern(_waves(found, "pattern")) if "pattern_real" in found else None,
     )
     return kind(problem=problem, method=method, **values)

@@ -10,28 +10,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from adhesis.ensemble.loop.record import summary_rows
-from adhesis.ensemble.outputs import check_output_folder
-from adhesis.ensemble.quantities import (
-    UNITS,
-    drive_text,
-    stress_text,
-    with_units,
-)
+from adhesis.ensemble.quantities import UNITS, drive_text, stress_text
 from adhesis.ensemble.reporter import bar
-from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, ContactState, Method
 from adhesis.solver.values import brief
-
-if TYPE_CHECKING:
-    from adhesis.ensemble.loop.film import Film
-    from adhesis.ensemble.trace.answer import Answer
 
 Result = LoopResult | PathResult
 
@@ -49,21 +37,28 @@ def film(
     *,
     frames: int,
     progress: Callable[[int, int], None] | bool | None,
-) -> Film:
+) -> Any:
     """Make a film, and write it where a path is given; see :meth:`adhesis.LoopResult.film`."""
-    from adhesis.ensemble.loop.film import check_film, film_of
+    from adhesis.ensemble.loop.film import Film, check_film
+    from adhesis.ensemble.loop.film_scenes import scenes_of
 
     if path is not None:
         path = check_film("path", path)
     with bar("frames") if progress is True else nullcontext(progress or None) as shown:
-        made = film_of(result, frames=frames, progress=shown)
+        made = Film(result, scenes_of(result, frames, shown))
         if path is not None:
             made.save(path, progress=shown if progress is True else None)
     return made
 
 
-# Made by other modules, and loaded when they are asked for.
-_ELSEWHERE = dict.fromkeys(("to_dataframe", "to_xarray", "save"), "adhesis.ensemble.loop.saved")
+# Made by other modules, and loaded when they are asked for: of a loop, and of a trace's answer.
+_ELSEWHERE = {
+    **dict.fromkeys(("to_dataframe", "to_xarray", "save"), "adhesis.ensemble.loop.saved"),
+    **dict.fromkeys(
+        ("summary", "notebook_page", "write_all", "table_of_runs"),
+        "adhesis.ensemble.trace.trace_page",
+    ),
+}
 
 
 def __getattr__(name: str) -> Any:
@@ -85,44 +80,6 @@ def page(shown: Any) -> str:
         return table_of(rows) + picture_of(plot(shown))
     figure = draw_shape(shown)
     return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))
-
-
-def trace_summary(answer: Answer) -> str:
-    """Return the summary of an answer as text."""
-    from adhesis.ensemble.trace.trace_page import summary
-
-    return summary(answer)
-
-
-def trace_page(answer: Answer) -> str:
-    """Return the summary of a trace's answer and the figure of its loop as HTML."""
-    from adhesis.ensemble.report.html import picture_of, table_of
-    from adhesis.ensemble.trace.figures import draw_loop
-
-    rows = [line.split(maxsplit=1) for line in str(answer).splitlines()]
-    return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
-
-
-def write_trace_page(answer: Answer, folder: str | os.PathLike[str]) -> Path:
-    """Write page, figures and numbers of an answer; see its method ``page``."""
-    from adhesis.ensemble.trace.trace_page import write_all
-
-    path = checks.path("folder", folder)
-    check_output_folder("folder", path, (), {})
-    return write_all(answer, path)
-
-
-def table_of_runs(answer: Answer) -> Any:
-    """Return the loops of an answer as a table; see its method ``to_dataframe``."""
-    import pandas as pd
-
-    from adhesis.ensemble.trace.answer import run_rows
-
-    hidden = (
-        *("range_warnings", "preload_warnings", "fall_warnings", "strain_warnings", "failed"),
-    )
-    rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
-    return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
 
 
 # By class: what the figure shows, and what is shown beside the fields.

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -17,17 +17,17 @@ from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
-from adhesis.ensemble.trace.job import Cycle
+from adhesis.ensemble.trace.job import MAX_PENETRATION, Cycle
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.variants import Plan, Run, default_tables, make_plan
+from adhesis.ensemble.trace.variants import TABLES, Plan, Run, default_tables, make_plan
 from adhesis.solver import checks, views
 from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Measure, Problem
+from adhesis.solver.model.problem import Measure
 from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
-from adhesis.solver.values import ByValue, finite
+from adhesis.solver.values import ByValue
 
 FIGURES = {
     "trace": "The trace, as measured and as used",
@@ -73,15 +73,21 @@ _SHORTER_WAVES = {
     "tip": "a sharper tip would resolve shorter waves",
     "given": "the trace holds shorter waves than the cut-off that was given",
 }
-# Groups of the loops with another decision about the trace.
-_DECISIONS = (*DOUBTS, "single features")
 # One patch that carries all contact is that of a single crest up to this share of the period.
 _ONE_PATCH = 0.25
+# Numbers of the document by their names: of the trace, of the answer's loop, of all loops alike.
+_READ = ("points", "step", "length", "height_range", "drop_outs", "tip_radius")
+_CONTACT = (
+    *("young", "poisson", "work_of_adhesion", "work_of_adhesion_open", "measure"),
+    *("stiffness", "strength"),
+)
+_OF_ALL_LOOPS = (
+    *("valid_range", "edge_range", "touch_range", "turn_range"),
+    "largest_interior_tension",
+)
 # The longest cut-offs are drawn, and no doubts.
 _FOR_THE_FIGURE = ("cut-off × 16", "cut-off × 8", "cut-off × 4", "cut-off × 2")
 
-# Turning point Δ/h_max of the answer where none is given.
-MAX_PENETRATION = 0.9
 Several = float | Sequence[float]
 
 
@@ -120,11 +126,6 @@ class Change:
     run: Run
     factor: float  # its loss over that of the loop with which it is compared; 0 if it loses nothing
 
-    @property
-    def size(self) -> float:
-        """Absolute logarithm of the factor."""
-        return abs(math.log(self.factor)) if self.factor > 0 else math.inf
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Answer(ByValue):
@@ -161,11 +162,11 @@ class Answer(ByValue):
 
     def __str__(self) -> str:
         """Summarise the answer for a terminal: loss, pull-off, contact, doubts, warnings."""
-        return str(views.maker().trace_summary(self))
+        return str(views.maker().summary(self))
 
     def _repr_html_(self) -> str:
         """Return the main numbers and the figure of the loop, for notebooks."""
-        return str(views.maker().trace_page(self))
+        return str(views.maker().notebook_page(self))
 
     def page(self, folder: str | os.PathLike[str]) -> Path:
         """Write what ``adhesis trace --to`` writes: the page, its figures, and every number.
@@ -188,7 +189,7 @@ class Answer(ByValue):
         TypeError
             If ``folder`` is no path.
         """
-        return Path(views.maker().write_trace_page(self, folder))
+        return Path(views.maker().write_all(self, folder))
 
     def to_dataframe(self) -> Any:
         """Return the numbers of every loop, that of the answer and the others.
@@ -250,24 +251,22 @@ class Answer(ByValue):
 
     def _alike(self) -> list[Result]:
         """Numbers of the loops whose material and turning point are the answer's."""
-        tables = ("work of adhesion", "turning point")
-        names = [run.name for run in self.plan.runs if run.group not in tables]
-        found = (self.result(name) for name in names)
+        found = (self.result(run.name) for run in self.plan.runs if run.group not in TABLES)
         return [one for one in found if one is not None]
 
     @property
     def largest_changes(self) -> tuple[Change, ...]:
         """The decision about the trace that changes the loss most.
 
-        If it is a longer cut-off, the one of the other decisions that does so follows. A mirror
-        image does not count: it is another body.
+        If it is a longer cut-off, the one of the other decisions that does so follows.
         """
-        changes = []
-        for run in self.plan.runs:
-            change = self.change(run.name)
-            if run.group in _DECISIONS and change is not None:
-                changes.append(Change(run, max(1 + change, 0.0)))
-        changes.sort(key=lambda change: -change.size)
+        changes = [
+            Change(run, max(1 + change, 0.0))
+            for run in self.plan.runs
+            if run.group not in ("answer", *TABLES)
+            if (change := self.change(run.name)) is not None
+        ]
+        changes.sort(key=lambda change: min(change.factor, 1 / (change.factor or math.inf)))
         others = [change for change in changes[1:] if change.run.group != "cut-off"]
         if changes and changes[0].run.group == "cut-off":
             return (changes[0], *others[:1])
@@ -429,7 +428,6 @@ def make_cycle(
     cycle = Cycle(half_space, tuple(given), (), *settings, **named)
     checks.choice("method", cycle.method, METHOD_NAMES)
     checks.real("accuracy", cycle.accuracy, checks.ACCURACY)
-    checks.choice("measure", cycle.measure, get_args(Measure))
     control = cycle.control
     if cycle.work_of_adhesion_open is not None and len(given) > 1:
         raise ValueError(
@@ -447,10 +445,7 @@ def make_cycle(
             check_preload(point, control)
             point = checks.FULL_PENETRATION if cycle.latest is None else cycle.latest
         check_cycle(point, cycle.load_steps, control)
-    cycle = replace(cycle, works_of_adhesion=gammas, turning_points=turns)
-    for gamma in gammas:
-        cycle.strength_at(gamma)
-    return cycle
+    return replace(cycle, works_of_adhesion=gammas, turning_points=turns)
 
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
@@ -458,12 +453,7 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     checks.instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        strength, open_ = cycle.strength_at(gamma), cycle.open_at(gamma)
-        problem = Problem(
-            profile, cycle.half_space, gamma, strength=strength, work_of_adhesion_open=open_,
-            measure=cycle.measure,
-        )  # fmt: skip
-        if problem.pinning > 0:
+        if cycle.problem(profile, gamma).pinning > 0:
             check_pinning(cycle.method, None)
 
 
@@ -479,16 +469,9 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
         raise NoAnswer(f"the loop could not be run to its end: {main}")
     bare = {name: Uncertain(float(main[name]), 0.0, {}) for name in QUANTITIES}
     draft = Answer(prepared, cycle, plan, results, warnings=(), seconds=0.0, **bare)
-    quantities = {name: _quantity(draft, name) for name in QUANTITIES}
-    return Answer(
-        prepared=prepared,
-        cycle=cycle,
-        plan=plan,
-        results=results,
-        warnings=(*prepared.warnings, *_warnings(draft, quantities["loss"])),
-        seconds=time.monotonic() - started,
-        **quantities,
-    )
+    found: dict[str, Any] = {name: _quantity(draft, name) for name in QUANTITIES}
+    warnings = (*prepared.warnings, *_warnings(draft, found["loss"]))
+    return replace(draft, warnings=warnings, seconds=time.monotonic() - started, **found)
 
 
 def _several(name: str, value: Several) -> Sequence[float]:
@@ -506,13 +489,12 @@ def _quantity(answer: Answer, name: str) -> Uncertain:
     doubts = {}
     neighbours = _neighbours(answer)
     for doubt in DOUBTS:
-        changes = []
-        for run in answer.plan.runs:
-            if run.group != doubt or (doubt == "cut-off" and run.name not in neighbours):
-                continue
-            change = answer.change(run.name, name)
-            if change is not None:
-                changes.append(change)
+        changes = [
+            change
+            for run in answer.plan.runs
+            if run.group == doubt and (doubt != "cut-off" or run.name in neighbours)
+            if (change := answer.change(run.name, name)) is not None
+        ]
         if changes:
             doubts[doubt] = float(np.sqrt(np.mean(np.square(changes))))
     if name == "loss" and value:
@@ -523,11 +505,11 @@ def _quantity(answer: Answer, name: str) -> Uncertain:
     return Uncertain(value, abs(value) * max(LEAST, COVERAGE * spread), doubts)
 
 
-def _cut_offs(answer: Answer) -> dict[float, str]:
-    """Return the names of the loops that ended by their shortest wave over the answer's."""
-    ended = [run for run, _ in answer.group("cut-off")]
+def _cut_offs(answer: Answer) -> dict[float, tuple[str, Result]]:
+    """Return the loops that ended by their shortest wave over the answer's."""
     at = answer.prepared.cut_off
-    return {1.0: "answer"} | {run.changes["cut_off"] / at: run.name for run in ended}
+    ended = {run.changes["cut_off"] / at: (run.name, r) for run, r in answer.group("cut-off")}
+    return {1.0: ("answer", answer.main)} | ended
 
 
 def _neighbours(answer: Answer) -> list[str]:
@@ -535,9 +517,9 @@ def _neighbours(answer: Answer) -> list[str]:
 
     The others, up to sixteen times as long, are for the figure.
     """
-    names = _cut_offs(answer)
-    longer = sorted(factor for factor in names if factor > 1)[:1]
-    return [name for factor, name in names.items() if factor < 1 or factor in longer]
+    loops = _cut_offs(answer)
+    longer = sorted(factor for factor in loops if factor > 1)[:1]
+    return [name for factor, (name, _) in loops.items() if factor < 1 or factor in longer]
 
 
 def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
@@ -596,12 +578,10 @@ def _one_patch(answer: Answer) -> list[str]:
 
 def _not_converged(answer: Answer) -> list[str]:
     """Return a warning where the shortest two cut-offs that were computed differ in their loss."""
-    names = _cut_offs(answer)
-    finest, coarser = sorted(names)[:2] if len(names) > 1 else (1.0, 1.0)
-    one, other = answer.result(names[finest]), answer.result(names[coarser])
-    assert one is not None
-    assert other is not None
-    change = one["loss"] / other["loss"] - 1 if other["loss"] else 0.0
+    loops = _cut_offs(answer)
+    finest, coarser = sorted(loops)[:2] if len(loops) > 1 else (1.0, 1.0)
+    one, other = (loops[factor][1]["loss"] for factor in (finest, coarser))
+    change = one / other - 1 if other else 0.0
     if abs(change) <= _NOT_CONVERGED:
         return []
     cut_off, limits = answer.prepared.cut_off, answer.prepared.limits
@@ -617,13 +597,12 @@ def _not_converged(answer: Answer) -> list[str]:
 
 def run_rows(answer: Answer) -> list[dict[str, Any]]:
     """Return the numbers of every loop of the plan, or why it failed."""
-    plan = answer.plan
     runs = []
-    for run in plan.runs:
+    for run in answer.plan.runs:
         found = answer.results.get(run.name)
         entry: dict[str, Any] = {
             **{"name": run.name, "group": run.group, "said": run.description},
-            **{"reference": run.reference, "expected_seconds": plan.seconds[run.name]},
+            **{"reference": run.reference, "expected_seconds": answer.plan.seconds[run.name]},
         }
         if isinstance(found, dict):
             entry |= {key: value for key, value in found.items() if key != "states"}
@@ -643,12 +622,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "file": trace.source,
         "read": {
             "said": list(trace.notes),
-            "points": trace.points,
-            "step": trace.step,
-            "length": trace.length,
-            "height_range": trace.height_range,
-            "drop_outs": trace.drop_outs,
-            "tip_radius": trace.tip_radius,
+            **{name: getattr(trace, name) for name in _READ},
         },
         "preparation": [
             {"name": step.name, "said": step.description, **step.numbers} for step in prepared.steps
@@ -664,13 +638,7 @@ def document(answer: Answer) -> dict[str, Any]:
             "power": spectrum.power.tolist(),
             "floor": spectrum.floor,
         },
-        "young": cycle.half_space.young,
-        "poisson": cycle.half_space.poisson,
-        "work_of_adhesion": cycle.works_of_adhesion[0],
-        "work_of_adhesion_open": answer.main["work_of_adhesion_open"],
-        "measure": cycle.measure,
-        "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
-        "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
+        **{name: answer.main[name] for name in _CONTACT},
         "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
         "preload": cycle.turning_points[0] if cycle.at_preload else None,
@@ -680,11 +648,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "friction": answer.main["friction"],
         "pull_off_stress": asdict(answer.pull_off_stress),
         "contact_fraction": asdict(answer.contact_fraction),
-        "valid_range": answer.valid_range,
-        "edge_range": answer.edge_range,
-        "touch_range": answer.touch_range,
-        "turn_range": answer.turn_range,
-        "largest_interior_tension": answer.largest_interior_tension,
+        **{name: getattr(answer, name) for name in _OF_ALL_LOOPS},
         "loop": dict(answer.main),
         "runs": run_rows(answer),
         "plan": {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -31,35 +30,17 @@ from adhesis.solver.model.measured_profile import trace_spectrum
 _GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """Figure on disk, with title and caption."""
-
-    path: Path
-    title: str
-    caption: str
-
-
-def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
-    """Draw all figures for which the answer has data, as PNG and PDF."""
-    drawn = []
+def draw_all(answer: Answer, folder: Path) -> dict[str, str]:
+    """Draw all figures for which the answer has data, as PNG and PDF; return their captions."""
+    captions = {}
+    builders = (_trace, _spectrum, _loop, _cut_off, _tables)
     with style():
-        for (stem, title), build in zip(
-            FIGURES.items(), (_trace, _spectrum, _loop, _cut_off, _tables), strict=True
-        ):
+        for stem, build in zip(FIGURES, builders, strict=True):
             built = build(answer)
-            if built is None:
-                continue
-            figure, caption = built
-            path, _ = save(figure, folder / stem)
-            drawn.append(Drawn(path, title, caption))
-    return drawn
-
-
-def _scale(name: str, size: float) -> tuple[float, str]:
-    """Return the unit of a quantity of this size: its factor and name."""
-    unit, in_si = shown_unit(name, size)
-    return 1 / in_si, unit
+            if built is not None:
+                figure, captions[stem] = built
+                save(figure, folder / stem)
+    return captions
 
 
 def _trace(answer: Answer) -> tuple[Figure, str]:
@@ -67,34 +48,28 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     heights = prepared.trace.heights
     level, profile = prepared.level(), prepared.profile()
     x = prepared.start + prepared.step * np.arange(level.size)
-    by_x, unit_x = _scale("length", prepared.trace.length)
+    unit_x, in_x = shown_unit("length", prepared.trace.length)
     figure = new_figure(2, 1, TWO_COLUMNS, 3.3, sharex=True)
     above, below = figure.axes
-    by_z, unit_z = _scale("height_range", prepared.trace.height_range)
+    unit_z, in_z = shown_unit("height_range", prepared.trace.height_range)
     measured = prepared.step * np.arange(heights.size)
-    above.plot(by_x * measured, by_z * heights, color=_GREY, lw=0.7)
+    above.plot(measured / in_x, heights / in_z, color=_GREY, lw=0.7)
     fit = prepared.filled - level
     sign = -1.0 if any(step.name == "turned over" for step in prepared.steps) else 1.0
-    above.plot(by_x * x, sign * by_z * fit, color=_ORANGE, lw=1.0, label="form subtracted")
+    above.plot(x / in_x, sign * fit / in_z, color=_ORANGE, lw=1.0, label="form subtracted")
     if prepared.gaps.any():
-        gaps = np.flatnonzero(prepared.gaps)
-        above.plot(
-            by_x * x[gaps],
-            sign * by_z * prepared.filled[gaps],
-            ".",
-            ms=2.5,
-            color="k",
-            label="interpolated",
-        )
-    marked = _mark(figure.axes, by_x, prepared)
+        gaps = prepared.gaps
+        filled = sign * prepared.filled[gaps] / in_z
+        above.plot(x[gaps] / in_x, filled, ".", ms=2.5, color="k", label="interpolated")
+    marked = _mark(figure.axes, in_x, prepared)
     above.set(ylabel=f"measured ({unit_z})")
     above.legend(loc="best")
-    by_z, unit_z = _scale("height_range", float(np.ptp(level)))
-    below.plot(by_x * x, by_z * level, color=_GREY, lw=0.7, label="level")
+    unit_z, in_z = shown_unit("height_range", float(np.ptp(level)))
+    below.plot(x / in_x, level / in_z, color=_GREY, lw=0.7, label="level")
     n = max(4 * profile.highest_harmonic, 2000) + 1
     used = profile.heights(n)
     at = prepared.start + profile.period * np.arange(n) / n
-    below.plot(by_x * at, by_z * used, color=_BLUE, lw=0.8, label="used, one period")
+    below.plot(at / in_x, used / in_z, color=_BLUE, lw=0.8, label="used, one period")
     below.set(xlabel=f"position ({unit_x})", ylabel=f"height ({unit_z})")
     below.legend(loc="best", ncols=2)
     return figure, (
@@ -103,8 +78,11 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     )
 
 
-def _mark(panels: Sequence[Axes], by: float, prepared: Prepared) -> str:
-    """Shade what is excluded and the single features; return sentences for the caption."""
+def _mark(panels: Sequence[Axes], unit: float, prepared: Prepared) -> str:
+    """Shade what is excluded and the single features, on axes in a unit of so many m.
+
+    Returns sentences for the caption.
+    """
     marks = (
         ("excluded", _GREY, prepared.excluded),
         ("single feature", _ORANGE, [(one.begin, one.end) for one in prepared.features]),
@@ -112,14 +90,9 @@ def _mark(panels: Sequence[Axes], by: float, prepared: Prepared) -> str:
     for panel, axes in enumerate(panels):
         for label, colour, ranges in marks:
             for index, (begin, end) in enumerate(ranges):
-                axes.axvspan(
-                    by * begin,
-                    by * min(end, prepared.trace.length),
-                    color=colour,
-                    alpha=0.3,
-                    lw=0,
-                    label=None if index or panel else label,
-                )
+                sides = begin / unit, min(end, prepared.trace.length) / unit
+                name = None if index or panel else label
+                axes.axvspan(*sides, color=colour, alpha=0.3, lw=0, label=name)
     sentences = ""
     if prepared.excluded:
         sentences += " Shaded in grey: what is excluded."

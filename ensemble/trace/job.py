@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
 from adhesis.ensemble.quantities import stress_text
 from adhesis.solver.loading.cycle import turn_arguments
 from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.method import Branch, ContactState
+from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Measure, Problem, strength_of
+from adhesis.solver.model.problem import Measure, Problem
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName, make_method
+
+MAX_PENETRATION = 0.9
+"""Turning point Δ/h_max where none is given."""
 
 
 @dataclass(frozen=True)
@@ -50,30 +53,31 @@ class Cycle:
 
     def turn(self, point: float) -> str:
         """Describe a turning point: "Δ/h_max = 0.9"."""
+        is_fixed = self.control.is_fixed
+        held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
         if self.at_preload:
-            held = "a fixed separation"
-            if not self.control.is_fixed:
-                held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
+            held = "a fixed separation" if is_fixed else held
             return f"a preload of {stress_text(point, 4)} at {held}"
         if self.control.is_load:
             return f"p̄ = {stress_text(point, 4)}"
-        if self.control.is_fixed:
-            return f"Δ/h_max = {point:g}"
-        return f"u_tot/h_max = {point:g} of a stiffness of {self.control.stiffness:.4g} Pa/m"
+        return f"{self.turn_sign} = {point:g}" + ("" if is_fixed else f" of {held}")
 
-    def strength_at(self, work_of_adhesion: float) -> float:
-        """Return the strength of the interface in Pa at a work of adhesion in J/m²."""
-        return strength_of(work_of_adhesion, self.adhesion_range, self.strength)
+    def problem(self, profile: Profile, work_of_adhesion: float) -> Problem:
+        """Make the problem of a profile and a work of adhesion in J/m² (TypeError, ValueError).
 
-    def open_at(self, work_of_adhesion: float) -> float | None:
-        """Return the work of adhesion of receding edges at one of advancing edges, in J/m².
-
-        It is given for that of the answer; at others both keep their ratio.
+        The work of adhesion of receding edges is given for the answer; elsewhere both keep their
+        ratio.
         """
-        first, given = self.works_of_adhesion[0], self.work_of_adhesion_open
-        if given is None or work_of_adhesion == first:
-            return given
-        return given / first * work_of_adhesion
+        first, opening = self.works_of_adhesion[0], self.work_of_adhesion_open
+        if opening is not None and work_of_adhesion != first:
+            opening = opening / first * work_of_adhesion
+        return Problem(
+            *(profile, self.half_space, work_of_adhesion, self.control),
+            strength=math.inf if self.strength is None else self.strength,
+            adhesion_range=self.adhesion_range,
+            work_of_adhesion_open=opening,
+            measure=self.measure,
+        )
 
 
 @dataclass(frozen=True)
@@ -87,22 +91,10 @@ class Job:
     turning_point: float
 
 
-def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> dict[str, Any]:
-    """Run one loop and return its numbers, and its states as lists.
-
-    ``report`` is called after each load step with the branch and the prescribed value that is
-    reached.
-    """
-
-    def progress(branch: Branch, penetration: float, state: ContactState) -> None:
-        if report is not None:
-            report((branch, penetration))
-
-    profile, cycle, gamma = job.profile, job.cycle, job.work_of_adhesion
-    problem = Problem(
-        profile, cycle.half_space, gamma, cycle.control, strength=cycle.strength_at(gamma),
-        work_of_adhesion_open=cycle.open_at(gamma), measure=cycle.measure,
-    )  # fmt: skip
+def run(job: Job, progress: Progress | None = None) -> dict[str, Any]:
+    """Run one loop and return its numbers, and its states as lists."""
+    cycle = job.cycle
+    problem = cycle.problem(job.profile, job.work_of_adhesion)
     method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
     turn = turn_arguments(cycle.control, job.turning_point, cycle.at_preload, cycle.latest)
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
@@ -117,6 +109,6 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),
         "small_scale_share": loop.drops(small_scale=True) / drops if drops > 0 else 0.0,
-        "waves": profile.highest_harmonic,
+        "waves": job.profile.highest_harmonic,
         "states": {name: values.tolist() for name, values in loop.columns().items()},
     }

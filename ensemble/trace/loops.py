@@ -31,7 +31,7 @@ class _Computing:
         started = time.monotonic()
         return run(
             self.jobs[task],
-            lambda place: check((time.monotonic() - started, *place)),
+            lambda branch, drive, _: check((time.monotonic() - started, branch, drive)),
         )
 
 

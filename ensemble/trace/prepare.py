@@ -294,7 +294,6 @@ def _within(begin: float, end: float, start: float, step: float, size: int) -> M
 
 
 def _excluded(work: _Work, heights: Array, ranges: Sequence[tuple[float, float]]) -> Mask:
-    """Return which heights are excluded."""
     trace = work.trace
     excluded = np.zeros(heights.size, dtype=bool)
     for begin, end in ranges:
@@ -428,7 +427,7 @@ def _why_missing(trace: Trace) -> str:
 def _degree(work: _Work, filled: Array, wanted: int | None) -> int:
     """Choose the degree of the form, unless given; warn of a form that is not subtracted."""
     shares = form_shares(filled)
-    stands_out = [d for d in range(2, _FORM_TO + 1) if _is_form(shares, d)]
+    stands_out = [d for d in range(2, _FORM_TO + 1) if _prominence(shares, d) > _FORM]
     found = max(stands_out, default=1)
     degree = found if wanted is None else wanted
     line = filled[-1] - filled[0] if degree else 0.0
@@ -436,14 +435,8 @@ def _degree(work: _Work, filled: Array, wanted: int | None) -> int:
     names = {0: "mean", 1: "tilt", 2: "tilt and bow"}
     name = names.get(degree, f"form of degree {degree}")
     bow = float(np.ptp(fit - polynomial_form(filled, min(1, degree))))
-    why = "as given"
-    if wanted is None:
-        why = (
-            "a form stands out of the roughness"
-            if found > 1
-            else "no form beyond a tilt stands out"
-        )
-    said = f"{name} subtracted ({why})"
+    why = "a form stands out of the roughness" if found > 1 else "no form beyond a tilt stands out"
+    said = f"{name} subtracted ({why if wanted is None else 'as given'})"
     numbers = {"degree": degree, "rise": float(line)}
     if bow > 0:
         said += f": {length_text(bow)} from lowest to highest beside the tilt"
@@ -455,13 +448,7 @@ def _degree(work: _Work, filled: Array, wanted: int | None) -> int:
             f"a form of degree {found} remains ({length_text(left)} rms, as of a curved sample "
             f"or guide): it counts as roughness with {parameter('degree')} {wanted}"
         )
-    elif degree < found + 1 <= _FORM_TO and wanted is None and _is_form(shares, found + 1):
-        work.warnings.append("a form of a higher degree may remain")
     return degree
-
-
-def _is_form(shares: Array, degree: int) -> bool:
-    return _prominence(shares, degree) > _FORM
 
 
 def _prominence(shares: Array, degree: int) -> float:

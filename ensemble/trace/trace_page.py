@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from adhesis._version import __version__
 from adhesis.ensemble.escape import code_span, markdown, markdown_table, printable
-from adhesis.ensemble.outputs import staged_folder, write_json
+from adhesis.ensemble.outputs import check_output_folder, staged_folder, write_json
 from adhesis.ensemble.quantities import (
     in_works_of_adhesion,
     length_text,
     rounded_percent,
     stress_text,
     with_error,
+    with_units,
 )
-from adhesis.ensemble.report.html import html_page
+from adhesis.ensemble.report.html import html_page, picture_of, table_of
 from adhesis.ensemble.trace.answer import (
     COVERAGE,
     DOUBTS,
     FIGURE_FILES,
+    FIGURES,
     LEAST,
     Answer,
     Uncertain,
     document,
+    run_rows,
 )
-from adhesis.ensemble.trace.figures import Drawn, draw_all
+from adhesis.ensemble.trace.figures import draw_all, draw_loop
+from adhesis.ensemble.trace.variants import TABLES
+from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.equilibrium_path import friction_text, sticking_text
 
@@ -137,12 +144,29 @@ def write_page(answer: Answer, folder: Path) -> None:
     (folder / "trace.html").write_text(html_page(text, folder), encoding="utf-8")
 
 
-def write_all(answer: Answer, folder: Path) -> Path:
-    """Write the page, its figures and ``trace.json``; return the path of the page (OSError)."""
-    with staged_folder(folder, FIGURE_FILES) as staged:
+def write_all(answer: Answer, folder: str | os.PathLike[str]) -> Path:
+    """Write the page, its figures and ``trace.json``; see the method ``page`` of an answer."""
+    path = checks.path("folder", folder)
+    check_output_folder("folder", path, (), {})
+    with staged_folder(path, FIGURE_FILES) as staged:
         write_page(answer, staged)
         write_json(staged / "trace.json", document(answer))
-    return folder / "trace.html"
+    return path / "trace.html"
+
+
+def notebook_page(answer: Answer) -> str:
+    """Return the summary of an answer and the figure of its loop as HTML."""
+    rows = (line.split(maxsplit=1) for line in summary(answer).splitlines())
+    return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
+
+
+def table_of_runs(answer: Answer) -> Any:
+    """Return the loops of an answer as a table; see its method ``to_dataframe``."""
+    import pandas as pd
+
+    rows = pd.DataFrame(run_rows(answer)).rename(columns={"said": "description"})
+    hidden = ["range_warnings", "preload_warnings", "fall_warnings", "strain_warnings", "failed"]
+    return with_units(rows.drop(columns=hidden, errors="ignore"))
 
 
 # ---------------------------------------------------------------------- content
@@ -156,14 +180,14 @@ def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) ->
     return f"{known}{unit}{share}"
 
 
-def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
-    """Return the page as Markdown, with those figures that were drawn."""
+def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
+    """Return the page as Markdown, with those figures that were drawn and have a caption."""
     prepared, cycle, plan = answer.prepared, answer.cycle, answer.plan
     trace, half_space = prepared.trace, cycle.half_space
     name = Path(trace.source).name
     images = {
-        drawn.path.stem: f"![{drawn.title}]({drawn.path.name})\n\n*{drawn.title}.* {drawn.caption}"
-        for drawn in figures
+        stem: f"![{FIGURES[stem]}]({stem}.png)\n\n*{FIGURES[stem]}.* {caption}"
+        for stem, caption in captions.items()
     }
     parts = [
         f"# From the trace {code_span(name)} to its loss",
@@ -200,12 +224,6 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         markdown_table(*_variant_rows(answer), left_columns=1),
         images.get("cut-off"),
     ]
-    mirror = answer.change("mirror")
-    if mirror is not None:
-        parts.append(
-            f"A mirror image instead changes the loss by {rounded_percent(mirror, sign='+')}. It "
-            "is not counted: it is a body of twice the period, and the loss grows with the period."
-        )
     sweep = _sweep_rows(answer)
     if len(sweep) > 2:
         heading = "## Against work of adhesion and turning point"
@@ -234,7 +252,7 @@ def _doubt_rows(answer: Answer) -> list[list[str]]:
 def _variant_rows(answer: Answer) -> list[list[str]]:
     rows = [["variant", "loss, mJ/m²", "change", "pull-off, kPa", "contact", "waves", "CPU, s"]]
     for run in answer.plan.runs:
-        if run.group in ("work of adhesion", "turning point"):
+        if run.group in TABLES:
             continue
         found = answer.result(run.name)
         if found is None:

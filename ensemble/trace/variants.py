@@ -12,7 +12,7 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
-from adhesis.ensemble.trace.job import Cycle, Job
+from adhesis.ensemble.trace.job import MAX_PENETRATION, Cycle, Job
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.checks import counted
@@ -30,10 +30,10 @@ _SECONDS_TO_HINT, _MIN_WAVES = 120.0, 50
 # 27,000 waves and 1 to 61 patches: right within a factor of 1.3 (rms), 3.3 at worst.
 _LEAST_SECONDS, _SECONDS_OF_WAVE, _SECONDS_OF_PATCH = 0.05, 1.5e-4, 1.7e-3
 _WAVES_POWER, _PATCHES_POWER = 0.24, 1.7
-# Crests are counted at so many penetrations, up to this one where the turning point is none.
-_LEVELS, _USUAL_PENETRATION = 18, 0.9
-# Loop without the crests and troughs that stand far out of all others.
-WITHOUT_FEATURES = "without single features"
+_LEVELS = 18  # penetrations at which crests are counted
+TABLES = ("work of adhesion", "turning point")
+"""Groups of the loops that fill the tables, and measure no doubt."""
+
 _START = 2.0  # seconds for a process to start
 
 
@@ -89,25 +89,20 @@ def make_plan(
     """
     processes = cores() if processes is None else processes
     runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]
-    jobs, seconds = {}, {}
-    profiles: dict[str, Profile] = {}
+    jobs, base = {}, prepared.profile()
     for run in runs:
-        key = repr(sorted(run.changes.items()))
-        if key not in profiles:
-            profiles[key] = prepared.profile(**run.changes)
         gamma, point = run.work_of_adhesion, run.turning_point
-        job = jobs[run.name] = Job(
-            *(run.name, profiles[key], cycle),
+        jobs[run.name] = Job(
+            *(run.name, prepared.profile(**run.changes) if run.changes else base, cycle),
             cycle.works_of_adhesion[0] if gamma is None else gamma,
             cycle.turning_points[0] if point is None else point,
         )
-        seconds[run.name] = expected_seconds(job)
-    base = profiles[repr([])]
-    order = sorted(runs, key=lambda run: -seconds[run.name])  # the longest first, for balance
+    seconds = {name: expected_seconds(job) for name, job in jobs.items()}
+    order = sorted(jobs, key=lambda name: -seconds[name])  # the longest first, for balance
     wall = max(sum(seconds.values()) / max(processes, 1), max(seconds.values()))
     plan = Plan(
         runs=tuple(runs),
-        jobs=tuple(jobs[run.name] for run in order),
+        jobs=tuple(jobs[name] for name in order),
         seconds=seconds,
         waves=base.highest_harmonic,
         patches=round(patches_of(jobs["answer"])),
@@ -135,27 +130,22 @@ def _doubts(prepared: Prepared) -> list[Run]:
 
     for longer in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0), 1 / math.sqrt(2.0)):
         if longer * cut <= length / 4 if longer > 1 else longer * cut >= 2.5 * step:
-            name, described = (
-                f"cut-off × {longer:.3g}",
-                f"waves down to {length_text(longer * cut)}",
-            )
-            runs.append(Run(name, "cut-off", described, {"cut_off": longer * cut}))
+            described = f"waves down to {length_text(longer * cut)}"
+            shortest = {"cut_off": longer * cut}
+            runs.append(Run(f"cut-off × {longer:.3g}", "cut-off", described, shortest))
     variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
     for part in (0.05, 0.1):
         faded = f"both ends faded to the mean over {100 * part:.0f} %"
         name = f"taper {100 * part:.0f} %"
         variant(name, "continuation", faded, continuation="taper", part=part)
-    if 2 * factor * cut <= length / 4:
-        described = "trace and mirror image, twice as long a period"
-        changes = {"continuation": "mirror", "cut_off": 2 * factor * cut}
-        runs.append(Run("mirror", "mirror", described, changes, f"cut-off × {2 * factor:.3g}"))
     degree = prepared.degree
     variant(f"degree {degree + 1}", "form", "one degree more off", degree=degree + 1)
     if degree > 1 and not prepared.form_is_sure:
         variant(f"degree {degree - 1}", "form", "one degree less off", degree=degree - 1)
     if prepared.features:
         bridged = f"{single_features_text(prepared.features)} bridged by straight lines"
-        variant(WITHOUT_FEATURES, "single features", bridged, without_features=True)
+        name = "without single features"
+        variant(name, "single features", bridged, without_features=True)
     if prepared.spectrum.noise > 0:
         described = "white noise of the instrument's size added"
         for seed in (1, 2) if factor == 1 else (1,):
@@ -211,7 +201,7 @@ def patches_of(job: Job) -> float:
     point is not known, those of the usual one count.
     """
     is_known = job.cycle.control.is_fixed and not job.cycle.at_preload
-    penetration = job.turning_point if is_known else _USUAL_PENETRATION
+    penetration = job.turning_point if is_known else MAX_PENETRATION
     by_adhesion = expected_patches(job.profile, job.cycle.half_space, job.work_of_adhesion)
     return min(by_adhesion, float(crests_reached(job.profile, penetration)))
 
@@ -241,8 +231,8 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
             break
         factor *= 2
     if not quick:
-        tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]
-        saved = sum(plan.seconds[name] for name in tables) / max(plan.processes, 1)
+        tables = (plan.seconds[run.name] for run in plan.runs if run.group in TABLES)
+        saved = sum(tables) / max(plan.processes, 1)
         hints.append(
             f"{parameter('quick')} leaves the tables out and saves about {duration(saved)}"
         )

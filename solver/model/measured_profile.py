@@ -15,7 +15,7 @@ from numpy.polynomial import legendre
 from adhesis.solver.model.profile import Array, Profile, profile_from_heights
 from adhesis.solver.values import ByValue
 
-Continuation = Literal["taper", "blend", "mirror"]
+Continuation = Literal["taper", "blend"]
 CONTINUATIONS: tuple[Continuation, ...] = get_args(Continuation)
 
 # Bands of the averaged spectrum per factor of two in wavelength.
@@ -67,11 +67,11 @@ def one_period(
         Level heights in m.
     step : float
         In m.
-    continuation : {"taper", "blend", "mirror"}
+    continuation : {"taper", "blend"}
         ``taper``: both ends fade to the mean over ``part`` of the length (Tukey's window), period
         n steps. ``blend``: the last ``part`` of the trace is cross-faded with the first one, with
         weights whose squares add up to one, which preserves the mean square height; period
-        (1 - part) n steps. ``mirror``: the trace and its mirror image, period 2 (n - 1) steps.
+        (1 - part) n steps.
     part : float
         Changed share of the length, 0 < part < 0.5.
 
@@ -87,8 +87,6 @@ def one_period(
         )
     if not 0 < part < 0.5:
         raise ValueError(f"part is {part!r}: it must lie between 0 and 0.5, both excluded")
-    if continuation == "mirror":
-        return np.concatenate([heights, heights[-2:0:-1]]), 2 * (n - 1) * step
     ends = max(2, round(part * n))
     rise = 0.5 * (1 - np.cos(np.pi * (np.arange(ends) + 0.5) / ends))
     if continuation == "taper":

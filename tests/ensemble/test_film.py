@@ -24,7 +24,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.loop.film import Film, film_of
+from adhesis.ensemble.loop.film import Film
 from adhesis.ensemble.loop.film_scenes import scenes_of
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.references.exact_wave import ExactWave
@@ -42,7 +42,7 @@ def loop() -> LoopResult:
 
 @pytest.fixture(scope="module")
 def film(loop: LoopResult) -> Film:
-    return film_of(loop, frames=30)
+    return loop.film(frames=30)
 
 
 def data_of(page: str) -> dict:
@@ -79,7 +79,7 @@ def test_frames_are_even_along_the_path(loop):
 
 def test_of_more_jumps_than_frames_those_with_the_largest_drops_are_shown(loop, monkeypatch):
     monkeypatch.setattr(scenes_module, "MOST_FRAMES", 12)
-    film = film_of(loop, frames=4)
+    film = loop.film(frames=4)
     shown = film._scenes.jumps_shown
     assert len(film) <= 12
     assert 0 < shown < len(loop.jumps)
@@ -145,7 +145,7 @@ def test_animations_are_written_by_their_writers(loop, tmp_path, ending):
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
         pytest.skip("ffmpeg, which writes .mp4, is not installed")
     file = tmp_path / f"loop{ending}"
-    film = film_of(loop, frames=2)
+    film = loop.film(frames=2)
     film._scenes.scenes[:] = film._scenes.scenes[4:8]  # equal frames are one in a .gif
     drawn = []
     film.save(file, progress=lambda number, total: drawn.append((number, total)))

@@ -276,6 +276,7 @@ def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_p
     assert table.loss[0] == answer.loss.value
     assert len(table) == runs
     assert table.description[0] == "the loop"
+    assert not [name for name in table.columns if "warnings" in name or name == "failed"]
     assert table.attrs["units"]["loss"] == "J/m²"
     path = answer.page(tmp_path / "new" / "folder")
     assert path == tmp_path / "new" / "folder" / "trace.html"

@@ -89,7 +89,8 @@ def test_the_table_of_a_trace_keeps_the_ratio_of_both_works_of_adhesion():
     prepared = small_trace()
     check_trace(prepared, cycle)
     plan = make_plan(prepared, cycle, processes=0)
-    found = {(job.work_of_adhesion, job.cycle.open_at(job.work_of_adhesion)) for job in plan.jobs}
+    problems = [cycle.problem(job.profile, job.work_of_adhesion) for job in plan.jobs]
+    found = {(problem.work_of_adhesion, problem.gamma_open) for problem in problems}
     assert found == {(0.04, 0.06), (0.02, 0.03), (0.08, 0.12)}
 
 

@@ -190,7 +190,7 @@ def test_a_preload_is_the_turning_point_of_a_trace() -> None:
     said = summary(answer)
     assert "to p̄ = 300 Pa with h_max" in said
     assert f"{answer.loss.value / 0.005:.4g} γ" in said
-    text = page_text(answer, [])
+    text = page_text(answer, {})
     assert "one loop to p̄ = 300 Pa" in text
     assert "| γ, J/m² | p̄, Pa |" in text
 
@@ -275,7 +275,7 @@ def test_the_page_shows_names_headers_and_warnings_as_texts(
         prepared=dataclasses.replace(before, trace=evil),
         warnings=("a <script> of ![w](/etc/passwd)",),
     )
-    page = page_text(answer, [])
+    page = page_text(answer, {})
     by_markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     for text in (html_page(page, tmp_path), by_markdown.render(page)):
         assert "<script" not in text
@@ -350,7 +350,7 @@ def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer:
     )
     lines = summary(found).splitlines()
     assert lines[3] == f"changes     {text}"
-    page = page_text(found, [])
+    page = page_text(found, {})
     assert page.index(f"**What changes the loss:** {text}.") < page.index("**Warning:** doubt")
     assert answers.document(found)["largest_changes"][0] == {"name": "cut-off × 4", "factor": 3.73}
     nothing = with_losses(spoiled_answer, losses | {"noise 1": 0.0}, {"step": 1e-6})

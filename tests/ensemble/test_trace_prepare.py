@@ -150,7 +150,6 @@ def test_the_profile_is_the_trace() -> None:
     used = found.profile().at(x)
     level = found.level()[200:1400]
     np.testing.assert_allclose(used - used.mean(), level - level.mean(), atol=2e-8)
-    assert found.profile(continuation="mirror").period == pytest.approx(2 * X[-1])
 
 
 RIDGE = 9e-6 * np.exp(-(((X - 0.7e-3) / 8e-6) ** 2))

@@ -48,7 +48,7 @@ def test_a_bow_stands_out_in_its_degree() -> None:
 def test_a_period_keeps_the_heights_and_has_no_step() -> None:
     z = rough() + 1e-3 * (X - X.mean())  # ends that do not meet
     steps = np.abs(np.diff(z)).max()
-    for continuation in ("taper", "blend", "mirror"):
+    for continuation in ("taper", "blend"):
         period, length = one_period(z, STEP, continuation, 0.05)
         assert np.abs(np.diff(period, append=period[0])).max() < 2 * steps, continuation
         assert length == pytest.approx(STEP * period.size)
@@ -58,8 +58,6 @@ def test_a_period_keeps_the_heights_and_has_no_step() -> None:
     blend, length = one_period(z, STEP, "blend", 0.05)
     np.testing.assert_array_equal(blend[ends:], z[ends : N - ends])
     assert length == pytest.approx(0.95 * LENGTH)
-    mirror, _ = one_period(z, STEP, "mirror", 0.05)
-    np.testing.assert_array_equal(mirror[1:N], mirror[: N - 2 : -1])
     for part in (0.0, 0.5):
         with pytest.raises(ValueError, match="part is"):
             one_period(z, STEP, "blend", part)

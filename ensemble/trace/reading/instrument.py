@@ -92,10 +92,6 @@ def _name(reader: Any) -> str:
 
 
 def _library() -> ModuleType:
-    if not available():
-        raise InputError(
-            f"an instrument's file needs the optional package SurfaceTopography: {HINT}"
-        )
     # NuMPI, which it imports, initialises MPI if it can import mpi4py; reading needs no ranks.
     hidden = "mpi4py" not in sys.modules
     if hidden:
