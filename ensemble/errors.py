@@ -59,6 +59,14 @@ class WriteError(_Printable):
     """An output could not be written: the disk is full, say. What was written before is sound."""
 
 
+class OutputError(Exception):
+    """stdout could not be written; the text gives the reason of the system."""
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM was received, or SIGHUP of a terminal that closes."""
+
+
 _LACKS = (errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EAGAIN)
 # How libraries put it: Python's threads, and the loader of shared libraries.
 _WORDS = ("can't start new thread", "failed to map segment", *(map(os.strerror, _LACKS)))
