@@ -29,7 +29,9 @@ def quoted(text: str) -> str:
 
 
 def reason(error: Exception) -> str:
-    """Return in one line what the system or a library says of an error."""
+    """Return in one line what the system or a library says of an error; of HDF5's the gist."""
+    if found := re.search(r"error message = '([^']*)'", str(error)):
+        return found[1]
     return getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
 
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, reason
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
@@ -33,7 +33,6 @@ from adhesis.ensemble.results.copy_rows import Source, copy_dataset
 from adhesis.ensemble.results.disk_file import opened, refusal
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import Dataset, sizes_of
 from adhesis.solver.runtime.uninterrupted import signals_held
 

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, reason
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.copy_rows import Source, copy_dataset
 from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS
 from adhesis.solver.runtime.uninterrupted import signals_held
@@ -34,9 +33,10 @@ _BLOCK_ROWS = 4096
 _OF_THE_RUN = ("wall_time", "cpu_time")
 _COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
 # Root attributes that say what a file is; the others say what computed it.
-_NOT_VERSIONS = frozenset(
-    ("file_type", "file_version", "Conventions", "title", "campaign", "seed", "created", "laid_out")
-) | {"part"}
+_NOT_VERSIONS = {
+    *("file_type", "file_version", "Conventions", "title", "campaign", "seed", "part"),
+    *("created", "laid_out"),
+}
 _COPIED = tuple(
     d for d in schema.DATASETS if d not in schema.TASK_DATASETS and d is not schema.STATUS
 )

@@ -6,7 +6,6 @@ So a row whose status is not "pending" is a whole one, and its checksum is that 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -17,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.errors import WriteError
+from adhesis.ensemble.errors import WriteError, reason
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
 from adhesis.ensemble.results.disk_file import DiskFile
@@ -243,11 +242,3 @@ class DatasetRows:
             return
         self._space.select_hyperslab((row, *self._rest), (1, *self._shape))
         self._id.write(self._memory, self._space, block)
-
-
-def reason(error: Exception) -> str:
-    """Return the reason of an error in one line, without HDF5's particulars."""
-    if isinstance(error, OSError) and error.errno:
-        return os.strerror(error.errno)
-    found = re.search(r"error message = '([^']*)'", str(error))
-    return found.group(1) if found else " ".join(str(error).split("(")[0].split())

@@ -246,7 +246,7 @@ def _tell_price(
     campaign: Campaign, path: Path, args: argparse.Namespace, engine: Engine | None
 ) -> int:
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
-    from adhesis.ensemble.run.price import as_text, price
+    from adhesis.ensemble.run.price import price
     from adhesis.ensemble.run.session import Engine
 
     engine = engine or Engine()
@@ -270,7 +270,7 @@ def _tell_price(
         prepare=prepare,
         on_pilot=tried,
     )
-    print(as_text(estimate))
+    print(estimate)
     return exit_codes.DONE
 
 
