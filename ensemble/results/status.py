@@ -20,10 +20,16 @@ from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.interval import estimates
-from adhesis.ensemble.quantities import AXIS_UNITS, percent, with_error
+from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, why_beyond
+from adhesis.ensemble.task.doubt import (
+    OF_DOUBT,
+    beyond_zero_range,
+    doubtful,
+    errors_text,
+    why_beyond,
+)
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import RANGES, least_range
 from adhesis.solver.values import finite
@@ -194,9 +200,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         )
     groups = status["groups"]
     if len(groups) <= _MOST_GROUPS_SHOWN:
-        units = status["axis_units"]
         further = {
-            name: key if units[name] == "1" else f"{key} in {AXIS_UNITS[units[name]]}"
+            name: f"{key} in {UNITS[key]}" if key in UNITS else key
             for name in status["axes"][2:]
             for key in [name.removeprefix("wanted_")]
         }
@@ -213,7 +218,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if status["doubtful"]:
         why = "by their own account less accurate than asked for"
         lines += ["", f"{len(status['doubtful'])} losses are doubtful: {why}"]
-        lines += _listed(status["doubtful"], _errors_of)
+        lines += _listed(status["doubtful"], lambda row: f": {errors_text(row)}")
     if status["beyond_limit"]:
         why = why_beyond(status["opens"])
         lines += ["", f"{len(status['beyond_limit'])} losses are doubtful: {why}"]
@@ -252,11 +257,6 @@ def _listed(
     if len(rows) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(rows) - _MOST_FAILURES_SHOWN} more (--json lists all)")
     return lines
-
-
-def _errors_of(row: Mapping[str, Any]) -> str:
-    share = row["loss_error"] / (abs(row["loss"]) or 1)
-    return f": audit residual {percent(row['audit_residual'])}, estimated error {percent(share)}"
 
 
 def _range_of(row: Mapping[str, Any]) -> str:

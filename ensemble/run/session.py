@@ -16,7 +16,6 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
-from adhesis.ensemble.quantities import percent
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
@@ -29,7 +28,7 @@ from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.task.compute import Runner, check_task
-from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful
+from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, errors_text
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
 from adhesis.solver.loading.path_record import Progress
@@ -266,11 +265,7 @@ class _Session:
             counts.beyond_limit += bool(beyond_zero_range(row))
             if doubtful(row, self.campaign.solver.accuracy):
                 counts.doubtful += 1
-                share = 100 * row["loss_error"] / (abs(row["loss"]) or 1.0)
-                progress.doubt(
-                    f"{what}: audit residual {percent(row['audit_residual'])}, "
-                    f"estimated error {share:.2g} %"
-                )
+                progress.doubt(f"{what}: {errors_text(row)}")
         if self.plan.batches is not None:
             steered = self.campaign.stop.quantity
             value = math.nan if outcome.error is not None else float(row[steered])

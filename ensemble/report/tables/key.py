@@ -10,7 +10,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.interval import Estimate
-from adhesis.ensemble.quantities import AXIS_UNITS, common_unit
+from adhesis.ensemble.quantities import UNITS, common_unit
 from adhesis.ensemble.report.tables.table import Format, TableColumn, Value, at_least_0, number
 
 
@@ -48,8 +48,7 @@ def axis_columns(
     columns = []
     for axis in axes:
         shown, size = common_unit(axis.name, axis.values)
-        unit = AXIS_UNITS.get(axis.unit, "")
-        shown = shown or unit
+        unit = UNITS.get(axis.name, "")
         columns.append(
             TableColumn(
                 f"{axis.name} [{unit.replace('²', '^2')}]" if unit else axis.name,
