@@ -61,14 +61,14 @@ def _write_files(
     from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
-    from adhesis.ensemble.report.tables import loss_tables, mechanisms, works
+    from adhesis.ensemble.report.tables import loss_tables, mechanisms
 
     loss_tables.losses(data).write_csv(directory / "losses.csv")
     if (known := loss_tables.precision(data)).rows:
         known.write_csv(directory / "precision.csv")
     loss_tables.paired(data).write_csv(directory / "growth.csv")
     mechanisms.jumps(data).write_csv(directory / "jumps.csv")
-    works.works(data).write_csv(directory / "works.csv")
+    loss_tables.works(data).write_csv(directory / "works.csv")
     write_netcdf(directory / "curves.nc", curves_dataset(data))
     if data.companions:
         loss_tables.companions(data).write_csv(directory / "beside.csv")

@@ -112,7 +112,7 @@ class Writer:
         for row in rows:
             with self._writing(row):
                 # First the status: a row that is being emptied must not be taken for a whole one.
-                self._write_status(row, schema.PENDING)
+                self._set_pending(row)
                 self.flush()
                 for dataset in cleared:
                     place = self._place(dataset.name, row)
@@ -126,7 +126,7 @@ class Writer:
         for row in rows:
             if needed:
                 with self._writing(row):
-                    self._write_status(row, schema.PENDING)
+                    self._set_pending(row)
             else:
                 self._write(row, {}, schema.NOT_NEEDED)
         self.flush()
@@ -155,9 +155,9 @@ class Writer:
             self._datasets[schema.STATUS.name].write(row, blocks[schema.STATUS.name])
             self.flush()
 
-    def _write_status(self, row: int, status: int) -> None:
+    def _set_pending(self, row: int) -> None:
         rows_of = self._datasets[schema.STATUS.name]
-        rows_of.write(row, rows_of.block(status))
+        rows_of.write(row, rows_of.block(schema.PENDING))
 
     def _origin_of(self, rank: int) -> dict[str, bytes]:
         return {schema.ORIGIN.name: schema.encode_text(self._origin(rank), schema.ORIGIN_LENGTH)}

@@ -104,7 +104,7 @@ def estimated(
         columns.append(
             TableColumn(
                 f"{name}{unit}" if part == "value" else f"{name}_{part}{unit}",
-                estimate(name, attribute) if of is None else partial(_part, of, attribute),
+                partial(_part, of or (lambda cell: cell.estimates[name]), attribute),
                 _HEADINGS.get(part, heading) if heading else "",
                 formats.get(part, show or number(unit=size)),
                 last=last,
