@@ -42,7 +42,6 @@ EXAMPLES = (
     "adhesis loop --hurst 0.8 --seed 1",
     "adhesis run jobs/example.toml --ranks 3",
 )
-_CAMPAIGNS = ("new", "run", "status", "verify", "merge", "report")
 _WITHOUT_NUMERICS = ("new", "completion")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
 _OPTIONS = {
@@ -83,8 +82,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def module_of(name: str) -> str:
     """Return the name of a command's module."""
-    folder = "campaigns." if name in _CAMPAIGNS else ""
-    return f"adhesis.ensemble.command.{folder}{name}"
+    return f"adhesis.ensemble.command.{name}"
 
 
 def parser_of(name: str) -> Parser:

@@ -32,11 +32,6 @@ _BLOCK_ROWS = 4096
 # Time and place may differ between two computations of one task; nothing else may.
 _OF_THE_RUN = ("wall_time", "cpu_time")
 _COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
-# Root attributes that say what a file is; the others say what computed it.
-_NOT_VERSIONS = {
-    *("file_type", "file_version", "Conventions", "title", "campaign", "seed", "part"),
-    *("created", "laid_out"),
-}
 _COPIED = tuple(
     d for d in schema.DATASETS if d not in schema.TASK_DATASETS and d is not schema.STATUS
 )
@@ -82,8 +77,9 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         doubts = [doubt for file in opened for doubt in file.doubts()]
         sources = _assign(opened, campaign, status, there)
         if there is None:
+            of_file = {*schema.fixed_attributes(campaign), "part", "created", "laid_out"}
             known = opened[0].attributes.items()
-            create(out, campaign, versions={k: v for k, v in known if k not in _NOT_VERSIONS})
+            create(out, campaign, versions={k: v for k, v in known if k not in of_file})
         else:
             there.close()
         _copy(sources, out)

@@ -84,10 +84,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     return {
         "file": str(path),
         "tasks": len(state),
-        "pending": int(np.sum(state == PENDING)),
-        "done": int(np.sum(state == DONE)),
-        "failed": len(failed),
-        "not_needed": int(np.sum(state == NOT_NEEDED)),
+        **_counts(state),
         "damaged": named(column, damaged),
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
@@ -146,6 +143,10 @@ def _times(times: NDArray[np.float64]) -> dict[str, float]:
     }
 
 
+def _counts(state: NDArray[np.uint8]) -> dict[str, int]:
+    return {name: int(np.sum(state == code)) for name, code in _CODES.items()}
+
+
 def _group(
     point: dict[str, float],
     rows: NDArray[np.intp],
@@ -155,7 +156,7 @@ def _group(
 ) -> dict[str, Any]:
     """Return the entry of one cell, from its rows."""
     done = rows[state[rows] == DONE]
-    counts = {name: int(np.sum(state[rows] == code)) for name, code in _CODES.items()}
+    counts = _counts(state[rows])
     values = np.array([column[name][done] for name in _AVERAGED])
     seconds, loss, scaled = estimates(values, with_interval=False)
     group: dict[str, Any] = {
