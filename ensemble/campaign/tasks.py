@@ -120,10 +120,7 @@ class Tasks(Sequence[Task]):
 
     def of_cells(self) -> Tasks:
         """Return the first task of each cell."""
-        cells = self.cell_of()
-        changes = np.flatnonzero(cells[1:] != cells[:-1]) + 1  # a cell is one long stretch
-        starts = np.concatenate(([0], changes))[: cells.size]
-        return self.chosen(self.rows[starts[np.unique(cells[starts], return_index=True)[1]]])
+        return self.chosen(self.rows[np.diff(self.cell_of(), prepend=-1) != 0])
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,9 @@ class Results:
 
     def _root_attributes(self) -> dict[str, Any]:
         found = {}
-        for name in set(self._file.attrs) - {HEAD}:
+        for name in self._file.attrs:
+            if name == HEAD:
+                continue
             if self._file.attrs.get_id(name).get_storage_size() > _LONGEST_ATTRIBUTE:
                 raise ValueError(name)
             value = self._file.attrs[name]
