@@ -7,6 +7,7 @@ import re
 import signal
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from traceback import walk_tb
 from types import FrameType
@@ -109,14 +110,10 @@ def deadline(
     """
     if walltime is not None:
         return _before(started + walltime, started)
-    try:
-        return _before(float(environ["SLURM_JOB_END_TIME"]), started)
-    except (KeyError, ValueError):
-        pass
-    try:
-        return _before(started + float(environ["PBS_WALLTIME"]), started)
-    except (KeyError, ValueError):
-        return None
+    for name, begin in (("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", started)):
+        with suppress(KeyError, ValueError):
+            return _before(begin + float(environ[name]), started)
+    return None
 
 
 def _before(end: float, started: float) -> Deadline:

@@ -212,7 +212,7 @@ class _Session:
 
         progress = self._progress = ProgressLine(
             self._counts,
-            lambda: self._estimate(schedule, master.in_flight, len(channel.workers)),
+            lambda: schedule.seconds_left(master.in_flight, len(channel.workers)),
             self.stream,
         )
         master = dispatch.Master(
@@ -302,10 +302,3 @@ class _Session:
 
     def _time_left(self) -> float | None:
         return None if self._ends is None else self._ends - time.monotonic()
-
-    @staticmethod
-    def _estimate(schedule: Schedule, in_flight: int, workers: int) -> float | None:
-        waiting, mean = schedule.seconds_waiting, schedule.mean_estimate
-        if waiting is None or mean is None:
-            return None
-        return (waiting + 0.5 * mean * in_flight) / workers
