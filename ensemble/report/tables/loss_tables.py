@@ -213,9 +213,7 @@ def beside_the_paper(data: Aggregate) -> Table:
     columns = (
         *key_columns(data),
         TableColumn("n", attrgetter("done"), "n"),
-        TableColumn("loss_dimensionless", estimate("loss_dimensionless"), "W~", number()),
-        TableColumn("ci_low", estimate("loss_dimensionless", "low"), "95 % from", number()),
-        TableColumn("ci_high", estimate("loss_dimensionless", "high"), "to", number()),
+        *estimated("loss_dimensionless", "value ci_low ci_high", "W~"),
         TableColumn("paper", papers_loss, "paper", fixed(2)),
         TableColumn(
             *("deviation", off_the_paper),
