@@ -138,7 +138,6 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
 
 
 def _checked_ranks(ranks: int) -> int:
-    """Return how many ranks are to be started (InputError)."""
     from adhesis.ensemble.run.launch import check_ranks
     from adhesis.ensemble.run.ranks import launched
 
@@ -210,7 +209,6 @@ def _again(options: Options) -> str:
 
 
 def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Options) -> None:
-    """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
@@ -235,7 +233,6 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Optio
 
 
 def _code(summary: Summary, options: Options) -> int:
-    """Return the exit code of a run."""
     too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
     if summary.pending and not too_many:
         return exit_codes.RESUME

@@ -154,7 +154,6 @@ def _group(
     column: dict[str, NDArray[Any]],
     stop: StopTable,
 ) -> dict[str, Any]:
-    """Return the entry of one cell, from its rows."""
     done = rows[state[rows] == DONE]
     counts = _counts(state[rows])
     values = np.array([column[name][done] for name in _AVERAGED])

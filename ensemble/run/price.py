@@ -117,7 +117,6 @@ class Price:
         return f"<Price: {self.left} of {self.tasks} tasks to do, {duration(self.seconds)} of CPU>"
 
     def _repr_html_(self) -> str:
-        """Return the same lines, for notebooks."""
         return f"<pre>{escape(str(self))}</pre>"
 
     def _short(self) -> str:

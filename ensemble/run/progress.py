@@ -49,7 +49,6 @@ class Summary:
 
 
 def _interval(elapsed: float) -> float:
-    """Return the time between lines, in s."""
     first, most = _LINE_INTERVALS
     return min(max(first, elapsed / _LINES_AT_LEAST), most)
 

@@ -201,7 +201,6 @@ def _finish_spectra(axes: Axes, cell: AveragedCell, state: str = "") -> None:
 
 
 def _label_spectra(figure: style.PublishedFigure, handles: list[Line2D]) -> None:
-    """Label the axes, and put the legend of all panels above them."""
     style.plain_decades(figure.panels)
     figure.label("wave number $q$ (rad/m)", r"spectral density $C(q)$ (m³)")
     slopes = [

@@ -151,7 +151,6 @@ def _of_audit(value: Callable[[Array], Any]) -> Callable[[Cell], float | None]:
 
 
 def _pull_off_stress(cell: Cell) -> float:
-    """Return the mean of the dimensionless pull-off stress."""
     scale = stress_scale(cell.campaign, cell.values["h_max"])
     return float((cell.values["pull_off_stress"] / scale).mean())
 
