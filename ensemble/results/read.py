@@ -18,7 +18,7 @@ from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
 from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
-from adhesis.ensemble.results.head import HEAD, check_head
+from adhesis.ensemble.results.head import check_head
 from adhesis.ensemble.task.dataset import KEPT, sizes_of
 from adhesis.solver.checks import shown
 
@@ -102,8 +102,8 @@ class Results:
 
     def _root_attributes(self) -> dict[str, Any]:
         found = {}
-        for name in self._file.attrs:
-            if name == HEAD:
+        for name in schema.ROOT_ATTRIBUTES:
+            if name not in self._file.attrs:
                 continue
             if self._file.attrs.get_id(name).get_storage_size() > _LONGEST_ATTRIBUTE:
                 raise ValueError(name)
