@@ -25,13 +25,12 @@ from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT
-from adhesis.ensemble.task.row import RESULT_DATASETS
+from adhesis.ensemble.task.row import RESULT_DATASETS, TIMES
 from adhesis.solver.runtime.uninterrupted import signals_held
 
 _BLOCK_ROWS = 4096
-# Time and place may differ between two computations of one task; nothing else may.
-_OF_THE_RUN = ("wall_time", "cpu_time")
-_COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
+# Times may differ between two computations of one task; nothing else may.
+_COMPARED = tuple(d for d in RESULT_DATASETS if d not in TIMES)
 _COPIED = tuple(
     d for d in schema.DATASETS if d not in schema.TASK_DATASETS and d is not schema.STATUS
 )

@@ -23,13 +23,7 @@ from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from adhesis.ensemble.task.doubt import (
-    OF_DOUBT,
-    beyond_zero_range,
-    doubtful,
-    errors_text,
-    why_beyond,
-)
+from adhesis.ensemble.task import doubt
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import RANGES, least_range
 from adhesis.solver.values import finite
@@ -64,7 +58,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         state = results.status()
         cells = results.tasks().by_cell()
         names = (
-            *dict.fromkeys((*_TASK, *_AVERAGED, *OF_DOUBT)),
+            *dict.fromkeys((*_TASK, *_AVERAGED, *doubt.OF_DOUBT)),
             *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
@@ -121,7 +115,7 @@ def named(
 def _doubtful(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]], accuracy: float
 ) -> list[dict[str, Any]]:
-    rows = np.flatnonzero(doubtful(column, accuracy) & (state == DONE))
+    rows = np.flatnonzero(doubt.doubtful(column, accuracy) & (state == DONE))
     rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
     return named(column, rows, "loss", "audit_residual", "loss_error")
 
@@ -129,7 +123,7 @@ def _doubtful(
 def _beyond_limit(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
 ) -> list[dict[str, Any]]:
-    rows = np.flatnonzero(beyond_zero_range(column) & (state == DONE))
+    rows = np.flatnonzero(doubt.beyond_zero_range(column) & (state == DONE))
     least = least_range(*(column[name][rows] for name in RANGES))
     return named(column, rows[np.argsort(least, kind="stable")], "loss", *RANGES)
 
@@ -218,9 +212,9 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if status["doubtful"]:
         why = "by their own account less accurate than asked for"
         lines += ["", f"{len(status['doubtful'])} losses are doubtful: {why}"]
-        lines += _listed(status["doubtful"], lambda row: f": {errors_text(row)}")
+        lines += _listed(status["doubtful"], lambda row: f": {doubt.errors_text(row)}")
     if status["beyond_limit"]:
-        why = why_beyond(status["opens"])
+        why = doubt.why_beyond(status["opens"])
         lines += ["", f"{len(status['beyond_limit'])} losses are doubtful: {why}"]
         lines += _listed(status["beyond_limit"], _range_of)
     if status["failures"]:
