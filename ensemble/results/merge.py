@@ -29,8 +29,8 @@ from adhesis.ensemble.task.row import RESULT_DATASETS, TIMES
 from adhesis.solver.runtime.uninterrupted import signals_held
 
 _BLOCK_ROWS = 4096
-# Times may differ between two computations of one task; nothing else may.
-_COMPARED = tuple(d for d in RESULT_DATASETS if d not in TIMES)
+# Times may differ between two computations of one task; nothing else may, and fields follow.
+_COMPARED = tuple(d for d in RESULT_DATASETS if d not in TIMES and d.dims[0] != KEPT)
 _COPIED = tuple(
     d for d in schema.DATASETS if d not in schema.TASK_DATASETS and d is not schema.STATUS
 )
@@ -138,8 +138,6 @@ def _assign(
 def _compare(source: Source, row: int, other: Results, there: int) -> None:
     """Refuse a row that two files hold with different bits."""
     for dataset in _COMPARED:
-        if dataset.dims[0] == KEPT:
-            continue
         one = source.results.column(dataset.name, slice(row, row + 1))
         two = other.column(dataset.name, slice(there, there + 1))
         if one.tobytes() != two.tobytes():
@@ -159,12 +157,10 @@ def _copy(sources: Sequence[Source], out: Path) -> None:
                 if not any(source.gives(first, stop) for source in sources):
                     continue
                 with signals_held():
+                    of_kept = np.searchsorted(kept, (first, stop)).tolist()
                     for dataset in _COPIED:
-                        if dataset.dims[0] == KEPT:
-                            low, high = np.searchsorted(kept, (first, stop))
-                            copy_dataset(sources, file, dataset, int(low), int(high))
-                        else:
-                            copy_dataset(sources, file, dataset, first, stop)
+                        rows = of_kept if dataset.dims[0] == KEPT else (first, stop)
+                        copy_dataset(sources, file, dataset, *rows)
                     file.flush()
                     disk.check()
                     copy_dataset(sources, file, schema.STATUS, first, stop)
