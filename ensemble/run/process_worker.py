@@ -69,5 +69,6 @@ if __name__ == "__main__":
         main()
     except Exception as failure:
         code, sentence = ended_by(failure)
-        print(sentence, file=sys.stderr)
+        if sentence:
+            print(sentence, file=sys.stderr)
         sys.exit(code)
