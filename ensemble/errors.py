@@ -29,7 +29,9 @@ def quoted(text: str) -> str:
 
 
 def reason(error: Exception) -> str:
-    """Return in one line what the system or a library says of an error."""
+    """Return in one line what the system or a library says of an error; of HDF5's the gist."""
+    if found := re.search(r"error message = '([^']*)'", str(error)):
+        return found[1]
     return getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
 
 
@@ -57,6 +59,14 @@ class RankError(InputError):
 
 class WriteError(_Printable):
     """An output could not be written: the disk is full, say. What was written before is sound."""
+
+
+class OutputError(Exception):
+    """stdout could not be written; the text gives the reason of the system."""
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM was received, or SIGHUP of a terminal that closes."""
 
 
 _LACKS = (errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EAGAIN)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import signal
+import traceback
+
+from adhesis.ensemble.errors import InputError, OutputError, Terminated, WriteError, lack
 
 DONE = 0
 SOME_FAILED = 1
@@ -17,3 +20,28 @@ RESUME = 75  # EX_TEMPFAIL
 INTERRUPTED = 128 + signal.SIGINT
 """Of a run, by a second Ctrl-C: the first one stops it in order."""
 TERMINATED = 128 + signal.SIGTERM
+
+
+def ended_by(error: BaseException) -> tuple[int, str]:
+    """Return the exit code of a command that an error has ended, and the sentence to report.
+
+    The sentence is empty for a reader that has seen enough, and for an error of adhesis itself,
+    whose traceback is printed.
+    """
+    match error:
+        case InputError():
+            return BAD_INPUT, str(error)
+        case WriteError():
+            return WRITE_FAILED, str(error)
+        case OutputError():
+            return WRITE_FAILED, f"stdout could not be written: {error}"
+        case BrokenPipeError():
+            return PIPE_CLOSED, ""
+        case Terminated():
+            return TERMINATED, "terminated"
+        case KeyboardInterrupt():
+            return INTERRUPTED, "interrupted"
+    if sentence := lack(error):
+        return TOO_FEW_RESOURCES, sentence
+    traceback.print_exception(error)
+    return OUR_ERROR, ""

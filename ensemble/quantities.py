@@ -244,7 +244,7 @@ _NAMES = {
     "position step length height_range adhesion_range tip_radius cut_off noise longest highest "
     "rise form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip "
     "coefficient_real coefficient_imag narrowest_length",
-    "m²": "m0",
+    "m²": "m0 c0",
     "1/m²": "m4",
     "m³": "power floor",
     "rad/m": "wave_number",
@@ -263,9 +263,6 @@ UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 
 _TWO_DIGITS = 2.95  # an error below has two significant digits
 _MOST_PLACES = 9
-
-AXIS_UNITS = {"m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m", "J m-2": "J/m²"}
-"""Units of the axes of a campaign for people, by their spelling in results files."""
 
 
 def with_units(table: Any) -> Any:

@@ -24,31 +24,6 @@ def log(text: str) -> None:
     print(printable(text), file=sys.stderr, flush=True)
 
 
-@contextmanager
-def ticking(
-    task: Callable[[], str], write: Callable[[str], None] = log, every: float = _EVERY
-) -> Iterator[None]:
-    """Log at intervals (s) which task is under way, and for how long.
-
-    ``task`` returns its description; it is called by another thread. A task that ends within the
-    first interval is not logged.
-    """
-    started = time.monotonic()
-    over = threading.Event()
-
-    def lines() -> None:
-        while not over.wait(every):
-            write(f"{task()} ({time.monotonic() - started:.0f} s)")
-
-    thread = threading.Thread(target=lines, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
-
-
 class StatusLine:
     """One line: rewritten on a terminal, elsewhere written anew at intervals.
 
@@ -134,17 +109,30 @@ def bar(what: str) -> Iterator[Bar]:
 
 
 @contextmanager
-def following(what: str) -> Iterator[Bar]:
-    """Show how far a command is: a bar on a terminal, lines at intervals elsewhere."""
+def following(what: str, every: float = _EVERY) -> Iterator[Bar]:
+    """Show how far a command is: a bar on a terminal, elsewhere a line at intervals (s).
+
+    The lines come from another thread, so that there is no silence; what ends within the first
+    interval has none.
+    """
     if sys.stderr.isatty():
         with bar(what) as show:
             yield show
         return
-    shown = what
+    shown, started, over = what, time.monotonic(), threading.Event()
 
     def keep(done: float | None, total: float | None, text: str = "") -> None:
         nonlocal shown
         shown = text or (what if total is None else f"{what}: {done:g} of {total:g}")
 
-    with ticking(lambda: shown):
+    def lines() -> None:
+        while not over.wait(every):
+            log(f"{shown} ({time.monotonic() - started:.0f} s)")
+
+    thread = threading.Thread(target=lines, daemon=True)
+    thread.start()
+    try:
         yield keep
+    finally:
+        over.set()
+        thread.join()

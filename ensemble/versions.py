@@ -125,7 +125,6 @@ def processor() -> str:
 
 
 def _kernels() -> str:
-    """Return what compiled the kernels."""
     from adhesis.solver._kernels import COMPILER
 
     return COMPILER

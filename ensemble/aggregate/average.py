@@ -157,7 +157,6 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
 
 
 def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedCell:
-    """Read curves, jumps and fields of a cell."""
     ones = np.ones(cell.done)
     stress = 1 / stress_scale(cell.campaign, cell.values["h_max"])
     # by dataset, the curves to make of it, with the factor of each row

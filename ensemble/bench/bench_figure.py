@@ -11,20 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from adhesis.ensemble.bench.equal_error import Line
-from adhesis.ensemble.report.figures.style import (
-    LINES,
-    MM,
-    TWO_COLUMNS,
-    label_panel,
-    look,
-    new_figure,
-    plain_decades,
-    style,
-)
+from adhesis.ensemble.report.figures import style
 
 _METHODS = ("grid", "sharp", "tamaas")
 _PANELS_IN_A_ROW = 2
-_PANEL_HEIGHT = 62 * MM
+_PANEL_HEIGHT = 62 * style.MM
 # Smaller errors are rounding or chance, and are drawn at this value.
 _MIN_ERROR = 1e-10
 
@@ -34,8 +25,10 @@ def draw(lines: Sequence[Line]) -> Figure:
     scenes = list(dict.fromkeys(line.run.scene for line in lines))
     columns = min(len(scenes), _PANELS_IN_A_ROW)
     rows = math.ceil(len(scenes) / columns)
-    with style():
-        figure = new_figure(rows, columns, TWO_COLUMNS, 8 * MM + rows * _PANEL_HEIGHT)
+    with style.style():
+        figure = style.new_figure(
+            rows, columns, style.TWO_COLUMNS, 8 * style.MM + rows * _PANEL_HEIGHT
+        )
         shown: dict[str, Line2D] = {}
         for k, axes in enumerate(figure.axes):
             if k >= len(scenes):
@@ -47,7 +40,7 @@ def draw(lines: Sequence[Line]) -> Figure:
                 chosen = [line for line in here if math.isfinite(line.error)]
                 if chosen:
                     shown[method] = _series(axes, method, chosen)
-            label_panel(axes, scenes[k].title)
+            style.label_panel(axes, scenes[k].title)
             axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
         # One range for all, so that the panels can be compared; with margins for the labels.
         finished = [line for line in lines if math.isfinite(line.error)]
@@ -58,7 +51,7 @@ def draw(lines: Sequence[Line]) -> Figure:
             axes.set_xlim(min(seconds) / 2, 2.5 * max(seconds))
             axes.set_ylim(min(errors) / 3, 5 * max(errors))
         figure.legend_above(list(shown.values()), len(shown))
-        plain_decades(figure.axes)
+        style.plain_decades(figure.axes)
     return figure
 
 
@@ -66,10 +59,14 @@ def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
     """Draw the runs of one method, each with its setting beside it."""
     k = _METHODS.index(method)
     # sharp has the darkest colour, so that the methods differ in grey too.
-    of_method = {"grid": look(0), "sharp": {**look(2), "marker": "s"}, "tamaas": look(3)}
+    of_method = {
+        "grid": style.look(0),
+        "sharp": {**style.look(2), "marker": "s"},
+        "tamaas": style.look(3),
+    }
     seconds = [line.measured.cpu_seconds for line in lines]
     errors = [_plotted_error(line) for line in lines]
-    (drawn,) = axes.plot(seconds, errors, ls=LINES[k], label=method, **of_method[method])
+    (drawn,) = axes.plot(seconds, errors, ls=style.LINES[k], label=method, **of_method[method])
     for number, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
         # Left below for sharp; right for the others, alternately above and below, as they lie
         # close.

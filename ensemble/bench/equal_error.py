@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -185,10 +186,8 @@ def _quotient(line: Line, series: Sequence[tuple[float, float]]) -> Quotient:
 
 def _with_error_of_finer(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Replace each error of runs (error, seconds), coarse to fine, by the largest from there on."""
-    raised: list[tuple[float, float]] = []
-    for error, seconds in reversed(series):
-        raised.append((max(error, raised[-1][0]) if raised else error, seconds))
-    return raised[::-1]
+    errors, seconds = zip(*reversed(series), strict=True)
+    return list(zip(accumulate(errors, max), seconds, strict=True))[::-1]
 
 
 def _front(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -118,7 +118,6 @@ def measure_here(run: Run, *, limited: bool = False) -> Measurement:
 
 
 def _numbers(run: Run) -> dict[str, Any]:
-    """Run the loop; return its numbers."""
     if run.method == "tamaas":
         problem = run.scene.problem()
         loss, states = tamaas_loop(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, product
 
 Value = float
 """A value on an axis: a float, or an int where the key is a whole number."""
@@ -52,8 +52,5 @@ def points(axes: Sequence[Axis], groups: Sequence[Sequence[Axis]]) -> list[tuple
     rows = [list(zip(*(axis.values for axis in group), strict=True)) for group in groups]
     names = [axis.name for group in groups for axis in group]
     place = [names.index(axis.name) for axis in axes]
-    found = []
-    for parts in product(*rows):
-        flat = [value for part in parts for value in part]
-        found.append(tuple(flat[i] for i in place))
-    return found
+    flat = (list(chain.from_iterable(parts)) for parts in product(*rows))
+    return [tuple(values[i] for i in place) for values in flat]

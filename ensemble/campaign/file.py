@@ -58,7 +58,6 @@ def read_campaign(text: str, source: str = "campaign") -> Campaign:
 
 
 def _ask_for_units(document: dict[str, Any]) -> None:
-    """Refuse numbers that can hardly be in SI units."""
     for table, kind in TABLES.items():
         for entry in fields(kind):
             quantity: Quantity | None = entry.metadata["rule"].quantity
@@ -232,7 +231,6 @@ def _largest(campaign: Campaign, name: str, value: float) -> float:
 
 
 def _check_together(campaign: Campaign) -> None:
-    """Check the rules that join several keys."""
     profile, cycle = campaign.profile, campaign.cycle
     given = list(profile.normalisation)
     if campaign.task_count > _MOST_TASKS:

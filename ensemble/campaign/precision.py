@@ -8,13 +8,11 @@ least :data:`LEAST` values.
 :class:`Precision` is the only judge of a cell: the rule, ``adhesis status``, the closing lines of a
 run and the report all have interval and verdict from it.
 
-A rule that stops as soon as an interval looks narrow stops when the spread happens to look small,
-and its intervals cover the mean less often than they say (Anscombe 1953, J. R. Stat. Soc. B 15, 1;
-Chow & Robbins 1965, Ann. Math. Stat. 36, 457: right only as the interval shrinks to nothing;
-Glynn & Whitt 1992, Ann. Appl. Probab. 2, 180: unless early stops are kept out; Singham & Schruben
-2012, INFORMS J. Comput. 24, 624: by how much before). A least number and several looks keep such
-luck small, and an interval that follows the skewness is wide as soon as one loss of a tail is seen.
-To wait until the sample's skewness is small would do harm: that picks the samples without a tail.
+A rule that stops as soon as an interval looks narrow stops by luck, and its intervals cover the
+mean less often than they say (Anscombe 1953, J. R. Stat. Soc. B 15, 1; Glynn & Whitt 1992, Ann.
+Appl. Probab. 2, 180; Singham & Schruben 2012, INFORMS J. Comput. 24, 624). A least number and
+several looks keep such luck small. To wait until the sample's skewness is small would do harm: that
+picks the samples without a tail.
 """
 
 from __future__ import annotations

@@ -77,7 +77,6 @@ class Tasks(Sequence[Task]):
     rows: NDArray[np.int64]  # numbers of these tasks in the whole campaign, cell by cell, ascending
 
     def __len__(self) -> int:
-        """Return the number of tasks."""
         return len(self.rows)
 
     @overload
@@ -85,7 +84,6 @@ class Tasks(Sequence[Task]):
     @overload
     def __getitem__(self, place: slice) -> Tasks: ...
     def __getitem__(self, place: int | slice) -> Task | Tasks:
-        """Return a task, or some of them."""
         if isinstance(place, slice):
             return self.chosen(self.rows[place])
         cell, realisation = divmod(int(self.rows[place]), self.realisations)
@@ -120,10 +118,7 @@ class Tasks(Sequence[Task]):
 
     def of_cells(self) -> Tasks:
         """Return the first task of each cell."""
-        cells = self.cell_of()
-        changes = np.flatnonzero(cells[1:] != cells[:-1]) + 1  # a cell is one long stretch
-        starts = np.concatenate(([0], changes))[: cells.size]
-        return self.chosen(self.rows[starts[np.unique(cells[starts], return_index=True)[1]]])
+        return self.chosen(self.rows[np.diff(self.cell_of(), prepend=-1) != 0])
 
 
 @dataclass(frozen=True)

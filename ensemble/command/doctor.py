@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 from adhesis.ensemble.doctor.examine import Diagnosis, examine
@@ -40,7 +41,7 @@ def execute(args: argparse.Namespace) -> int:
         raise InputError(f"--in is {folder}: it must be a folder that can be written")
     diagnosis = examine(args.directory)
     if args.json:
-        print(json.dumps(diagnosis.as_dict(), indent=2))
+        print(json.dumps({"usable": diagnosis.usable, **asdict(diagnosis)}, indent=2))
     else:
         print(_text(diagnosis))
     return DONE if diagnosis.usable else SOME_FAILED

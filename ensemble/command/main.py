@@ -12,14 +12,13 @@ import os
 import signal
 import sys
 import time
-import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
 from adhesis.ensemble import errors, exit_codes
 from adhesis.ensemble.command.parser import Parser
-from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
+from adhesis.ensemble.command.streams import standard_streams, write_line
 from adhesis.ensemble.run.interrupt import in_main_thread
 from adhesis.ensemble.run.launch import ONE_THREAD
 from adhesis.ensemble.run.ranks import launched
@@ -43,7 +42,6 @@ EXAMPLES = (
     "adhesis loop --hurst 0.8 --seed 1",
     "adhesis run jobs/example.toml --ranks 3",
 )
-_CAMPAIGNS = ("new", "run", "status", "verify", "merge", "report")
 _WITHOUT_NUMERICS = ("new", "completion")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
 _OPTIONS = {
@@ -57,10 +55,6 @@ _PARALLEL = "run"
 _INDEPENDENT = ("loop", "trace", "doctor")
 # How long a process waits for rank 0 to report the same error, whose end makes mpirun end all.
 _RANK_0_FIRST = 20.0  # s
-
-
-class Terminated(KeyboardInterrupt):
-    """SIGTERM was received, or SIGHUP of a terminal that closes."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -88,8 +82,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def module_of(name: str) -> str:
     """Return the name of a command's module."""
-    folder = "campaigns." if name in _CAMPAIGNS else ""
-    return f"adhesis.ensemble.command.{folder}{name}"
+    return f"adhesis.ensemble.command.{name}"
 
 
 def parser_of(name: str) -> Parser:
@@ -107,23 +100,8 @@ def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | Non
             code = _execute(name, words)
             sys.stdout.flush()
         return code, "", None
-    except errors.InputError as error:
-        return exit_codes.BAD_INPUT, str(error), error
-    except errors.WriteError as error:
-        return exit_codes.WRITE_FAILED, str(error), error
-    except OutputError as error:
-        return exit_codes.WRITE_FAILED, f"stdout could not be written: {error}", error
-    except BrokenPipeError as error:
-        return exit_codes.PIPE_CLOSED, "", error  # the reader has seen enough
-    except Terminated as error:
-        return exit_codes.TERMINATED, "terminated", error
-    except KeyboardInterrupt as error:
-        return exit_codes.INTERRUPTED, "interrupted", error
-    except Exception as error:
-        if sentence := errors.lack(error):
-            return exit_codes.TOO_FEW_RESOURCES, sentence, error
-        traceback.print_exc()
-        return exit_codes.OUR_ERROR, "", error
+    except (Exception, KeyboardInterrupt) as error:
+        return *exit_codes.ended_by(error), error
 
 
 def _execute(name: str, words: Sequence[str]) -> int:
@@ -162,7 +140,7 @@ def _termination(*, enabled: bool) -> Iterator[None]:
     def terminate(_: int, __: FrameType | None) -> None:
         for number in handled:
             signal.signal(number, signal.SIG_IGN)
-        raise Terminated
+        raise errors.Terminated
 
     numbers = (signal.SIGTERM, signal.SIGHUP) if enabled and in_main_thread() else ()
     handled = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]

@@ -9,9 +9,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-
-class OutputError(Exception):
-    """stdout could not be written; the text gives the reason of the system."""
+from adhesis.ensemble.errors import OutputError
 
 
 class _Stdout(io.FileIO):

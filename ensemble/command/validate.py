@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -72,12 +71,11 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _record(row: Row) -> dict[str, object]:
-    record: dict[str, object] = {**asdict(row), "passed": row.passed}
+    from adhesis.solver.values import finite
+
     # JSON has no NaN: a method that did not get there has no error.
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in record.items()
-    }
+    known = {k: finite(v) if isinstance(v, float) else v for k, v in asdict(row).items()}
+    return {**known, "passed": row.passed}
 
 
 def _line(row: Row) -> str:

@@ -12,7 +12,7 @@ import socket
 import subprocess
 import tempfile
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -59,10 +59,6 @@ class Diagnosis:
     def usable(self) -> bool:
         """Whether a campaign can run here: every check that is needed passed."""
         return all(check.ok or not check.needed for check in self.checks)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the results as a dictionary, for ``--json``."""
-        return {"usable": self.usable, **asdict(self)}
 
 
 def examine(directory: Path | str | None = None) -> Diagnosis:

@@ -13,7 +13,6 @@ from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
-from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import (
@@ -23,7 +22,7 @@ from adhesis.ensemble.report.further_axes import (
     short_of_preload,
     together,
 )
-from adhesis.ensemble.report.tables.loss_tables import extreme
+from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import why_beyond
 from adhesis.ensemble.task.preload import INSTEAD, highest_stress, most_reached
@@ -220,7 +219,7 @@ def readings(data: Aggregate) -> list[str]:
     deviations = []
     campaigns: tuple[Aggregate | Companion, ...] = (data, *data.companions)
     for one in campaigns:
-        if found := _deviations([cell for cell in one.cells if paper.is_cell_of(cell)]):
+        if found := _deviations(one.cells):
             rms = float(np.sqrt(np.mean(np.square(found))))
             deviations.append((rms, one.path.name, len(found)))
     if len(deviations) < 2:
@@ -280,7 +279,9 @@ def _preload(data: Aggregate) -> list[str]:
     if not short:
         return ["Every loop reached its preload."]
     with Results(data.path) as results:
-        reached = [_highest_stress(results, cell) for _, cell in short]
+        lost = (np.sort(cell.rows[cell.values["preload_reached"] == 0]) for _, cell in short)
+        # of the load steps, all that the file holds
+        reached = [highest_stress(results.column("loading_mean_stress", rows)) for rows in lost]
     listing = [
         f"{count} at {cell_name(cell)} ({most_reached(highest)})"
         for (count, cell), highest in zip(short, reached, strict=True)
@@ -289,12 +290,6 @@ def _preload(data: Aggregate) -> list[str]:
         f"WARNING: {sum(count for count, _ in short)} of {data.done} loops did not reach their "
         f"preload, and turned at the latest turning point: {_listed(listing)}. {INSTEAD}."
     ]
-
-
-def _highest_stress(results: Results, cell: Cell) -> float:
-    """Return the highest mean stress at the load steps of loops short of their preload, in Pa."""
-    rows = np.sort(cell.rows[cell.values["preload_reached"] == 0])
-    return highest_stress(results.column("loading_mean_stress", rows))
 
 
 def _limit(data: Aggregate) -> list[str]:
@@ -339,32 +334,20 @@ def _table_1(data: Aggregate) -> list[str]:
     found = _deviations(data.cells)
     if not found:
         return []
-    known = [pair for pair in _beside(data.cells) if np.isfinite(pair[0].low)]
-    inside = sum(loss.low <= value <= loss.high for loss, value in known)
-    here = f"; {inside} of {len(known)} lie inside the 95 % interval of the mean here"
-    intervals = here if known else ""
+    known = [verdict for cell in data.cells if (verdict := inside_interval(cell)) is not None]
+    here = f"; {known.count('yes')} of {len(known)} lie inside the 95 % interval of the mean here"
     low, high = 100 * min(found), 100 * max(found)
     rms = 100 * np.sqrt(np.mean(np.square(found)))
     return [
         f"Of the {len(paper.TABLE_1)} losses of the paper's Table 1, {len(found)} have a cell "
         f"here: W~ is off by {low:+.1f} % to {high:+.1f} %, root mean square {rms:.1f} %"
-        f"{intervals}."
+        f"{here if known else ''}."
     ]
 
 
 def _deviations(cells: Sequence[Cell]) -> list[float]:
     """Relative deviations of the mean W~ from the values that the paper gives."""
-    return [loss.mean / value - 1 for loss, value in _beside(cells)]
-
-
-def _beside(cells: Sequence[Cell]) -> list[tuple[Estimate, float]]:
-    """Return W~ of the finished cells of the paper's table, and its values."""
-    values = ((cell, paper.table_1(cell.hurst, cell.work_of_adhesion)) for cell in cells)
-    return [
-        (cell.estimates["loss_dimensionless"], value)
-        for cell, value in values
-        if cell.done and value is not None
-    ]
+    return [found for cell in cells if (found := off_the_paper(cell)) is not None]
 
 
 def _slopes(data: Aggregate) -> list[str]:

@@ -23,7 +23,7 @@ _LABELS = {
     "rolloff": r"roll-off $q_\mathrm{r}/q_\mathrm{min}$",
     "h_rms": r"root mean square height $h_\mathrm{rms}$",
     "m2": "mean square slope $m_2$",
-    "c0": "$C_0$ (m²)",
+    "c0": "$C_0$",
     "stiffness": "stiffness $k$",
     "young": "Young's modulus $E$",
     "poisson": r"Poisson's ratio $\nu$",

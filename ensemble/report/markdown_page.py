@@ -17,7 +17,6 @@ from adhesis.ensemble.report.figures.style import left_out
 from adhesis.ensemble.report.further_axes import short_of_preload, shown_cells
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
-from adhesis.ensemble.report.tables.works import works
 from adhesis.solver.loading.zero_range import ANY_RANGE
 
 
@@ -97,7 +96,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         mechanism_tables.shares_by_kind(data).markdown(),
         "Numbers of jumps: `jumps.csv`.",
         "## Approach and separation",
-        works(data).markdown(),
+        loss_tables.works(data).markdown(),
         "Works per nominal area, and the same over the largest contact area of the loop: effective "
         "works of adhesion on approach and separation, and their difference. Full contact: its "
         "elastic energy, to be set beside γ. With intervals: `works.csv`.",

@@ -206,7 +206,6 @@ class CampaignResults:
 
     @property
     def _cell(self) -> tuple[str, ...]:
-        """Names of the axes of the cells."""
         return self.axes[:-1]
 
     def _arranged(self, datasets: Sequence[Dataset]) -> xr.Dataset:

@@ -58,21 +58,17 @@ _NEAR = 1e-3  # values are the paper's if they agree with its digits
 
 def table_1(hurst: float, work_of_adhesion: float) -> float | None:
     """Loss of the paper's Table 1 at (H, γ in J/m²), None where it gives none."""
-    for (h, g), value in TABLE_1.items():
-        if abs(h - hurst) < 1e-9 and abs(g - work_of_adhesion) < 1e-9:
-            return value
-    return None
+    return TABLE_1.get((round(hurst, 9), round(work_of_adhesion, 9)))
 
 
 def has_cell(hurst: float, work_of_adhesion: float) -> bool:
     """Whether the paper's Table 1 has a place for (H, γ in J/m²), be it a dash."""
-    gammas = {g for _, g in TABLE_1}
-    return m2(hurst) is not None and any(abs(g - work_of_adhesion) < 1e-9 for g in gammas)
+    return m2(hurst) is not None and round(work_of_adhesion, 9) in {g for _, g in TABLE_1}
 
 
 def m2(hurst: float) -> float | None:
     """Mean square slope that the paper quotes for H, None if it gives none."""
-    return next((value for h, value in M2.items() if abs(h - hurst) < 1e-9), None)
+    return M2.get(round(hurst, 9))
 
 
 def is_cell_of(cell: Cell) -> bool:

@@ -61,18 +61,22 @@ def _write_files(
     from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
-    from adhesis.ensemble.report.tables import loss_tables, mechanisms, works
+    from adhesis.ensemble.report.tables import loss_tables, mechanisms
 
-    loss_tables.losses(data).write_csv(directory / "losses.csv")
+    tables = {
+        "losses": loss_tables.losses(data),
+        "growth": loss_tables.paired(data),
+        "jumps": mechanisms.jumps(data),
+        "works": loss_tables.works(data),
+        "slopes": mechanisms.slopes(data),
+    }
     if (known := loss_tables.precision(data)).rows:
-        known.write_csv(directory / "precision.csv")
-    loss_tables.paired(data).write_csv(directory / "growth.csv")
-    mechanisms.jumps(data).write_csv(directory / "jumps.csv")
-    works.works(data).write_csv(directory / "works.csv")
-    write_netcdf(directory / "curves.nc", curves_dataset(data))
+        tables["precision"] = known
     if data.companions:
-        loss_tables.companions(data).write_csv(directory / "beside.csv")
-    mechanisms.slopes(data).write_csv(directory / "slopes.csv")
+        tables["beside"] = loss_tables.companions(data)
+    for name, table in tables.items():
+        table.write_csv(directory / f"{name}.csv")
+    write_netcdf(directory / "curves.nc", curves_dataset(data))
     figures = sections(data)
     items = [item for illustrations in figures.values() for item in illustrations]
     for number, item in enumerate(items, 1):
@@ -93,13 +97,10 @@ def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
     from adhesis.ensemble.report import findings
     from adhesis.ensemble.report.tables import loss_tables, mechanisms
 
-    loss_tables.losses(data).print(stream)
-    print(file=stream)
-    if (known := loss_tables.precision(data)).rows:
-        known.print(stream)
-        print(file=stream)
-    mechanisms.mechanisms(data).print(stream)
-    print(file=stream)
+    for make in (loss_tables.losses, loss_tables.precision, mechanisms.mechanisms):
+        if (table := make(data)).rows:
+            table.print(stream)
+            print(file=stream)
     for sentence in (
         *findings.verdict(data),
         *findings.pattern(data),

@@ -17,14 +17,13 @@ from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, reason
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
@@ -33,7 +32,6 @@ from adhesis.ensemble.results.copy_rows import Source, copy_dataset
 from adhesis.ensemble.results.disk_file import opened, refusal
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import Dataset, sizes_of
 from adhesis.solver.runtime.uninterrupted import signals_held
 
@@ -114,10 +112,10 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
     for scale in laid_out:
         dataset = file.create_dataset(scale.name, data=scale.values)
         dataset.make_scale(scale.name)
-        _set_attributes(dataset, schema.description(scale))
+        dataset.attrs.update(schema.description(scale))
     for column in schema.datasets(campaign):
         dataset = _allocate(file, column, schema.shape_of(column, sizes))
-        _set_attributes(dataset, schema.description(column))
+        dataset.attrs.update(schema.description(column))
         for axis, dim in enumerate(column.dims):
             dataset.dims[axis].attach_scale(file[dim])
     tasks = campaign.tasks(part)
@@ -149,18 +147,14 @@ def _describe(
     old: Results | None,
 ) -> None:
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    attributes: dict[str, Any] = {
-        **schema.fixed_attributes(campaign, part),
-        "created": now if old is None else old.attributes.get("created", now),
-        "laid_out": now,
-        **versions,
-    }
-    _set_attributes(file, attributes)
-
-
-def _set_attributes(of: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
-    for name, value in attributes.items():
-        of.attrs[name] = value
+    file.attrs.update(
+        {
+            **schema.fixed_attributes(campaign, part),
+            "created": now if old is None else old.attributes.get("created", now),
+            "laid_out": now,
+            **versions,
+        }
+    )
 
 
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:

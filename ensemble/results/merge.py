@@ -18,25 +18,19 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, reason
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.copy_rows import Source, copy_dataset
 from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import KEPT
-from adhesis.ensemble.task.row import RESULT_DATASETS
+from adhesis.ensemble.task.row import RESULT_DATASETS, TIMES
 from adhesis.solver.runtime.uninterrupted import signals_held
 
 _BLOCK_ROWS = 4096
-# Time and place may differ between two computations of one task; nothing else may.
-_OF_THE_RUN = ("wall_time", "cpu_time")
-_COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
-# Root attributes that say what a file is; the others say what computed it.
-_NOT_VERSIONS = frozenset(
-    ("file_type", "file_version", "Conventions", "title", "campaign", "seed", "created", "laid_out")
-) | {"part"}
+# Times may differ between two computations of one task; nothing else may, and fields follow.
+_COMPARED = tuple(d for d in RESULT_DATASETS if d not in TIMES and d.dims[0] != KEPT)
 _COPIED = tuple(
     d for d in schema.DATASETS if d not in schema.TASK_DATASETS and d is not schema.STATUS
 )
@@ -82,8 +76,9 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         doubts = [doubt for file in opened for doubt in file.doubts()]
         sources = _assign(opened, campaign, status, there)
         if there is None:
+            of_file = {*schema.fixed_attributes(campaign), "part", "created", "laid_out"}
             known = opened[0].attributes.items()
-            create(out, campaign, versions={k: v for k, v in known if k not in _NOT_VERSIONS})
+            create(out, campaign, versions={k: v for k, v in known if k not in of_file})
         else:
             there.close()
         _copy(sources, out)
@@ -143,8 +138,6 @@ def _assign(
 def _compare(source: Source, row: int, other: Results, there: int) -> None:
     """Refuse a row that two files hold with different bits."""
     for dataset in _COMPARED:
-        if dataset.dims[0] == KEPT:
-            continue
         one = source.results.column(dataset.name, slice(row, row + 1))
         two = other.column(dataset.name, slice(there, there + 1))
         if one.tobytes() != two.tobytes():
@@ -164,12 +157,10 @@ def _copy(sources: Sequence[Source], out: Path) -> None:
                 if not any(source.gives(first, stop) for source in sources):
                     continue
                 with signals_held():
+                    of_kept = np.searchsorted(kept, (first, stop)).tolist()
                     for dataset in _COPIED:
-                        if dataset.dims[0] == KEPT:
-                            low, high = np.searchsorted(kept, (first, stop))
-                            copy_dataset(sources, file, dataset, int(low), int(high))
-                        else:
-                            copy_dataset(sources, file, dataset, first, stop)
+                        rows = of_kept if dataset.dims[0] == KEPT else (first, stop)
+                        copy_dataset(sources, file, dataset, *rows)
                     file.flush()
                     disk.check()
                     copy_dataset(sources, file, schema.STATUS, first, stop)

@@ -178,7 +178,6 @@ class Results:
                     raise ValueError(name)
 
     def _check_scales(self) -> None:
-        """Compare the dimension scales with the campaign."""
         for scale in schema.scales(self.campaign, self.part):
             found = self._file[scale.name][:]
             if not np.allclose(found, scale.values, rtol=_SCALE_ROUNDING, atol=0.0):
@@ -215,7 +214,6 @@ class Results:
         self._file.close()
 
     def __len__(self) -> int:
-        """Number of tasks."""
         return int(self._file["task"].shape[0])
 
     def column(

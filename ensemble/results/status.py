@@ -20,10 +20,10 @@ from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.interval import estimates
-from adhesis.ensemble.quantities import AXIS_UNITS, percent, with_error
+from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, why_beyond
+from adhesis.ensemble.task import doubt
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import RANGES, least_range
 from adhesis.solver.values import finite
@@ -58,7 +58,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         state = results.status()
         cells = results.tasks().by_cell()
         names = (
-            *dict.fromkeys((*_TASK, *_AVERAGED, *OF_DOUBT)),
+            *dict.fromkeys((*_TASK, *_AVERAGED, *doubt.OF_DOUBT)),
             *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
@@ -78,10 +78,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     return {
         "file": str(path),
         "tasks": len(state),
-        "pending": int(np.sum(state == PENDING)),
-        "done": int(np.sum(state == DONE)),
-        "failed": len(failed),
-        "not_needed": int(np.sum(state == NOT_NEEDED)),
+        **_counts(state),
         "damaged": named(column, damaged),
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
@@ -118,7 +115,7 @@ def named(
 def _doubtful(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]], accuracy: float
 ) -> list[dict[str, Any]]:
-    rows = np.flatnonzero(doubtful(column, accuracy) & (state == DONE))
+    rows = np.flatnonzero(doubt.doubtful(column, accuracy) & (state == DONE))
     rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
     return named(column, rows, "loss", "audit_residual", "loss_error")
 
@@ -126,7 +123,7 @@ def _doubtful(
 def _beyond_limit(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
 ) -> list[dict[str, Any]]:
-    rows = np.flatnonzero(beyond_zero_range(column) & (state == DONE))
+    rows = np.flatnonzero(doubt.beyond_zero_range(column) & (state == DONE))
     least = least_range(*(column[name][rows] for name in RANGES))
     return named(column, rows[np.argsort(least, kind="stable")], "loss", *RANGES)
 
@@ -140,6 +137,10 @@ def _times(times: NDArray[np.float64]) -> dict[str, float]:
     }
 
 
+def _counts(state: NDArray[np.uint8]) -> dict[str, int]:
+    return {name: int(np.sum(state == code)) for name, code in _CODES.items()}
+
+
 def _group(
     point: dict[str, float],
     rows: NDArray[np.intp],
@@ -147,9 +148,8 @@ def _group(
     column: dict[str, NDArray[Any]],
     stop: StopTable,
 ) -> dict[str, Any]:
-    """Return the entry of one cell, from its rows."""
     done = rows[state[rows] == DONE]
-    counts = {name: int(np.sum(state[rows] == code)) for name, code in _CODES.items()}
+    counts = _counts(state[rows])
     values = np.array([column[name][done] for name in _AVERAGED])
     seconds, loss, scaled = estimates(values, with_interval=False)
     group: dict[str, Any] = {
@@ -194,9 +194,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         )
     groups = status["groups"]
     if len(groups) <= _MOST_GROUPS_SHOWN:
-        units = status["axis_units"]
         further = {
-            name: key if units[name] == "1" else f"{key} in {AXIS_UNITS[units[name]]}"
+            name: f"{key} in {UNITS[key]}" if key in UNITS else key
             for name in status["axes"][2:]
             for key in [name.removeprefix("wanted_")]
         }
@@ -213,9 +212,9 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if status["doubtful"]:
         why = "by their own account less accurate than asked for"
         lines += ["", f"{len(status['doubtful'])} losses are doubtful: {why}"]
-        lines += _listed(status["doubtful"], _errors_of)
+        lines += _listed(status["doubtful"], lambda row: f": {doubt.errors_text(row)}")
     if status["beyond_limit"]:
-        why = why_beyond(status["opens"])
+        why = doubt.why_beyond(status["opens"])
         lines += ["", f"{len(status['beyond_limit'])} losses are doubtful: {why}"]
         lines += _listed(status["beyond_limit"], _range_of)
     if status["failures"]:
@@ -252,11 +251,6 @@ def _listed(
     if len(rows) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(rows) - _MOST_FAILURES_SHOWN} more (--json lists all)")
     return lines
-
-
-def _errors_of(row: Mapping[str, Any]) -> str:
-    share = row["loss_error"] / (abs(row["loss"]) or 1)
-    return f": audit residual {percent(row['audit_residual'])}, estimated error {percent(share)}"
 
 
 def _range_of(row: Mapping[str, Any]) -> str:

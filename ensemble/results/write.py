@@ -6,7 +6,6 @@ So a row whose status is not "pending" is a whole one, and its checksum is that 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -17,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.errors import WriteError
+from adhesis.ensemble.errors import WriteError, reason
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
 from adhesis.ensemble.results.disk_file import DiskFile
@@ -113,7 +112,7 @@ class Writer:
         for row in rows:
             with self._writing(row):
                 # First the status: a row that is being emptied must not be taken for a whole one.
-                self._write_status(row, schema.PENDING)
+                self._set_pending(row)
                 self.flush()
                 for dataset in cleared:
                     place = self._place(dataset.name, row)
@@ -127,7 +126,7 @@ class Writer:
         for row in rows:
             if needed:
                 with self._writing(row):
-                    self._write_status(row, schema.PENDING)
+                    self._set_pending(row)
             else:
                 self._write(row, {}, schema.NOT_NEEDED)
         self.flush()
@@ -156,9 +155,9 @@ class Writer:
             self._datasets[schema.STATUS.name].write(row, blocks[schema.STATUS.name])
             self.flush()
 
-    def _write_status(self, row: int, status: int) -> None:
+    def _set_pending(self, row: int) -> None:
         rows_of = self._datasets[schema.STATUS.name]
-        rows_of.write(row, rows_of.block(status))
+        rows_of.write(row, rows_of.block(schema.PENDING))
 
     def _origin_of(self, rank: int) -> dict[str, bytes]:
         return {schema.ORIGIN.name: schema.encode_text(self._origin(rank), schema.ORIGIN_LENGTH)}
@@ -243,11 +242,3 @@ class DatasetRows:
             return
         self._space.select_hyperslab((row, *self._rest), (1, *self._shape))
         self._id.write(self._memory, self._space, block)
-
-
-def reason(error: Exception) -> str:
-    """Return the reason of an error in one line, without HDF5's particulars."""
-    if isinstance(error, OSError) and error.errno:
-        return os.strerror(error.errno)
-    found = re.search(r"error message = '([^']*)'", str(error))
-    return found.group(1) if found else " ".join(str(error).split("(")[0].split())

@@ -80,58 +80,27 @@ def attempt(
 def _watched(check: StopCheck) -> Iterator[None]:
     """Call ``check`` from a timer too: a task may hang before it calls it itself.
 
-    A timer of the caller keeps running, and its handler is called when it expires.
+    A timer of the caller's own stays, and there is none of ours then.
     """
-    if not in_main_thread():
+    if not in_main_thread() or signal.getitimer(signal.ITIMER_REAL)[0] > 0:
         yield
         return
     finished = False
 
     def on_alarm(number: int, frame: FrameType | None) -> None:
         nonlocal finished
-        try:
-            callers.pass_on(number, frame)
-            if not finished:
+        if not finished:
+            try:
                 check()
-        except BaseException:
-            finished = True  # a second exception would interrupt the unwinding of this one
-            raise
+            except BaseException:
+                finished = True  # a second exception would interrupt the unwinding of this one
+                raise
 
-    callers = _CallersTimer()
+    before = signal.signal(signal.SIGALRM, on_alarm)
     try:
-        signal.signal(signal.SIGALRM, on_alarm)
-        signal.setitimer(signal.ITIMER_REAL, min(WATCH_INTERVAL, callers.left), WATCH_INTERVAL)
+        signal.setitimer(signal.ITIMER_REAL, WATCH_INTERVAL, WATCH_INTERVAL)
         yield
     finally:
         finished = True
-        callers.restore()
-
-
-class _CallersTimer:
-    """Timer and handler of SIGALRM as they were before a task began."""
-
-    def __init__(self) -> None:
-        self._handler = signal.getsignal(signal.SIGALRM)
-        delay, self._interval = signal.getitimer(signal.ITIMER_REAL)
-        self._due = time.monotonic() + delay if delay > 0 else math.inf
-
-    @property
-    def left(self) -> float:
-        """Time until it expires, in s; infinite if it was not set."""
-        return max(self._due - time.monotonic(), 1e-6)
-
-    def pass_on(self, number: int, frame: FrameType | None) -> None:
-        """Call the caller's handler if its timer has expired."""
-        if time.monotonic() < self._due:
-            return
-        self._due = self._due + self._interval if self._interval > 0 else math.inf
-        if callable(self._handler):
-            self._handler(number, frame)
-
-    def restore(self) -> None:
-        """Restore handler and timer, less the time that has passed."""
         signal.setitimer(signal.ITIMER_REAL, 0)
-        if self._handler is not None:  # None: it was not set from Python
-            signal.signal(signal.SIGALRM, self._handler)
-        if self._due < math.inf:
-            signal.setitimer(signal.ITIMER_REAL, self.left, self._interval)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL if before is None else before)

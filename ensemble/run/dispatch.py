@@ -302,7 +302,6 @@ class Worker:
         return True
 
     def _received(self) -> Message:
-        """Wait for the next message."""
         pause = SHORTEST_PAUSE
         while (message := self.channel.poll()) is None:
             self._stopped()

@@ -7,6 +7,7 @@ import re
 import signal
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from traceback import walk_tb
 from types import FrameType
@@ -25,34 +26,28 @@ _CLOCK = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(\d+):(\d+)")
 _UNITS = re.compile(r"(?:(\d+)d)?(?:(\d+)h)?(?:(\d+)m)?(?:(\d+(?:\.\d*)?)s?)?")
 
 
-def stop_signals() -> tuple[signal.Signals, ...]:
-    """Return the signals that stop a run in order.
-
-    SIGHUP, of a terminal that closes, is one of them unless it is ignored, as under ``nohup``.
-    """
-    always = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
-    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-    return always if ignored else (*always, signal.SIGHUP)
-
-
 def in_main_thread() -> bool:
     """Check whether this is the main thread, the only one that may have handlers of signals."""
     return threading.current_thread() is threading.main_thread()
 
 
 class StopSignals:
-    """Context manager that records the first of the :func:`stop_signals`, and goes on.
+    """Context manager that records the first signal that stops a run in order, and goes on.
 
-    A second SIGINT (Ctrl-C) interrupts at once. Outside the main thread none is recorded.
+    SIGHUP, of a terminal that closes, is one unless it is ignored, as under ``nohup``. A second
+    SIGINT (Ctrl-C) interrupts at once. Outside the main thread none is recorded.
     """
+
+    _SIGNALS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT, signal.SIGHUP)
 
     def __init__(self) -> None:
         self.received: str | None = None
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
-        for number in stop_signals() if in_main_thread() else ():
-            self._before[number] = signal.signal(number, self._note)
+        for number in self._SIGNALS if in_main_thread() else ():
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                self._before[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -109,14 +104,10 @@ def deadline(
     """
     if walltime is not None:
         return _before(started + walltime, started)
-    try:
-        return _before(float(environ["SLURM_JOB_END_TIME"]), started)
-    except (KeyError, ValueError):
-        pass
-    try:
-        return _before(started + float(environ["PBS_WALLTIME"]), started)
-    except (KeyError, ValueError):
-        return None
+    for name, begin in (("SLURM_JOB_END_TIME", 0.0), ("PBS_WALLTIME", started)):
+        with suppress(KeyError, ValueError):
+            return _before(begin + float(environ[name]), started)
+    return None
 
 
 def _before(end: float, started: float) -> Deadline:

@@ -75,20 +75,11 @@ def cores() -> int:
 
 def launcher() -> str | None:
     """Find this installation's ``mpirun``: ``$MPIRUN``, that of set-up, or the one in PATH."""
-    recorded = Path(sys.prefix, "mpirun")
-    beside = str(Path(sys.executable).parent)
-    candidates = [os.environ.get("MPIRUN", "")]
-    if recorded.is_file():
-        candidates.append(recorded.read_text().strip())
-    for name in filter(None, candidates):
-        found = shutil.which(name)
-        if found:
-            return found
+    recorded, beside = Path(sys.prefix, "mpirun"), Path(sys.executable).parent
+    names = [os.environ.get("MPIRUN"), recorded.read_text().strip() if recorded.is_file() else None]
     for name in ("mpirun", "mpiexec"):
-        found = shutil.which(name, path=beside) or shutil.which(name)
-        if found:
-            return found
-    return None
+        names += [str(beside / name), name]
+    return next(filter(None, map(shutil.which, filter(None, names))), None)
 
 
 def launch_environment(ranks: int) -> dict[str, str]:

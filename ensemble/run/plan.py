@@ -16,7 +16,6 @@ from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results.layout import check_space, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
@@ -109,7 +108,10 @@ def prepare(
         for task in chosen.of_cells():
             check(campaign, task)
 
-    _check_path(path)
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError(f"{path} cannot be written: the folder {path.parent} is read-only")
+    if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
+        raise InputError(f"{path} cannot be written: permission denied")
     lock.acquire(size, patience)
     if not os.path.exists(path):
         check_space(path, campaign, part)
@@ -170,19 +172,6 @@ def prepare(
         + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
     )
     return plan
-
-
-def _check_path(path: Path) -> None:
-    folder = path.parent
-    if not os.path.isdir(folder):
-        raise InputError(f"{path} cannot be written: there is no folder {folder}")
-    kind = irregular(path.stat().st_mode) if os.path.exists(path) else None
-    if kind is not None:
-        raise InputError(f"{path} is {kind}, not a results file")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{path} cannot be written: the folder {folder} is read-only")
-    if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
-        raise InputError(f"{path} cannot be written: permission denied")
 
 
 def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:

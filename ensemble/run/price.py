@@ -81,14 +81,51 @@ class Price:
 
     def __str__(self) -> str:
         """Return the lines of ``adhesis run --dry-run``."""
-        return as_text(self)
+        tried = (
+            f"{self.pilots} pilot loops of {duration(self.pilot_seconds)} in all"
+            if self.pilots
+            else "the loops that are done"
+        )
+        memory = f", about {self.rank_bytes / 1e6:.0f} MB of memory a rank" if self.left else ""
+        lines = [
+            f"{self.left} tasks to do in {len(self.cells)} cells, {self.done} done; "
+            "nothing was written",
+            *([self.stop] if self.stop else []),
+            *([self._short()] if self.pilots_short else []),
+            f"{self.seconds / 3600:.3g} core hours, by {tried}; "
+            f"the longest task takes about {duration(self.longest)}",
+            f"results file {self.file_bytes / 1e6:.3g} MB{memory}",
+        ]
+        if self.left:
+            lines.append(f"one process takes {duration(self.makespan(1))}")
+            for workers in sorted({2, 8, 32, 128, self.most_workers}):
+                if 1 < workers <= self.most_workers:
+                    lines.append(f"{workers + 1} ranks take {duration(self.makespan(workers))}")
+            lines.append("of more ranks some would wait for the longest task")
+        if len(self.cells) <= _MOST_CELLS_SHOWN:
+            lines += ["", "s a loop  tasks  core hours  cell"]
+            for cell in self.cells:
+                mark = " " if cell.measured else "~"
+                hours = cell.tasks * cell.seconds / 3600
+                name = cell.task.cell_name
+                lines.append(f"{mark}{cell.seconds:7.3g} {cell.tasks:6d} {hours:11.3g}  {name}")
+            if not all(cell.measured for cell in self.cells):
+                lines.append("~ extrapolated from other cells")
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
         return f"<Price: {self.left} of {self.tasks} tasks to do, {duration(self.seconds)} of CPU>"
 
     def _repr_html_(self) -> str:
-        """Return the same lines, for notebooks."""
         return f"<pre>{escape(str(self))}</pre>"
+
+    def _short(self) -> str:
+        of = f"{self.pilots_short} of {counted(self.pilots, 'pilot loop')}"
+        does, turns = ("does", "turns") if self.pilots_short == 1 else ("do", "turn")
+        return (
+            f"WARNING: {of} {does} not reach the preload, and {turns} at the latest turning point: "
+            f"{most_reached(self.highest_stress)}. {INSTEAD}."
+        )
 
     @property
     def left(self) -> int:
@@ -305,47 +342,3 @@ def _longest(campaign: Campaign, cells: tuple[CellPrice, ...]) -> float:
 def _rank_bytes() -> int:
     kibibytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return kibibytes if sys.platform == "darwin" else 1024 * kibibytes
-
-
-def _short(price: Price) -> str:
-    verb = "does" if price.pilots_short == 1 else "do"
-    return (
-        f"WARNING: {price.pilots_short} of {counted(price.pilots, 'pilot loop')} {verb} not reach "
-        f"the preload, and turn{'s' * (verb == 'does')} at the latest turning point: "
-        f"{most_reached(price.highest_stress)}. {INSTEAD}."
-    )
-
-
-def as_text(price: Price) -> str:
-    """Return a price as lines for people."""
-    tried = (
-        f"{price.pilots} pilot loops of {duration(price.pilot_seconds)} in all"
-        if price.pilots
-        else "the loops that are done"
-    )
-    memory = f", about {price.rank_bytes / 1e6:.0f} MB of memory a rank" if price.left else ""
-    lines = [
-        f"{price.left} tasks to do in {len(price.cells)} cells, {price.done} done; "
-        "nothing was written",
-        *([price.stop] if price.stop else []),
-        *([_short(price)] if price.pilots_short else []),
-        f"{price.seconds / 3600:.3g} core hours, by {tried}; "
-        f"the longest task takes about {duration(price.longest)}",
-        f"results file {price.file_bytes / 1e6:.3g} MB{memory}",
-    ]
-    if price.left:
-        lines.append(f"one process takes {duration(price.makespan(1))}")
-        for workers in sorted({2, 8, 32, 128, price.most_workers}):
-            if 1 < workers <= price.most_workers:
-                lines.append(f"{workers + 1} ranks take {duration(price.makespan(workers))}")
-        lines.append("of more ranks some would wait for the longest task")
-    if len(price.cells) <= _MOST_CELLS_SHOWN:
-        lines += ["", "s a loop  tasks  core hours  cell"]
-        for cell in price.cells:
-            mark = " " if cell.measured else "~"
-            hours = cell.tasks * cell.seconds / 3600
-            name = cell.task.cell_name
-            lines.append(f"{mark}{cell.seconds:7.3g} {cell.tasks:6d} {hours:11.3g}  {name}")
-        if not all(cell.measured for cell in price.cells):
-            lines.append("~ extrapolated from other cells")
-    return "\n".join(lines)

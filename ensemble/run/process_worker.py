@@ -13,8 +13,7 @@ import threading
 from collections.abc import Sequence
 from typing import BinaryIO
 
-from adhesis.ensemble.errors import lack
-from adhesis.ensemble.exit_codes import TOO_FEW_RESOURCES
+from adhesis.ensemble.exit_codes import ended_by
 from adhesis.ensemble.run.dispatch import MASTER, Limits, Message, Worker
 from adhesis.ensemble.run.launch import end_with_parent
 
@@ -69,7 +68,7 @@ if __name__ == "__main__":
     try:
         main()
     except Exception as failure:
-        if not (sentence := lack(failure)):
-            raise
-        print(sentence, file=sys.stderr)
-        sys.exit(TOO_FEW_RESOURCES)
+        code, sentence = ended_by(failure)
+        if sentence:
+            print(sentence, file=sys.stderr)
+        sys.exit(code)

@@ -49,7 +49,6 @@ class Summary:
 
 
 def _interval(elapsed: float) -> float:
-    """Return the time between lines, in s."""
     first, most = _LINE_INTERVALS
     return min(max(first, elapsed / _LINES_AT_LEAST), most)
 
@@ -69,26 +68,22 @@ class ProgressLine(StatusLine):
         super().__init__(_interval, stream, at_once=True)
         self._counts = counts
         self._time_left = time_left
-        self._failures_shown = 0
-        self._doubts_shown = 0
 
     def tick(self) -> None:
         """Report, if it is time to."""
         self.show(self._text)
 
     def failure(self, what: str, error: str) -> None:
-        """Report a failed task: the first ones each, then only their number."""
-        if self._failures_shown < _MOST_FAILURES_SHOWN:
+        """Report a failed task that is counted: the first ones each, then only their number."""
+        if self._counts.failed_now <= _MOST_FAILURES_SHOWN:
             self.say(f"failed: {what}: {error}")
-        elif self._failures_shown == _MOST_FAILURES_SHOWN:
+        elif self._counts.failed_now == _MOST_FAILURES_SHOWN + 1:
             self.say("further failures are counted here and listed by `adhesis status`")
-        self._failures_shown += 1
 
     def doubt(self, what: str) -> None:
-        """Report a loss that its own checks find wrong: the first ones each."""
-        if self._doubts_shown < _MOST_FAILURES_SHOWN:
+        """Report a loss that is counted as doubtful: the first ones each."""
+        if self._counts.doubtful <= _MOST_FAILURES_SHOWN:
             self.say(f"doubtful loss: {what}")
-        self._doubts_shown += 1
 
     def end(self) -> None:
         """Show the last state and end the line on a terminal."""

@@ -88,18 +88,16 @@ class Schedule:
             return mean
         return self._groups[group].prior * self._known_seconds / self._known_prior
 
-    @property
-    def mean_estimate(self) -> float | None:
-        """Mean measured time of a task in s."""
-        count = sum(group.count for group in self._groups.values())
-        return self._known_seconds / count if count else None
+    def seconds_left(self, in_flight: int, workers: int) -> float | None:
+        """Return the estimated time in s until so many workers are done; None if nothing is known.
 
-    @property
-    def seconds_waiting(self) -> float | None:
-        """Estimated time of all waiting tasks, one after the other, in s."""
+        The tasks in flight are half done.
+        """
         if not self._known_prior:
             return None
-        return sum(g.waiting * (self.estimate(name) or 0.0) for name, g in self._groups.items())
+        mean = self._known_seconds / sum(group.count for group in self._groups.values())
+        waiting = sum(g.waiting * (self.estimate(name) or 0.0) for name, g in self._groups.items())
+        return (waiting + 0.5 * mean * in_flight) / workers
 
     def take(self, time_left: float | None = None) -> Unit:
         """Return the next unit; an empty one if none waits or fits into ``time_left`` (s)."""

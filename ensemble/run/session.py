@@ -16,19 +16,10 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
-from adhesis.ensemble.quantities import percent
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
-from adhesis.ensemble.run.dispatch import (
-    REPORT_INTERVAL,
-    SILENCE,
-    Channel,
-    Limits,
-    Master,
-    OwnWorker,
-    Worker,
-)
 from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
@@ -37,7 +28,7 @@ from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.task.compute import Runner, check_task
-from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful
+from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, errors_text
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
 from adhesis.solver.loading.path_record import Progress
@@ -58,7 +49,9 @@ class Engine:
     all_write: bool = bool(h5py.get_config().mpi)
     # Makes what stands around a rank's loop of handing out or working
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
-    silence: float = SILENCE  # how long a rank may not be heard from until the run ends, in s
+    silence: float = (
+        dispatch.SILENCE
+    )  # how long a rank may not be heard from until the run ends, in s
 
 
 @dataclass(frozen=True)
@@ -180,24 +173,24 @@ class _Session:
             row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
         }
         self._compute = _Computing(campaign, plan.tasks, engine.compute)
-        self._limits = Limits(
+        self._limits = dispatch.Limits(
             stop=self._stop,
             time_left=self._time_left,
             task_seconds=campaign.solver.time_limit,
             grace=GRACE if options.deadline is None else options.deadline.grace,
             silence=engine.silence,
-            report_interval=min(REPORT_INTERVAL, engine.silence / 12),
+            report_interval=min(dispatch.REPORT_INTERVAL, engine.silence / 12),
         )
 
     def run(self, comm: Any, own_rows: bool) -> str | None:
         """Hand out, work, or both; returns on rank 0 why the run stopped early, or None."""
         if comm.rank > 0:
             deliver = self._write if own_rows else lambda outcome: outcome
-            Worker(MpiChannel(comm), self._compute, deliver, self._limits).run()
+            dispatch.Worker(MpiChannel(comm), self._compute, deliver, self._limits).run()
             return None
         limits = self._limits
         with ExitStack() as stack:
-            channel: Channel
+            channel: dispatch.Channel
             if comm.size > 1:
                 channel = MpiChannel(comm)
             elif self.options.processes and self.plan.rows:
@@ -208,10 +201,10 @@ class _Session:
                     )
                 )
             else:
-                channel = OwnWorker(self._compute_here, lambda outcome: outcome, limits)
+                channel = dispatch.OwnWorker(self._compute_here, lambda outcome: outcome, limits)
             return self._hand_out(channel, own_rows)
 
-    def _hand_out(self, channel: Channel, own_rows: bool) -> str | None:
+    def _hand_out(self, channel: dispatch.Channel, own_rows: bool) -> str | None:
         schedule = self._schedule()
 
         def collect(outcome: Outcome) -> None:
@@ -219,10 +212,12 @@ class _Session:
 
         progress = self._progress = ProgressLine(
             self._counts,
-            lambda: self._estimate(schedule, master.in_flight, len(channel.workers)),
+            lambda: schedule.seconds_left(master.in_flight, len(channel.workers)),
             self.stream,
         )
-        master = Master(channel, schedule, self._groups, collect, self._limits, progress.tick)
+        master = dispatch.Master(
+            channel, schedule, self._groups, collect, self._limits, progress.tick
+        )
         try:
             return master.run()
         finally:
@@ -270,11 +265,7 @@ class _Session:
             counts.beyond_limit += bool(beyond_zero_range(row))
             if doubtful(row, self.campaign.solver.accuracy):
                 counts.doubtful += 1
-                share = 100 * row["loss_error"] / (abs(row["loss"]) or 1.0)
-                progress.doubt(
-                    f"{what}: audit residual {percent(row['audit_residual'])}, "
-                    f"estimated error {share:.2g} %"
-                )
+                progress.doubt(f"{what}: {errors_text(row)}")
         if self.plan.batches is not None:
             steered = self.campaign.stop.quantity
             value = math.nan if outcome.error is not None else float(row[steered])
@@ -311,10 +302,3 @@ class _Session:
 
     def _time_left(self) -> float | None:
         return None if self._ends is None else self._ends - time.monotonic()
-
-    @staticmethod
-    def _estimate(schedule: Schedule, in_flight: int, workers: int) -> float | None:
-        waiting, mean = schedule.seconds_waiting, schedule.mean_estimate
-        if waiting is None or mean is None:
-            return None
-        return (waiting + 0.5 * mean * in_flight) / workers

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.ensemble.quantities import percent
 from adhesis.solver.loading.zero_range import (
     ANY_RANGE,
     DOUBTFUL_BARRIER,
@@ -30,25 +31,27 @@ _OF_LIMIT = (
 OF_DOUBT = ("audit_residual", "loss_error", *_OF_LIMIT)
 """Numbers of a row from which its loss is judged."""
 
-BEYOND_LIMIT = (
-    f"{ANY_RANGE} is below {DOUBTFUL_RANGE:g} m, or the loss above "
-    f"{DOUBTFUL_LOSS:g} times the work of adhesion of the largest contact, so that an interface of "
-    "finite range would lose less (docs/zero-range.md)"
-)
-"""Why losses are doubtful that are those of the zero-range limit alone."""
-
-BEYOND_STRENGTH = (
-    f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, or the "
-    f"barriers of openings are more than {DOUBTFUL_BARRIER:g} of the loss, or the range of "
-    "adhesion is longer than edge_range, touch_range or turn_range, so that what zero range leaves "
-    "open matters for it (docs/zero-range.md)"
-)
-"""Why losses are doubtful where patches open from inside."""
-
 
 def why_beyond(opens: bool) -> str:
-    """Return why losses of a campaign are beyond what zero range describes."""
-    return BEYOND_STRENGTH if opens else BEYOND_LIMIT
+    """Return why losses are beyond zero range; ``opens``: whether patches open from inside."""
+    if opens:
+        return (
+            f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, "
+            f"or the barriers of openings are more than {DOUBTFUL_BARRIER:g} of the loss, or the "
+            "range of adhesion is longer than edge_range, touch_range or turn_range, so that what "
+            "zero range leaves open matters for it (docs/zero-range.md)"
+        )
+    return (
+        f"{ANY_RANGE} is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "
+        "work of adhesion of the largest contact, so that an interface of finite range would lose "
+        "less (docs/zero-range.md)"
+    )
+
+
+def errors_text(row: Mapping[str, Any]) -> str:
+    """Return "audit residual 0.2 %, estimated error 3 %" of the loss of a row."""
+    error = row["loss_error"] / (abs(row["loss"]) or 1.0)
+    return f"audit residual {percent(row['audit_residual'])}, estimated error {percent(error)}"
 
 
 def doubtful(values: Mapping[str, Any], accuracy: float) -> NDArray[np.bool_]:

@@ -245,7 +245,7 @@ def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
     def interrupt(seconds):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("adhesis.ensemble.command.campaigns.status.time.sleep", interrupt)
+    monkeypatch.setattr("adhesis.ensemble.command.status.time.sleep", interrupt)
     assert main(["status", "r.h5", "--watch"]) == 130
     assert capsys.readouterr().err == "adhesis status: interrupted\n"
 
@@ -254,7 +254,7 @@ def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatc
     def fail(args):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("adhesis.ensemble.command.campaigns.status.execute", fail)
+    monkeypatch.setattr("adhesis.ensemble.command.status.execute", fail)
     assert main(["status", "r.h5"]) == 70
     assert "ZeroDivisionError" in capsys.readouterr().err
 
@@ -335,7 +335,7 @@ def test_an_error_of_one_rank_is_reported_when_rank_0_had_its_time(rank_one, cap
     def fail(args):
         raise RankError("no mpi4py here")
 
-    monkeypatch.setattr("adhesis.ensemble.command.campaigns.run.execute", fail)
+    monkeypatch.setattr("adhesis.ensemble.command.run.execute", fail)
     assert main(["run", "c.toml"]) == 2
     assert len(rank_one) == 2
     assert capsys.readouterr().err == "adhesis run: no mpi4py here\n"

@@ -14,7 +14,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.plan import prior
-from adhesis.ensemble.run.price import as_text, price
+from adhesis.ensemble.run.price import price
 from adhesis.ensemble.run.session import run_campaign
 from adhesis.solver.method import PathError
 from tests.support.campaign_support import adhesis_here, campaign_text, write_campaign
@@ -112,7 +112,7 @@ def test_pilot_loops_short_of_their_preload_are_reported():
     text = campaign_text(realisations="1").replace("max_penetration = 0.6", "preload = 5000")
     campaign = parse_campaign(text)
     (warning,) = (
-        s for s in as_text(price(campaign, compute=falls_short)).splitlines() if "WARN" in s
+        s for s in str(price(campaign, compute=falls_short)).splitlines() if "WARN" in s
     )
     assert warning == (
         "WARNING: 2 of 4 pilot loops do not reach the preload, and turn at the latest turning "
@@ -123,8 +123,8 @@ def test_pilot_loops_short_of_their_preload_are_reported():
     def pulls(campaign, task):
         return falls_short(campaign, task) | {"loading_mean_stress": np.array([0.0, -3000.0])}
 
-    assert "at load steps the mean stress is a tension" in as_text(price(campaign, compute=pulls))
-    assert "preload" not in as_text(price(campaign, compute=compute))
+    assert "at load steps the mean stress is a tension" in str(price(campaign, compute=pulls))
+    assert "preload" not in str(price(campaign, compute=compute))
 
 
 def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
@@ -135,7 +135,7 @@ def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
     reported = price(campaign, compute=compute, seconds=3.0)
     assert reported.pilots == 3
     assert [bool(cell.measured) for cell in reported.cells].count(False) == 1
-    assert "~ extrapolated from other cells" in as_text(reported)
+    assert "~ extrapolated from other cells" in str(reported)
     assert all(cell.seconds > 0 for cell in reported.cells)
 
 
@@ -201,10 +201,10 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
 
     reported = price(campaign, compute=compute)  # all 200 of each cell are tried: they take no time
     assert reported.left in (4 * 80, 4 * 88)  # whole batches
-    text = as_text(reported)
+    text = str(reported)
     assert "loss_dimensionless of 800 loops scatters by 40 % so far; at least 56" in text
     blind = price(campaign, compute=compute, seconds=-1.0)
-    assert "[stop]: 56 to 200 realisations a cell; the price is for 200" in as_text(blind)
+    assert "[stop]: 56 to 200 realisations a cell; the price is for 200" in str(blind)
     # What the rule has left out is not priced.
     path = tmp_path / "r.h5"
     create(path, campaign)

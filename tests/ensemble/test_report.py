@@ -40,7 +40,7 @@ from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
-from adhesis.ensemble.report.tables.works import works
+from adhesis.ensemble.report.tables.loss_tables import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem

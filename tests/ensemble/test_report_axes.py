@@ -19,8 +19,7 @@ from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.catalogue import sections
 from adhesis.ensemble.report.figures.loops import _bands
 from adhesis.ensemble.report.figures.style import style
-from adhesis.ensemble.report.tables.loss_tables import losses
-from adhesis.ensemble.report.tables.works import works
+from adhesis.ensemble.report.tables.loss_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import FAILED

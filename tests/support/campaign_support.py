@@ -17,7 +17,7 @@ from unittest.mock import patch
 import h5py
 import numpy as np
 
-from adhesis.ensemble.command.campaigns import run
+from adhesis.ensemble.command import run
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.run import launch
 from tests.support.fake_run import fake_engine

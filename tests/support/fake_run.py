@@ -121,7 +121,7 @@ def fake_engine(behaviour: str) -> Engine:
 
 if __name__ == "__main__":
     from adhesis.ensemble import versions
-    from adhesis.ensemble.command.campaigns import run
+    from adhesis.ensemble.command import run
     from adhesis.ensemble.command.main import main
     from tests.support import fake_run  # by its name, as other processes know it
 

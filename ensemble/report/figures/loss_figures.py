@@ -17,25 +17,7 @@ from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE, SMALL
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.figures.style import (
-    CAP,
-    LINES,
-    MM,
-    MOST_CURVES,
-    MOST_PANELS,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    PublishedFigure,
-    colour,
-    gamma_label,
-    key,
-    label_panel,
-    look,
-    new_figure,
-    plain_decades,
-    shown_gammas,
-    spread_out,
-)
+from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.findings import typical_cell
 from adhesis.ensemble.report.further_axes import loops_short_of_preload
 from adhesis.ensemble.report.tables.loss_tables import papers_loss
@@ -70,22 +52,22 @@ def loss_label(data: Aggregate, what: str = "loss") -> str:
     )
 
 
-def loss_against_hurst(data: Aggregate) -> PublishedFigure:
+def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
     """Table 1 as a figure: loss of each H with intervals and the paper's, a panel for each γ."""
-    shown, (name, label, unit) = shown_gammas(data), loss_quantity(data)
+    shown, (name, label, unit) = style.shown_gammas(data), loss_quantity(data)
     columns = min(len(shown), _MOST_BESIDE)
     rows = -(-len(shown) // columns)
-    height = (20 + 42 * rows) * MM
-    figure = new_figure(rows, columns, ONE_COLUMN, height, sharex=True, sharey=True)
-    hursts = spread_out(data.hursts, MOST_CURVES)
+    height = (20 + 42 * rows) * style.MM
+    figure = style.new_figure(rows, columns, style.ONE_COLUMN, height, sharex=True, sharey=True)
+    hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     aside = 0.2 * min(np.diff(hursts), default=0.1)
     for axes, (k, gamma) in zip(figure.panels, shown, strict=False):
         cells = _of_gamma(data, gamma)
         x = np.array([cell.hurst for cell in cells])
         found = [cell.estimates[name] for cell in cells]
         errorbar(axes, x, found, k, "_", unit=unit, hollow=hollow_of(cells))
-        _stars(axes, [(cell.hurst + aside, papers_loss(cell), colour(k)) for cell in cells])
-        label_panel(axes, gamma_label(gamma))
+        _stars(axes, [(cell.hurst + aside, papers_loss(cell), style.colour(k)) for cell in cells])
+        style.label_panel(axes, style.gamma_label(gamma))
     for axes in figure.panels[len(shown) :]:
         axes.set_axis_off()
     figure.label("Hurst exponent $H$", label)
@@ -94,34 +76,36 @@ def loss_against_hurst(data: Aggregate) -> PublishedFigure:
         if len(hursts) <= _MOST_TICKS:
             axes.set_xticks(hursts)
         axes.set_xlim(min(hursts) - 2.5 * aside, max(hursts) + 2.5 * aside)
-    mean = key("mean and 95 % interval", color="0.3", marker="o", linestyle="none")
+    mean = style.key("mean and 95 % interval", color="0.3", marker="o", linestyle="none")
     figure.legend_above([mean, *_star_handle(data), *hollow_handle(data.cells)], 2)
     return figure
 
 
-def loss_against_slope(data: Aggregate) -> PublishedFigure:
+def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
     """Loss against the mean square slope m2 with intervals, a panel for each γ."""
-    shown, (name, label, unit) = shown_gammas(data), loss_quantity(data)
-    figure = new_figure(len(shown), 1, ONE_COLUMN, (20 + 33 * len(shown)) * MM, sharex=True)
-    hursts = spread_out(data.hursts, MOST_CURVES)
+    shown, (name, label, unit) = style.shown_gammas(data), loss_quantity(data)
+    figure = style.new_figure(
+        len(shown), 1, style.ONE_COLUMN, (20 + 33 * len(shown)) * style.MM, sharex=True
+    )
+    hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     for axes, (_, gamma) in zip(figure.panels, shown, strict=True):
         for k, hurst in enumerate(hursts):
             cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
             found = [cell.estimates[name] for cell in cells]
             errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit, hollow=hollow_of(cells))
-            _stars(axes, [(paper.m2(c.hurst), papers_loss(c), colour(k)) for c in cells])
+            _stars(axes, [(paper.m2(c.hurst), papers_loss(c), style.colour(k)) for c in cells])
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
-        label_panel(axes, gamma_label(gamma))
+        style.label_panel(axes, style.gamma_label(gamma))
     figure.label("mean square slope $m_2$", label)
-    handles = [key(f"H = {h:g}", ls="none", **look(k)) for k, h in enumerate(hursts)]
+    handles = [style.key(f"H = {h:g}", ls="none", **style.look(k)) for k, h in enumerate(hursts)]
     figure.legend_above([*handles, *_star_handle(data), *hollow_handle(data.cells)], 4)
     return figure
 
 
 def _of_gamma(data: Aggregate, gamma: float) -> list[Cell]:
     """The finished cells of one γ that a figure shows, by H."""
-    hursts = spread_out(data.hursts, MOST_CURVES)
+    hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
     return [cell for cell in cells if cell.hurst in hursts]
 
@@ -138,7 +122,7 @@ def _star_handle(data: Aggregate) -> list[Line2D]:
     """The entry of the paper's values in a legend, if any are drawn."""
     if all(papers_loss(cell) is None for cell in data.cells if cell.done):
         return []
-    return [key("paper", **_STAR)]
+    return [style.key("paper", **_STAR)]
 
 
 def of_penetration(data: Aggregate) -> list[Companion]:
@@ -146,18 +130,18 @@ def of_penetration(data: Aggregate) -> list[Companion]:
     return [companion for companion in data.companions if companion.kind == "penetration"]
 
 
-def loss_against_penetration(data: Aggregate) -> PublishedFigure:
+def loss_against_penetration(data: Aggregate) -> style.PublishedFigure:
     """Loss against the largest penetration with intervals, from the realisations that all share.
 
     One curve for each γ at the middle H; or for each H, if the campaigns have one γ in common.
     """
-    figure = new_figure(1, 1, ONE_COLUMN, 65 * MM)
+    figure = style.new_figure(1, 1, style.ONE_COLUMN, 65 * style.MM)
     axes, (_, quantity, unit) = figure.panels[0], loss_quantity(data)
     typical = typical_cell(data)
     assert typical is not None  # an aggregate has finished tasks
     curves = [
-        (k, gamma_label(gamma), found)
-        for k, gamma in shown_gammas(data)
+        (k, style.gamma_label(gamma), found)
+        for k, gamma in style.shown_gammas(data)
         if len(found := _by_penetration(data, typical.hurst, gamma)) > 1
     ]
     title = f"H = {typical.hurst:g}"
@@ -168,10 +152,10 @@ def loss_against_penetration(data: Aggregate) -> PublishedFigure:
             if any(len(_by_penetration(data, hurst, gamma)) > 1 for hurst in data.hursts)
         ]
         gamma = common[len(common) // 2] if common else typical.work_of_adhesion
-        title = gamma_label(gamma)
+        title = style.gamma_label(gamma)
         curves = [
             (k, f"H = {hurst:g}", _by_penetration(data, hurst, gamma))
-            for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES))
+            for k, hurst in enumerate(style.spread_out(data.hursts, style.MOST_CURVES))
         ]
         curves = [curve for curve in curves if curve[2]]
     tops = [top for _, _, found in curves for top in found]
@@ -182,7 +166,7 @@ def loss_against_penetration(data: Aggregate) -> PublishedFigure:
         errorbar(axes, x, losses, k, label, offset=offset, unit=unit)
     figure.label(r"largest penetration $\Delta_\mathrm{max}/h_\mathrm{max}$", quantity)
     axes.set_ylim(bottom=0)
-    label_panel(axes, title)
+    style.label_panel(axes, title)
     figure.legend_above(axes.get_legend_handles_labels()[0], len(curves) or 1)
     return figure
 
@@ -205,11 +189,11 @@ def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, 
     return dict(zip(there, estimates(np.array(losses)), strict=True))
 
 
-def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
+def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
     """Sum of the drops at small-scale and at large-scale jumps, for each (H, γ)."""
     cells = _cells(data)
-    width = ONE_COLUMN if len(cells) <= _MOST_BARS else TWO_COLUMNS
-    figure = new_figure(1, 1, width, 68 * MM)
+    width = style.ONE_COLUMN if len(cells) <= _MOST_BARS else style.TWO_COLUMNS
+    figure = style.new_figure(1, 1, width, 68 * style.MM)
     axes = figure.panels[0]
     place = np.arange(len(cells))
     large = [cell.estimates["loss_large_scale"] for cell in cells]
@@ -227,7 +211,7 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
             "ecolor": "black",
             "elinewidth": 0.8,
             "label": "_",
-            "capsize": CAP,
+            "capsize": style.CAP,
         }
         axes.errorbar(place + aside, bottom + mean, yerr=bars, **line)
         mark_below_zero(axes, (place + aside)[bottom + low < 0], "black")
@@ -251,24 +235,27 @@ def loss_by_mechanism(data: Aggregate) -> PublishedFigure:
     return figure
 
 
-def jump_energies(data: Aggregate) -> PublishedFigure:
+def jump_energies(data: Aggregate) -> style.PublishedFigure:
     """Jumps per loop and decade of energy drop: large scale left, small scale right."""
-    hursts = spread_out(data.hursts, MOST_PANELS)
-    shown, occupied = shown_gammas(data), _occupied(data)
-    height = (13 + 44 * len(hursts)) * MM
-    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
+    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
+    shown, occupied = style.shown_gammas(data), _occupied(data)
+    height = (13 + 44 * len(hursts)) * style.MM
+    figure = style.new_figure(len(hursts), 2, style.TWO_COLUMNS, height, sharex=True, sharey=True)
     for row, hurst in zip(figure.rows, hursts, strict=True):
         for axes, small in zip(row, (False, True), strict=True):
             for k, gamma in shown:
                 cell = data.cell(hurst, gamma)
                 if cell is not None and cell.done:
                     _jump_density(axes, cell, small, k, occupied)
-            label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
+            style.label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
     figure.label("energy drop of one jump (J/m²)", "jumps per loop and decade")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
-    handles = [key(gamma_label(g), color=colour(k), linestyle=LINES[k]) for k, g in shown]
-    plain_decades(figure.panels)
+    handles = [
+        style.key(style.gamma_label(g), color=style.colour(k), linestyle=style.LINES[k])
+        for k, g in shown
+    ]
+    style.plain_decades(figure.panels)
     figure.legend_above(handles, len(handles))
     return figure
 
@@ -279,19 +266,19 @@ def _jump_density(axes: Axes, cell: AveragedCell, small: bool, k: int, part: sli
     # Jumps are counted: n of them are known to sqrt(n).
     scatter = density / np.sqrt(np.maximum(density * cell.done / BINS_PER_DECADE, 1))
     below = np.maximum(density - scatter, 0.3 * density)[part]
-    band: Any = {"fill": True, "color": colour(k), "alpha": 0.1, "linewidth": 0, "label": "_"}
+    band: Any = {"fill": True, "color": style.colour(k), "alpha": 0.1, "linewidth": 0, "label": "_"}
     axes.stairs((density + scatter)[part], edges, baseline=below, **band)
     shown = np.where(density > 0, density, np.nan)[part]
-    line: Any = {"color": colour(k), "linestyle": LINES[k], "linewidth": 1.4}
-    label = gamma_label(cell.work_of_adhesion)
+    line: Any = {"color": style.colour(k), "linestyle": style.LINES[k], "linewidth": 1.4}
+    label = style.gamma_label(cell.work_of_adhesion)
     axes.stairs(shown, edges, baseline=None, label=label, **line)
 
 
-def pull_off(data: Aggregate) -> PublishedFigure:
+def pull_off(data: Aggregate) -> style.PublishedFigure:
     """Largest mean tension on unloading against γ, for each H, with intervals."""
-    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    figure = style.new_figure(1, 1, style.ONE_COLUMN, 62 * style.MM)
     axes = figure.panels[0]
-    hursts = spread_out(data.hursts, MOST_CURVES)
+    hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
@@ -320,8 +307,8 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
 
 
 def _cells(data: Aggregate) -> list[Cell]:
-    hursts = spread_out(data.hursts, MOST_PANELS)
-    gammas = spread_out(data.works_of_adhesion, MOST_CURVES)
+    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
+    gammas = style.spread_out(data.works_of_adhesion, style.MOST_CURVES)
     return [c for c in data.cells if c.done and c.hurst in hursts and c.work_of_adhesion in gammas]
 
 
@@ -352,14 +339,16 @@ def errorbar(
     :func:`hollow_of` are hollow.
     """
     mean, low, bars = _in_unit(found, unit)
-    line = LINES[k] if x.size >= FEWEST_FOR_A_LINE else "none"
-    axes.errorbar(x + offset, mean, yerr=bars, linestyle=line, label=label, capsize=CAP, **look(k))
+    line = style.LINES[k] if x.size >= FEWEST_FOR_A_LINE else "none"
+    axes.errorbar(
+        x + offset, mean, yerr=bars, linestyle=line, label=label, capsize=style.CAP, **style.look(k)
+    )
     if any(hollow):
         place = np.flatnonzero(hollow)
         options = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5, "label": "_"}
-        axes.plot((x + offset)[place], mean[place], **look(k) | options)
+        axes.plot((x + offset)[place], mean[place], **style.look(k) | options)
     if from_zero:
-        mark_below_zero(axes, (x + offset)[low < 0], colour(k))
+        mark_below_zero(axes, (x + offset)[low < 0], style.colour(k))
 
 
 def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
@@ -385,7 +374,7 @@ def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:
     }
     label = " or ".join(reason for reason, holds in reasons.items() if holds)
     look_of_mark: Any = {"color": "0.3", "marker": "o", "markerfacecolor": "white"}
-    return [key(f"loops {label}", linestyle="none", **look_of_mark)] if label else []
+    return [style.key(f"loops {label}", linestyle="none", **look_of_mark)] if label else []
 
 
 def mark_below_zero(axes: Axes, x: np.ndarray, colour: str) -> None:

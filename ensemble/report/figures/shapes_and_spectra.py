@@ -20,25 +20,8 @@ from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.mean_fields import DeformedShape
 from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.figures.selection import cell_of_hurst, cells_of, state_of
-from adhesis.ensemble.report.figures.style import (
-    LINE_OF_BRANCH,
-    LINES,
-    MM,
-    MOST_CURVES,
-    MOST_PANELS,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    PublishedFigure,
-    colour,
-    gamma_label,
-    key,
-    label_panel,
-    look,
-    new_figure,
-    plain_decades,
-    spread_out,
-)
 from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, field_plan
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
@@ -51,7 +34,7 @@ _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 _SLOPE: Any = {"color": "0.3", "linewidth": 0.7}
 
 
-def shapes(data: Aggregate) -> PublishedFigure:
+def shapes(data: Aggregate) -> style.PublishedFigure:
     """Fig. 3: rigid profile and elastic surface above it of one realisation on both branches.
 
     Heights are those of the profile: on a machine or under a load the two branches have different
@@ -65,8 +48,10 @@ def shapes(data: Aggregate) -> PublishedFigure:
     shape = cell.fields.shape
     assert shape is not None
     chosen = shown_penetrations(data, 3)
-    height, ratios = (12 + 38 * len(chosen)) * MM, {"width_ratios": [2, 1]}
-    figure = new_figure(len(chosen), 2, TWO_COLUMNS, height, sharex="col", gridspec_kw=ratios)
+    height, ratios = (12 + 38 * len(chosen)) * style.MM, {"width_ratios": [2, 1]}
+    figure = style.new_figure(
+        len(chosen), 2, style.TWO_COLUMNS, height, sharex="col", gridspec_kw=ratios
+    )
     everywhere = np.arange(cell.plan.position.size)
     window = _window(cell, shape)
     for (whole, detail), k in zip(figure.rows, chosen, strict=True):
@@ -75,44 +60,46 @@ def shapes(data: Aggregate) -> PublishedFigure:
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
         depth, separations = _depth(data, cell, k), _separations(shape, k)
-        label_panel(whole, f"{_cell_label(cell)}, {depth}, $s$ = {separations}")
-        label_panel(detail, "detail")
+        style.label_panel(whole, f"{_cell_label(cell)}, {depth}, $s$ = {separations}")
+        style.label_panel(detail, "detail")
     figure.label("position $x$ (mm)", "height (µm)")
     handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h$")]
-    handles += [key(f"elastic surface $v + s$, {b}", **_look_of(b)) for b in BRANCHES]
+    handles += [style.key(f"elastic surface $v + s$, {b}", **_look_of(b)) for b in BRANCHES]
     figure.legend_above(handles, 3)
     return figure
 
 
-def spectra_of_branches(data: Aggregate) -> PublishedFigure:
+def spectra_of_branches(data: Aggregate) -> style.PublishedFigure:
     """Fig. 4: spectral density of profile and deformed surface on both branches at one state."""
     cells = cells_of(data, paper.FIGURE_4)
-    figure = new_figure(len(cells), 1, ONE_COLUMN, (16 + 52 * len(cells)) * MM, sharex=True)
+    figure = style.new_figure(
+        len(cells), 1, style.ONE_COLUMN, (16 + 52 * len(cells)) * style.MM, sharex=True
+    )
     for (axes,), cell in zip(figure.rows, cells, strict=True):
         k = state_of(cell.plan, paper.FIGURE_4)
         for b, branch in enumerate(BRANCHES):
             _spectrum(axes, cell, b, k, label=branch, **_look_of(branch))
         _finish_spectra(axes, cell, f", {_depth(data, cell, k)}")
-    _label_spectra(figure, [key(b, **_look_of(b)) for b in BRANCHES])
+    _label_spectra(figure, [style.key(b, **_look_of(b)) for b in BRANCHES])
     return figure
 
 
-def spectra_on_loading(data: Aggregate) -> PublishedFigure:
+def spectra_on_loading(data: Aggregate) -> style.PublishedFigure:
     """Fig. 5(a): spectral density of profile and deformed surface on loading, state by state."""
     return _spectra(data, 0)
 
 
-def spectra_on_unloading(data: Aggregate) -> PublishedFigure:
+def spectra_on_unloading(data: Aggregate) -> style.PublishedFigure:
     """Fig. 5(b): the same on unloading."""
     return _spectra(data, 1)
 
 
-def gap_density(data: Aggregate) -> PublishedFigure:
+def gap_density(data: Aggregate) -> style.PublishedFigure:
     """Fig. 8: probability density of the gap on either branch, for each H."""
-    hursts = spread_out(data.hursts, MOST_PANELS)
-    height = (16 + 46 * len(hursts)) * MM
-    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
-    chosen = shown_penetrations(data, MOST_CURVES)
+    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
+    height = (16 + 46 * len(hursts)) * style.MM
+    figure = style.new_figure(len(hursts), 2, style.TWO_COLUMNS, height, sharex=True, sharey=True)
+    chosen = shown_penetrations(data, style.MOST_CURVES)
     for row, hurst in zip(figure.rows, hursts, strict=True):
         cell = cell_of_hurst(data, hurst, paper.FIGURE_8)
         if cell is None:
@@ -123,30 +110,30 @@ def gap_density(data: Aggregate) -> PublishedFigure:
                 values = cell.fields.gap_density[b, k][1:-1]
                 if np.any(values > 0):
                     y, depth = np.where(values > 0, values, np.nan), cell.plan.penetration[k]
-                    line: Any = {"color": colour(place), "linestyle": LINES[place]}
+                    line: Any = {"color": style.colour(place), "linestyle": style.LINES[place]}
                     axes.plot(GAP_BINS[1:-1], y, label=f"{depth:.2f}", **line)
-            label_panel(axes, f"{_cell_label(cell)}, {branch}")
+            style.label_panel(axes, f"{_cell_label(cell)}, {branch}")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
         axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
     figure.label(r"gap $t/h_\mathrm{max}$", r"density of $t/h_\mathrm{max}$")
-    plain_decades(figure.panels)
+    style.plain_decades(figure.panels)
     figure.legend_above(_penetration_handles(data, chosen, markers=False), len(chosen))
     return figure
 
 
-def height_density(data: Aggregate) -> PublishedFigure:
+def height_density(data: Aggregate) -> style.PublishedFigure:
     """Fig. 9: probability density of the heights of the rigid profiles, and the Gaussian."""
-    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    figure = style.new_figure(1, 1, style.ONE_COLUMN, 62 * style.MM)
     axes = figure.panels[0]
-    for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES)):
+    for k, hurst in enumerate(style.spread_out(data.hursts, style.MOST_CURVES)):
         # All γ have the same profiles: the cell with most of them says all.
         cell = max((c for c in data.cells if c.hurst == hurst), key=lambda c: c.done)
         if cell.done:
             density = cell.fields.height_density
             points: Any = {"linestyle": "none", "markersize": 2.4, "label": f"H = {hurst:g}"}
             y = np.where(density > 0, density, np.nan)
-            axes.plot(HEIGHT_BINS, y, **points, **look(k))
+            axes.plot(HEIGHT_BINS, y, **points, **style.look(k))
     x = np.linspace(-4.5, 4.5, 200)
     axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color="0.3", label="Gaussian")
     axes.set(yscale="log", ylim=(1e-4, 1), xlim=(-4.5, 4.5))
@@ -163,12 +150,14 @@ def cells_with_shape(data: Aggregate) -> list[AveragedCell]:
 def shown_penetrations(data: Aggregate, most: int) -> list[int]:
     """Places of the penetrations that a figure shows, deepest first."""
     places = list(range(data.cells[0].plan.penetration.size))[::-1]
-    return [int(k) for k in spread_out(places, most)]
+    return [int(k) for k in style.spread_out(places, most)]
 
 
-def _spectra(data: Aggregate, b: int) -> PublishedFigure:
-    hursts = spread_out(data.hursts, MOST_PANELS)
-    figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 52 * len(hursts)) * MM, sharex=True)
+def _spectra(data: Aggregate, b: int) -> style.PublishedFigure:
+    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
+    figure = style.new_figure(
+        len(hursts), 1, style.ONE_COLUMN, (16 + 52 * len(hursts)) * style.MM, sharex=True
+    )
     chosen = shown_penetrations(data, 3)
     for (axes,), hurst in zip(figure.rows, hursts, strict=True):
         cell = cell_of_hurst(data, hurst, paper.FIGURE_5)
@@ -176,7 +165,9 @@ def _spectra(data: Aggregate, b: int) -> PublishedFigure:
             continue
         for place, k in enumerate(chosen):
             label = f"{cell.plan.penetration[k]:.2f}"
-            _spectrum(axes, cell, b, k, label=label, linestyle=LINES[place], **look(place))
+            _spectrum(
+                axes, cell, b, k, label=label, linestyle=style.LINES[place], **style.look(place)
+            )
         _finish_spectra(axes, cell)
     _label_spectra(figure, _penetration_handles(data, chosen))
     return figure
@@ -184,7 +175,7 @@ def _spectra(data: Aggregate, b: int) -> PublishedFigure:
 
 def _look_of(branch: str) -> dict[str, Any]:
     """Return the look of a branch where both are drawn over the rigid profile."""
-    return {"color": _COLOUR_OF_BRANCH[branch], "linestyle": LINE_OF_BRANCH[branch]}
+    return {"color": _COLOUR_OF_BRANCH[branch], "linestyle": style.LINE_OF_BRANCH[branch]}
 
 
 def _spectrum(axes: Axes, cell: AveragedCell, b: int, k: int, **options: Any) -> None:
@@ -206,15 +197,19 @@ def _finish_spectra(axes: Axes, cell: AveragedCell, state: str = "") -> None:
     for exponent, factor, line in ((2 * cell.hurst + 1, 0.2, ":"), (2 + cell.hurst, 5.0, "-.")):
         slope = factor * rigid[0] * (ends / q[0]) ** -exponent
         axes.loglog(ends, slope, linestyle=line, label=f"slope {-exponent:.1f}", **_SLOPE)
-    label_panel(axes, f"{_cell_label(cell)}{state}")
+    style.label_panel(axes, f"{_cell_label(cell)}{state}")
 
 
-def _label_spectra(figure: PublishedFigure, handles: list[Line2D]) -> None:
-    """Label the axes, and put the legend of all panels above them."""
-    plain_decades(figure.panels)
+def _label_spectra(figure: style.PublishedFigure, handles: list[Line2D]) -> None:
+    style.plain_decades(figure.panels)
     figure.label("wave number $q$ (rad/m)", r"spectral density $C(q)$ (m³)")
-    slopes = [key("$q^{-(2H+1)}$", ls=":", **_SLOPE), key("$q^{-(2+H)}$", ls="-.", **_SLOPE)]
-    figure.legend_above([key("rigid profile", color="0.55", linewidth=2), *handles, *slopes], 3)
+    slopes = [
+        style.key("$q^{-(2H+1)}$", ls=":", **_SLOPE),
+        style.key("$q^{-(2+H)}$", ls="-.", **_SLOPE),
+    ]
+    figure.legend_above(
+        [style.key("rigid profile", color="0.55", linewidth=2), *handles, *slopes], 3
+    )
 
 
 def _draw_shape(
@@ -286,9 +281,10 @@ def _penetration_handles(
         unit = r"\Delta/\Delta"
     penetration = (data.cells[0].plan if len(tops) == 1 else field_plan(data.campaign)).penetration
     return [
-        key(
+        style.key(
             rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
-            **{**look(place), "linestyle": LINES[place]} | ({} if markers else {"marker": ""}),
+            **{**style.look(place), "linestyle": style.LINES[place]}
+            | ({} if markers else {"marker": ""}),
         )
         for place, k in enumerate(chosen)
     ]
@@ -307,4 +303,4 @@ def _depth(data: Aggregate, cell: Cell, k: int) -> str:
 
 
 def _cell_label(cell: Cell) -> str:
-    return f"H = {cell.hurst:g}, {gamma_label(cell.work_of_adhesion)}"
+    return f"H = {cell.hurst:g}, {style.gamma_label(cell.work_of_adhesion)}"

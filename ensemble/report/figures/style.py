@@ -209,7 +209,6 @@ class PublishedFigure(Figure):
         return found
 
     def _repr_png_(self) -> bytes:
-        """Return the figure as a picture, for notebooks."""
         stream = io.BytesIO()
         self.savefig(stream, format="png", dpi=_DPI_OF_NOTEBOOK)
         return stream.getvalue()

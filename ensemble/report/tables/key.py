@@ -10,7 +10,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.interval import Estimate
-from adhesis.ensemble.quantities import AXIS_UNITS, common_unit
+from adhesis.ensemble.quantities import UNITS, common_unit
 from adhesis.ensemble.report.tables.table import Format, TableColumn, Value, at_least_0, number
 
 
@@ -48,8 +48,7 @@ def axis_columns(
     columns = []
     for axis in axes:
         shown, size = common_unit(axis.name, axis.values)
-        unit = AXIS_UNITS.get(axis.unit, "")
-        shown = shown or unit
+        unit = UNITS.get(axis.name, "")
         columns.append(
             TableColumn(
                 f"{axis.name} [{unit.replace('²', '^2')}]" if unit else axis.name,
@@ -105,7 +104,7 @@ def estimated(
         columns.append(
             TableColumn(
                 f"{name}{unit}" if part == "value" else f"{name}_{part}{unit}",
-                estimate(name, attribute) if of is None else partial(_part, of, attribute),
+                partial(_part, of or (lambda cell: cell.estimates[name]), attribute),
                 _HEADINGS.get(part, heading) if heading else "",
                 formats.get(part, show or number(unit=size)),
                 last=last,

@@ -151,7 +151,6 @@ def _of_audit(value: Callable[[Array], Any]) -> Callable[[Cell], float | None]:
 
 
 def _pull_off_stress(cell: Cell) -> float:
-    """Return the mean of the dimensionless pull-off stress."""
     scale = stress_scale(cell.campaign, cell.values["h_max"])
     return float((cell.values["pull_off_stress"] / scale).mean())
 
@@ -213,15 +212,13 @@ def beside_the_paper(data: Aggregate) -> Table:
     columns = (
         *key_columns(data),
         TableColumn("n", attrgetter("done"), "n"),
-        TableColumn("loss_dimensionless", estimate("loss_dimensionless"), "W~", number()),
-        TableColumn("ci_low", estimate("loss_dimensionless", "low"), "95 % from", number()),
-        TableColumn("ci_high", estimate("loss_dimensionless", "high"), "to", number()),
+        *estimated("loss_dimensionless", "value ci_low ci_high", "W~"),
         TableColumn("paper", papers_loss, "paper", fixed(2)),
         TableColumn(
-            *("deviation", _off_the_paper),
+            *("deviation", off_the_paper),
             *("W~ off the paper by", partial(rounded_percent, sign="+")),
         ),
-        TableColumn("inside", _inside, "paper in the interval"),
+        TableColumn("inside", inside_interval, "paper in the interval"),
     )
     cells = [
         cell
@@ -233,13 +230,13 @@ def beside_the_paper(data: Aggregate) -> Table:
     return make_table("Beside the paper's Table 1", columns, cells)
 
 
-def _off_the_paper(cell: Cell) -> float | None:
-    """Return the relative deviation of the mean loss from the paper's."""
-    value = papers_loss(cell)
+def off_the_paper(cell: Cell) -> float | None:
+    """Return the relative deviation of the mean loss from the paper's; None without either."""
+    value = papers_loss(cell) if cell.done else None
     return None if value is None else cell.estimates["loss_dimensionless"].mean / value - 1
 
 
-def _inside(cell: Cell) -> str | None:
+def inside_interval(cell: Cell) -> str | None:
     """Whether the paper's value lies in the interval of the mean; None if either is unknown."""
     value, loss = papers_loss(cell), cell.estimates["loss_dimensionless"]
     if value is None or np.isnan(loss.low):
@@ -350,3 +347,25 @@ def companions(data: Aggregate) -> Table:
         and (pair := difference(cell, other)) is not None
     ]
     return make_table("Beside other campaigns", columns, pairs)
+
+
+def works(data: Aggregate) -> Table:
+    """What approach gains and separation spends: docs/theory.md, section 8."""
+    per_contact = {
+        "effective_work_of_approach": "per contact: approach (mJ/m²)",
+        "effective_work_of_separation": "separation (mJ/m²)",
+        "loss_per_contact": "loss (mJ/m²)",
+    }
+    columns = [
+        *key_columns(data),
+        TableColumn("n", attrgetter("done"), "n"),
+        *estimated("work_gained", "mean", "gained on approach (mJ/m²)", **_MILLI),
+        *estimated("work_spent", "mean", "spent on separation (mJ/m²)", **_MILLI),
+        *estimated("largest_contact_fraction", "mean", "largest A/A0"),
+        *estimated("largest_contact_fraction", "ci_low ci_high"),
+    ]
+    for name, heading in per_contact.items():
+        columns += estimated(name, "mean", heading, **_MILLI)
+        columns += estimated(name, "ci_low ci_high", **_MILLI)
+    columns += estimated("full_contact_energy", "mean", "full contact (mJ/m²)", **_MILLI)
+    return make_table("Work of approach and separation", columns, data.cells)

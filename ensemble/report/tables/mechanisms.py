@@ -28,7 +28,6 @@ from adhesis.solver.model.jump import JUMP_KINDS
 
 
 def _kinds(data: Aggregate) -> list[int]:
-    """Return the places in JUMP_KINDS of the kinds that any cell has."""
     return np.flatnonzero(np.any([cell.jumps.number for cell in data.cells], axis=0)).tolist()
 
 

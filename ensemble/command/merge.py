@@ -11,7 +11,6 @@ import sys
 from pathlib import Path
 
 from adhesis.ensemble.errors import WriteError
-from adhesis.ensemble.exit_codes import WRITE_FAILED
 
 EXAMPLES = (
     "adhesis merge part1.h5 part2.h5 --out all.h5",
@@ -38,17 +37,13 @@ def execute(args: argparse.Namespace) -> int:
 
     out = args.out
     check_results_file("--out", out)
-    try:
-        with RunLock(out) as lock:
-            lock.acquire(1, 10.0)
-            try:
-                merged = merge(args.parts, out)
-            except WriteError:
-                lock.release()  # nobody else writes
-                raise
-    except WriteError as error:
-        print(f"adhesis merge: {error}; the same command resumes", file=sys.stderr)
-        return WRITE_FAILED
+    with RunLock(out) as lock:
+        lock.acquire(1, 10.0)
+        try:
+            merged = merge(args.parts, out)
+        except WriteError as error:
+            lock.release()  # nobody else writes
+            raise WriteError(f"{error}; the same command resumes") from error
     for doubt in merged.doubts:
         print(f"adhesis merge: {doubt}", file=sys.stderr)
     failed = f", {merged.failed} failed" if merged.failed else ""

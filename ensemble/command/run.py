@@ -12,23 +12,13 @@ from __future__ import annotations
 import argparse
 import os
 import time
-import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
-from adhesis.ensemble.command.streams import OutputError, write_line
-from adhesis.ensemble.errors import InputError, WriteError, lack
-from adhesis.ensemble.exit_codes import (
-    BAD_INPUT,
-    DONE,
-    INTERRUPTED,
-    OUR_ERROR,
-    RESUME,
-    SOME_FAILED,
-    TOO_FEW_RESOURCES,
-    WRITE_FAILED,
-)
+from adhesis.ensemble.command.streams import write_line
+from adhesis.ensemble.errors import InputError, OutputError
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import log
 
@@ -125,35 +115,29 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
             processes = _checked_ranks(args.ranks) - 1
         comm = world()
         code = _run(args, comm, processes, started, engine)
-        return code if comm.rank == 0 else DONE
+        return code if comm.rank == 0 else exit_codes.DONE
     except InputError as error:
         if comm.size == 1:
             raise
         if comm.rank == 0:
             write_line(f"adhesis run: {error}")
         if not wait_for_all(comm, _ALL_ARRIVE):  # the error is of this rank alone
-            _end_job(comm, BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
-        return BAD_INPUT if comm.rank == 0 else DONE
-    except WriteError as error:
-        _end_job(comm, WRITE_FAILED, f"adhesis run: {error}; what was done is kept")
-        os._exit(WRITE_FAILED)  # at an orderly exit HDF5 would try to write again, and crash
-    except KeyboardInterrupt:
-        text = "adhesis run: interrupted; what was done is kept, run the same command to resume"
-        _end_job(comm, INTERRUPTED, text)
-        return INTERRUPTED
+            _end_job(comm, exit_codes.BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
+        return exit_codes.BAD_INPUT if comm.rank == 0 else exit_codes.DONE
     except BaseException as error:
         if args.dry_run and isinstance(error, (BrokenPipeError, OutputError)):
             raise
-        if sentence := lack(error):
-            _end_job(comm, TOO_FEW_RESOURCES, f"adhesis run: {sentence}; what was done is kept")
-            return TOO_FEW_RESOURCES
-        traceback.print_exc()
-        _end_job(comm, OUR_ERROR)
-        return OUR_ERROR
+        code, sentence = exit_codes.ended_by(error)
+        if sentence:
+            again = ", run the same command to resume" if code == exit_codes.INTERRUPTED else ""
+            sentence = f"adhesis run: {sentence}; what was done is kept{again}"
+        _end_job(comm, code, sentence)
+        if code == exit_codes.WRITE_FAILED:
+            os._exit(code)  # at an orderly exit HDF5 would try to write again, and crash
+        return code
 
 
 def _checked_ranks(ranks: int) -> int:
-    """Return how many ranks are to be started (InputError)."""
     from adhesis.ensemble.run.launch import check_ranks
     from adhesis.ensemble.run.ranks import launched
 
@@ -185,7 +169,7 @@ def _run(
     path = args.out or Path(f"{args.campaign.stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
-        return _tell_price(campaign, path, args, engine) if comm.rank == 0 else DONE
+        return _tell_price(campaign, path, args, engine) if comm.rank == 0 else exit_codes.DONE
     if args.part and not args.out:
         raise InputError("--part needs --out: every part has a results file of its own")
     options = Options(
@@ -201,8 +185,8 @@ def _run(
     except Unresponsive as error:
         # Nobody can be waited for: what is in flight is lost, the results file is sound.
         text = f"adhesis run: {error}; what was done is kept, {_again(options)}"
-        _end_job(comm, RESUME, text)
-        return RESUME
+        _end_job(comm, exit_codes.RESUME, text)
+        return exit_codes.RESUME
     if comm.rank == 0:
         _report_end(campaign, path, summary, options)
     return _code(summary, options)
@@ -225,7 +209,6 @@ def _again(options: Options) -> str:
 
 
 def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Options) -> None:
-    """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
@@ -250,18 +233,17 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Optio
 
 
 def _code(summary: Summary, options: Options) -> int:
-    """Return the exit code of a run."""
     too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
     if summary.pending and not too_many:
-        return RESUME
-    return SOME_FAILED if summary.failed else DONE
+        return exit_codes.RESUME
+    return exit_codes.SOME_FAILED if summary.failed else exit_codes.DONE
 
 
 def _tell_price(
     campaign: Campaign, path: Path, args: argparse.Namespace, engine: Engine | None
 ) -> int:
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
-    from adhesis.ensemble.run.price import as_text, price
+    from adhesis.ensemble.run.price import price
     from adhesis.ensemble.run.session import Engine
 
     engine = engine or Engine()
@@ -285,8 +267,8 @@ def _tell_price(
         prepare=prepare,
         on_pilot=tried,
     )
-    print(as_text(estimate))
-    return DONE
+    print(estimate)
+    return exit_codes.DONE
 
 
 def _selection(args: argparse.Namespace) -> Any:
