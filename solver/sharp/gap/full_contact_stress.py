@@ -138,11 +138,12 @@ class StressSource:
 
 def patches_between(gaps: Array) -> Array:
     """Return the patches between gaps, shape (L, 2), by their left edges, which are in [0, 2π)."""
-    ends = gaps.ravel()
-    patches = np.concatenate([ends[-1:] - 2 * np.pi, ends[:-1]]).reshape(-1, 2)
-    patches -= np.floor(patches[:, :1] / (2 * np.pi)) * 2 * np.pi
-    first = int(np.argmin(patches[:, 0]))
-    return np.concatenate([patches[first:], patches[:first]])
+    patches = np.empty_like(gaps)
+    left, edges, ends = patches[:, 0], patches.ravel(), gaps.ravel()
+    edges[0], edges[1:] = ends[-1] - 2 * np.pi, ends[:-1]
+    patches -= 2 * np.pi * np.floor(left / (2 * np.pi))[:, None]
+    first = int(left.argmin())
+    return patches if first == 0 else np.concatenate([patches[first:], patches[:first]])
 
 
 def _to_chebyshev(nodes: Array) -> Array:
