@@ -40,12 +40,3 @@ def test_openings_at_fine_nodes_are_sums_of_their_modes(field: Field, k: int) ->
         assert (size + 1) % 4 == 0
     if k == 2:  # of many nodes
         assert all(any((size + 1) % factor == 0 for size in sizes) for factor in (9, 10, 15))
-
-
-@pytest.mark.parametrize("count", [12, 16, 24, 64, 96, 520, 600, 640, 768, 900, 1000])
-def test_modes_are_summed_at_any_number_of_nodes(field: Field, count: int) -> None:
-    modes = np.random.default_rng(count).normal(size=count - 1)
-    theta, opening = field.refine_opening(2, modes, 1)
-    assert count - 1 <= len(theta) < 1.52 * count
-    exact = field.sum_modes(2, theta, modes)
-    np.testing.assert_allclose(opening, exact, atol=1e-12 * count)
