@@ -33,7 +33,6 @@ from adhesis.solver.loading.zero_range import (
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Jump
-from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
@@ -277,22 +276,6 @@ def test_the_narrowest_length_is_beside_an_edge_that_moves(before, after, narrow
     assert _narrowest_moved(np.array(before), np.array(after), 1.0) == pytest.approx(narrowest)
 
 
-@pytest.mark.parametrize(
-    ("values", "peaks"),
-    [
-        ([9, 2, 5, 2, 9, np.nan, np.nan], [2]),  # between two edges
-        ([3, 9, np.nan, np.nan, 9, 2, 5], [6]),  # over the end of the period
-        ([9, 2, 5, 4, 7, 2, 9, np.nan], [4, 2]),  # the highest first
-        ([9, 5, 4.99, 5, 9, np.nan], []),  # falls from both edges
-        ([9, 5, 5.01, 5, 9, np.nan], []),  # stands out by less than a hundredth
-        ([np.nan, 5, np.nan, 3, 2, np.nan], []),  # its neighbours have no values
-        ([-3, -4, -2, -5, -1, np.nan], []),  # compression
-    ],
-)
-def test_peaks_stand_out_from_what_lies_beside_them(values, peaks):
-    assert highest_peaks(np.array(values, dtype=float), 5) == peaks
-
-
 # ---------------------------------------------------------------------- ranges at edges and touches
 
 
@@ -469,8 +452,3 @@ def test_full_contact_bounds_the_range_beyond_the_turn():
     gap = 0.01 * loop.problem.profile.h_max
     assert gap < loop.touch_range
     assert 0 < loop.turn_range < gap
-
-
-def test_without_adhesion_no_jump_lies_beyond():
-    loop = run_loop(method_of(rough(), 1e7, 0.0), max_penetration=0.5, load_steps=4)
-    assert loop.turn_range == math.inf
