@@ -18,7 +18,6 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
-from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
 SOLID = HalfSpace(1e6, 0.5)
@@ -218,15 +217,6 @@ def test_under_a_load_the_solid_falls_off_at_the_largest_tension_of_the_larger_w
     tension = -opens.mean_stress(np.linspace(1e-3, 0.4, 40_000) * PERIOD).min()
     assert loop.pull_off_stress == pytest.approx(tension, rel=1e-5)
     assert abs(loop.audit_residual) < 1e-5
-
-
-def test_an_edge_that_has_begun_to_move_limits_no_step() -> None:
-    """The edge beyond its opening does not; of the two others the nearer one does."""
-    share, rate = np.array([1.0 + 1e-12, 0.4, 0.9, np.nan]), np.array([5.0, 3.0, 0.5, np.nan])
-    edges = PinnedEdges(share, rate)
-    assert edges.distance(1.0) == pytest.approx(0.2)
-    assert edges.distance(-1.0) == pytest.approx(0.4 / 3)
-    assert PinnedEdges(share[:1], rate[:1]).distance(1.0) == np.inf
 
 
 def test_a_loop_under_a_load_does_not_creep() -> None:
