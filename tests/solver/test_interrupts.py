@@ -136,13 +136,3 @@ def test_an_interrupt_that_meets_the_start_of_a_thread_arrives_as_itself(monkeyp
     monkeypatch.setattr(threading, name, interrupted_start)
     with pytest.raises(Interrupt):
         uninterrupted(lambda: time.sleep(0.2))()
-
-
-def test_uninterrupted_work_returns_and_raises_as_it_does_by_itself():
-    @uninterrupted
-    def divide(a: float, *, by: float) -> tuple[float, bool]:
-        return a / by, threading.current_thread() is threading.main_thread()
-
-    assert divide(6, by=3) == (2.0, False)
-    with pytest.raises(ZeroDivisionError):
-        divide(1, by=0)
