@@ -252,18 +252,6 @@ def test_a_mean_stress_that_a_branch_does_not_have_is_refused(tmp_path):
         again.at_stress(100.0)
 
 
-def test_a_loss_under_a_weight_says_so_where_it_stands():
-    weight = run_loop(make_method("sharp", rough(Control(0.0))), max_stress=PRELOAD, load_steps=5)
-    note = f"under a weight; it falls off at {1e-3 * weight.pull_off_stress:.3g} kPa: drops before"
-    (line,) = (line for line in str(weight).splitlines() if line.startswith("loss"))
-    assert note in line
-    assert "under a weight" in repr(weight)
-    assert note in weight._repr_html_()
-    machine = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=5)
-    assert machine.loss_note == ""
-    assert "weight" not in str(machine) + repr(machine) + machine._repr_html_()
-
-
 def test_a_closing_drop_that_is_negative_is_doubted():
     profile = self_affine_profile(0.8, period=1e-3, n0=3, ratio=6, seed=4, h_rms=1e-6)
     for max_stress, count in ((500.0, 0), (2000.0, 1)):  # the same branch, turned early and late
