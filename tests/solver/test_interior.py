@@ -234,7 +234,7 @@ def test_either_reason_makes_a_loss_doubtful():
 def test_without_adhesion_nothing_bounds_the_range():
     loop = run_loop(method_of(rough(), 1e7, 0.0), max_penetration=0.5, load_steps=4)
     assert loop.interior is None
-    assert loop.valid_range == math.inf
+    assert loop.valid_range == loop.turn_range == math.inf
     assert loop.warnings == ()
 
 
