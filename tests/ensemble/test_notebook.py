@@ -326,13 +326,6 @@ def test_units_are_asked_for_on_every_way_in(tmp_path):
     assert adhesis.Campaign(with_unit).tables.sweep.work_of_adhesion == (0.04,)
 
 
-def test_what_a_campaign_computes_cannot_be_changed(campaign):
-    """Ranks compute its text, and one process its tables."""
-    for name in ("text", "tables"):
-        with pytest.raises(AttributeError):
-            setattr(campaign, name, None)
-
-
 def _inside_itself():
     values: list[Any] = [0.7]
     values.append(values)
