@@ -165,14 +165,6 @@ def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
     assert reported.seconds == pytest.approx(cost(campaign.tasks()[6]) + cost(campaign.tasks()[7]))
 
 
-def test_a_results_file_of_another_campaign_is_refused(tmp_path):
-    path = tmp_path / "r.h5"
-    create(path, parse_campaign(campaign_text()))
-    other = parse_campaign(campaign_text(period="2e-3"))
-    with pytest.raises(InputError, match=r"r\.h5 holds another campaign: .*period"):
-        price(other, path, compute=compute)
-
-
 def test_loops_on_one_loading_branch_are_tried_together(monkeypatch):
     """Time is up within the first three loops: they are gone through, and no others."""
     clock = iter(range(100))
