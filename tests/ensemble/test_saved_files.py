@@ -60,17 +60,6 @@ def test_other_programs_open_a_saved_file(
         np.testing.assert_array_equal(file["separation"], loop.separation)
 
 
-def test_what_was_loaded_is_saved_as_the_same_file(content: bytes, tmp_path: Path) -> None:
-    path, again = tmp_path / "loop.nc", tmp_path / "again.nc"
-    path.write_bytes(content)
-    once = adhesis.load(path)
-    once.save(again)
-    twice = adhesis.load(again)
-    assert twice == once
-    assert twice.method == once.method
-    assert twice.to_xarray().identical(once.to_xarray())
-
-
 def test_a_bit_that_is_flipped_is_found(content: bytes, tmp_path: Path) -> None:
     path, draw = tmp_path / "loop.nc", random.Random(5)
     for _ in range(1000):
