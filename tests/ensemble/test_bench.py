@@ -18,7 +18,6 @@ from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megab
 from adhesis.ensemble.bench.scenes import (
     GROWTH,
     ONE_WAVE,
-    PAPER,
     SMALL_ROUGH,
     TWO_WAVES,
 )
@@ -93,14 +92,6 @@ def test_exponents_are_those_of_the_times():
     assert (waves.variable, waves.least, waves.most) == ("wave numbers", 1000, 10_000)
     assert waves.of_loop == pytest.approx(np.log10(5))
     assert waves.of_solution == pytest.approx(0, abs=1e-9)
-
-
-def test_paper_scale_is_the_paper_s():
-    profile = PAPER.problem().profile
-    assert profile.highest_harmonic == 1000
-    assert profile.h_rms == pytest.approx(1e-6)
-    assert (PAPER.max_penetration, PAPER.load_steps, PAPER.work_of_adhesion) == (0.9, 40, 0.04)
-    assert max(scene.n0 * scene.ratio for scene in GROWTH) == 100_000
 
 
 def test_one_wave_is_measured_against_its_exact_loss():
