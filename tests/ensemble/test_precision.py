@@ -109,12 +109,6 @@ def test_a_cell_is_described_with_quantity_both_ends_and_verdict():
     assert "… and 5 more" in many[-1]
 
 
-def test_looks_are_after_the_first_and_every_batch():
-    assert looks(8, 4, 20) == [8, 12, 16, 20]
-    assert looks(8, 5, 20) == [8, 13, 18, 20]
-    assert looks(8, 4, 8) == [8]
-
-
 def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
     rng = np.random.default_rng(2)
     losses = rng.normal(1, 0.2, 200)
@@ -134,17 +128,6 @@ def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
     assert 1.98 * rare.std(ddof=1) / np.sqrt(rare.size) / rare.mean() < 0.06
     assert not precision(rare, 0.07).narrow
     assert enough(np.full(200, np.nan), at, 0.05) == 200  # all failed: there is an end
-
-
-def test_a_wide_look_starts_the_count_of_looks_again():
-    """Two narrow looks lapse when a large loss makes the next one wide."""
-    at = looks(8, 8, 200)
-    losses = np.tile([0.9, 1.1], 100)
-    losses[40] = 1.6  # seen first at the look at 48
-    found = [precision(losses[:n], 0.045).narrow for n in at]
-    assert found[:7] == [False, False, False, True, True, False, True]  # 8, 16, … 56 realisations
-    assert all(found[6:])
-    assert enough(losses, at, 0.045) == at[9]
 
 
 @pytest.mark.parametrize(
