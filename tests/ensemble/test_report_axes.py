@@ -17,7 +17,6 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.catalogue import sections
-from adhesis.ensemble.report.figures.loops import _bands
 from adhesis.ensemble.report.figures.style import style
 from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.report.tables.works import works
@@ -243,16 +242,6 @@ def test_units_are_those_in_which_the_campaign_was_written(tmp_path):
     heading, _, first, *_ = losses(aggregate(path)).markdown().splitlines()
     assert [cell.strip() for cell in heading.split("|")[2:4]] == ["γ (mJ/m²)", "h_rms (µm)"]
     assert [cell.strip() for cell in first.split("|")[2:4]] == ["10", "0.5"]
-
-
-def test_a_curve_that_ends_early_has_its_shading():
-    """A loop that turns at a stress has no states beyond: its curve is NaN there."""
-    x = np.array([0.0, 1.0, 2.0, np.nan])
-    ((middle, low, high),) = _bands(x, x + 1, x + 2)
-    assert middle[0] < 0.1
-    assert middle[-1] > 1.9
-    assert high - low == pytest.approx(np.ones(low.size), abs=0.1)
-    assert _bands(x[3:], x[3:], x[3:]) == []
 
 
 def test_spectra_are_of_cells_that_have_fields(tmp_path):
