@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
-from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import field_plan
@@ -296,24 +295,6 @@ def test_seeds_are_a_promise():
     """Written down: a release that changes them would break every campaign that is to grow."""
     tasks = parse_campaign(campaign_text(seed="0")).tasks()
     assert [t.seed for t in tasks[:2]] == [4232842298785526, 2383740928328724]
-
-
-def test_tasks_by_number_are_those_by_column():
-    campaign = parse_campaign(campaign_text(realisations="3", **AXES))
-    for part in (WHOLE, Part(2, 5)):
-        tasks = campaign.tasks(part)
-        assert len(tasks) == len(list(tasks)) == campaign.rows(part).size
-        for name in ("hurst", "work_of_adhesion", "realisation", "seed"):
-            assert tasks.column(name).tolist() == [getattr(task, name) for task in tasks]
-        for name in tasks.names:
-            assert tasks.column(name).tolist() == [dict(task.others)[name] for task in tasks]
-        first = {}
-        for task in tasks:
-            first.setdefault(task.cell, task)
-        assert list(tasks.of_cells()) == list(first.values())
-    assert list(tasks[1:3]) == [tasks[1], tasks[2]]
-    with pytest.raises(IndexError):
-        tasks[len(tasks)]
 
 
 def test_too_many_tasks_are_counted_and_not_made():
