@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import importlib.util
 import json
 import os
 import re
 import signal
-import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,7 +19,6 @@ from matplotlib.image import imread
 from adhesis import Control, Problem, make_method, run_loop, self_affine_profile
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.run.dispatch import Unresponsive
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import (
     COVERAGE,
@@ -37,10 +33,10 @@ from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
 from adhesis.ensemble.trace.variants import Plan, Run, make_plan
+from benchmarks.trace_coverage import case, judged
 from tests.support.scenes import HALF_SPACE
-from tools.interrupted import Interrupt, interrupted
+from tools.interrupted import Interrupt
 
-ROOT = Path(__file__).parents[2]
 N, LENGTH = 400, 1e-3
 PROFILE = self_affine_profile(0.8, period=LENGTH, n0=4, ratio=6, seed=2, h_rms=1e-6)
 X = LENGTH / N * np.arange(N)
@@ -485,24 +481,6 @@ def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
             os.kill(pid, 0)
 
 
-def test_a_process_that_hangs_leaves_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    trace, cycle, plan = small_plan()
-
-    def hang(*_: object) -> None:
-        raise Unresponsive("rank 1 has not answered for 120 s")
-
-    monkeypatch.setattr(Loops, "run", hang)
-    with pytest.raises(NoAnswer, match="rank 1 has not answered for 120 s"):
-        run_plan(trace, cycle, plan)
-
-
-def test_a_loop_of_a_trace_that_is_interrupted_has_not_failed() -> None:
-    """Where it runs in this process: its own failures are words, an interrupt is none of them."""
-    trace, cycle, plan = small_plan()
-    ended = {interrupted(lambda: run_plan(trace, cycle, plan), t) for t in (1e-4, 0.1, 0.2, 0.3)}
-    assert ended <= {"raised", "done"}
-
-
 def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     """And are priced before any work, with a word on what would be cheaper."""
     n = 100_000
@@ -525,22 +503,10 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     assert seconds == sorted(seconds, reverse=True)  # the longest first
 
 
-@pytest.fixture(scope="module")
-def coverage() -> ModuleType:
-    path = ROOT / "benchmarks" / "trace_coverage.py"
-    spec = importlib.util.spec_from_file_location("trace_coverage", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["trace_coverage"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.usefixtures("quick_figures")
-def test_known_losses_lie_within_their_intervals(coverage: ModuleType, tmp_path: Path) -> None:
+def test_known_losses_lie_within_their_intervals(tmp_path: Path) -> None:
     """A case of the benchmark with fewer waves; all of it: benchmarks/trace_coverage.py."""
-    row = coverage.judged(coverage.case(1, waves=40), tmp_path)
+    row = judged(case(1, waves=40), tmp_path)
     assert row["loss"]["covered"], row
     assert row.keys() >= set(answers.QUANTITIES)
 
