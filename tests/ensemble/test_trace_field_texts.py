@@ -48,35 +48,15 @@ def put(path: Path, text: str | Iterable[str] | bytes, encoding: str = "utf-8") 
 
 
 Options = dict[str, object]
+# Other encodings, delimiters, quotes, blanks and headers: test_trace_variations.py.
 READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
-    "a sampling length above the step": (
-        ["Sampling length: 0.8 mm", "Pitch: 0.5 um", "Z (um)", *ZS],
-        {},
-    ),
-    "a height of a step": (["Step height: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}),
-    "a mean spacing": (["RSm (mean spacing): 21.4 um", "dx = 0.5 um", "Z (um)", *ZS], {}),
-    "a pitch of the rows": (["Pitch Y: 5 um", "Pitch X: 0.5 um", "Z (um)", *ZS], {}),
-    "a cut-off": (["Z (um)", "Cut-off (mm): 0.8", "Step (um): 0.5", *ZS], {}),
-    "quoted": (['"x (um)","z (um)"', *(f'"{x}","{z}"' for x, z in PAIRS)], {}),
-    "a quoted column": ([UM, *(f'"{x}",{z}' for x, z in PAIRS)], {}),
     "quoted, decimal commas": (
         [UM, *(f'"{x}","{z}"'.replace(".", ",") for x, z in PAIRS)],
         {},
     ),
     "quoted names with delimiters": (['"x, along (um)","z, up (um)"', *TWO], {}),
-    "CR CR LF": ("\r\r\n".join([UM, *TWO, ""]), {}),
-    "a blank line after each row": ([UM, "", *(f"{row}\n" for row in TWO)], {}),
-    "a blank line after each height": (["dx: 0.5 um", "z (um)", "", *(f"{z}\n" for z in ZS)], {}),
-    "a blank line after two rows": ([UM, *(r + k % 2 * "\n" for k, r in enumerate(TWO))], {}),
     "rows of empty fields between": (["x (um)\tz (um)", *(f"\t\n{x}\t{z}" for x, z in PAIRS)], {}),
-    "rows of empty fields below": ([UM, *TWO, *[","] * 5], {}),
-    "rows of empty fields within": ([UM, *TWO[:50], ",", ",", *TWO[50:]], {}),
-    "empty columns": (["Lateral um,Height um,", *(f"{row},," for row in TWO)], {}),
     "an empty column before": ([f",{UM}", *(f",{row}" for row in TWO)], {}),
-    "a first column that counts": (
-        ["Pitch: 0.5 um", "No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
-        {},
-    ),
     "a count and an interval in quotes": (
         [
             '"Measurement data interval","0.5","um"',
@@ -89,14 +69,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {"columns": [2], "step": STEP},
     ),
-    "signs for units": (["x (㎛),z (㎛)", *TWO], {}),
-    "signs for other units": (
-        ["x (㎜);z (㎚)", *(f"{float(x) / 1e3:.6f};{1e3 * float(z):.3f}" for x, z in PAIRS)],
-        {},
-    ),
-    "names with numbers": (["X1 (um),Z1 (um)", *TWO], {}),
-    "names with a delimiter behind": (["x [um],z [um],", *(f"{row}," for row in TWO)], {}),
-    "a minus sign of typesetters": ([UM, *(row.replace("-", "\u2212") for row in TWO)], {}),
     "a column that marks": (
         ["X;Z;valid", "[um];[um];[1/0]", *(f"{row.replace(',', ';')};1" for row in TWO)],
         {"columns": [1, 2]},
@@ -109,7 +81,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
-    "Korean, with a unit": ("\n".join(["위(㎛),높이(㎛)", *TWO]).encode("cp949"), {"unit": "um"}),
     "an option against a line that names no column": (
         ["Evaluation length in mm", *TWO],
         {"unit": "um"},
@@ -119,7 +90,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["dx: 500 nm", "Z (nm)", *(f"{1e3 * float(z):.3f}".replace(".", ",") for z in ZS)],
         {},
     ),
-    "Latin-1": ("\n".join(["Höhe x [µm],z [µm]", *TWO]).encode("latin-1"), {}),
 }  # fmt: skip
 
 
