@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
-import adhesis
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
@@ -256,24 +255,6 @@ def test_the_reference_of_commands_is_that_of_the_parsers() -> None:
     text = commands_page.PAGE.read_text()
     assert re.findall(r"^## adhesis (\w+)$", text, re.MULTILINE) == list(COMMANDS)
     assert text == commands_page.page(text)
-
-
-def test_the_entries_to_cite_are_those_of_the_citation_file() -> None:
-    cited = yaml_lines((ROOT / "CITATION.cff").read_text())
-    text = (ROOT / "docs" / "citing.md").read_text()
-    entries = next(b.text for b in blocks(ROOT / "docs" / "citing.md") if b.language == "bibtex")
-    for value in cited:
-        assert value in " ".join(entries.split()), value
-    assert f"version = {{{adhesis.__version__}}}" in entries
-    assert "CITATION.cff" in text
-
-
-def yaml_lines(text: str) -> list[str]:
-    """Return what of the citation file an entry has to hold."""
-    folded = re.sub(r"title: >-\n +", "title: ", text)
-    names = "title|family-names|given-names|journal|volume|year|doi"
-    found = re.findall(rf"^ +(?:- )?(?:{names}): (.*)$", folded, re.MULTILINE)
-    return [value.strip('"') for value in found]
 
 
 def test_exit_codes_of_the_page_are_those_of_the_commands() -> None:
