@@ -287,21 +287,6 @@ def test_a_second_job_touches_nothing_of_the_first(real: Site) -> None:
     assert not staged(real).exists()
 
 
-def test_a_job_waits_for_the_run_of_a_script_that_was_killed(real: Site) -> None:
-    first = real.start(STAGING="disk1")
-    wait_until(lambda: done_rows(staged(real)) == 3)
-    first.kill()
-    first.wait()
-    refused = real.start("--patience", "0", STAGING="disk1")
-    assert refused.wait(60) == 2  # the run goes on alone
-    second = real.start("--patience", "60", STAGING="disk1")
-    (real.folder / "free").touch()
-    text, _ = second.communicate(timeout=120)
-    assert second.returncode == 0, text
-    assert "40 of 40 tasks done; 0 computed" in text
-    assert done_rows(real.folder / "s.h5") == 40
-
-
 def test_rows_of_a_killed_run_come_back(real: Site) -> None:
     first = real.start(STAGING="disk1", LAUNCHER="setsid --wait")
     wait_until(lambda: done_rows(staged(real)) == 3)
