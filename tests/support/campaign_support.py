@@ -142,18 +142,6 @@ def start(
     )
 
 
-def start_python(*words: object) -> subprocess.Popen[str]:
-    """Start this interpreter in an environment in which it can start ranks."""
-    return subprocess.Popen(
-        [sys.executable, *map(str, words)],
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-
-
 def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]:
     """Run this interpreter to its end, in an environment in which it can start ranks."""
     return subprocess.run(
