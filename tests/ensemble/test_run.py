@@ -414,6 +414,14 @@ def test_the_deadline_of_the_batch_system():
     assert deadline(None, 5.0, {}) is None
 
 
+def test_workers_have_as_long_to_answer_as_the_walltime_leaves(tmp_path):
+    campaign = load_campaign(write_campaign(tmp_path))
+    plan = Plan(campaign.tasks(), [0], 0, 0)
+    for options, grace in ((Options(), 30.0), (Options(deadline=deadline(70.0, 0.0, {})), 3.5)):
+        found = session._Session(campaign, plan, None, options, StopSignals(), Engine())
+        assert found._limits.grace == pytest.approx(grace)
+
+
 def test_a_clock_that_is_set_back_does_not_move_the_walltime(tmp_path, monkeypatch):
     campaign = load_campaign(write_campaign(tmp_path))
     plan = Plan(campaign.tasks(), [0], 0, 0)
