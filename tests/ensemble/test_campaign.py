@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Iterator
 
@@ -14,9 +15,11 @@ from hypothesis import strategies as st
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
+from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.task.compute import make_problem
+from adhesis.ensemble.task.compute import check_task, make_problem
 from adhesis.ensemble.task.fields import field_plan
+from adhesis.solver.model.pattern import stripes
 from tests.support.campaign_support import ROOT, campaign_text
 from tests.support.wrong_values import outside
 
@@ -430,12 +433,48 @@ def test_fields_under_a_load_are_kept_at_parts_of_it():
     assert plan.max_stress == 300
 
 
-def test_the_strength_of_the_interface_is_a_key_of_the_material_and_may_be_an_axis():
-    text = campaign_text(poisson="0.5\nadhesion_range = [1e-8, 2e-8]")
-    campaign = parse_campaign(text)
-    assert campaign.material.opens
-    assert not parse_campaign(campaign_text()).material.opens
-    found = {make_problem(campaign, task).strength for task in campaign.tasks()}
-    assert found == {0.01 / 1e-8, 0.04 / 1e-8, 0.01 / 2e-8, 0.04 / 2e-8}
-    given = parse_campaign(campaign_text(poisson="0.5\nstrength = 3e6"))
-    assert {make_problem(given, task).strength for task in given.tasks()} == {3e6}
+# Keys of [material] that make an interface, γ = 0.04 J/m²; what the problems of the tasks have.
+INTERFACES: list[tuple[str, str, list[object]]] = [
+    ("", "strength", [math.inf]),
+    ("adhesion_range = [1e-8, 2e-8]", "strength", [4e6, 2e6]),
+    ("strength = 3e6", "strength", [3e6]),
+    ("", "work_of_adhesion_open", [None]),
+    ('work_of_adhesion_open = ["50 mJ/m2", 0.08]', "work_of_adhesion_open", [0.05, 0.08]),
+    ("work_of_adhesion_open = 0.04", "work_of_adhesion_open", [None]),  # also with the method grid
+    ("", "pattern", [None]),
+    ("stripes = 2\nstripe_amplitude = 0.1", "pattern", [stripes(2, 0.1)]),
+    (
+        "stripes = [2, 8]\nstripe_amplitude = [0.1, 0.3]\nstripe_phase = 0.5",
+        "pattern",
+        [stripes(n, e, 0.5) for n in (2, 8) for e in (0.1, 0.3)],
+    ),
+]
+
+
+@pytest.mark.parametrize(("keys", "name", "found"), INTERFACES)
+def test_keys_of_the_interface_reach_every_task_and_may_be_axes(keys, name, found):
+    text = campaign_text(work_of_adhesion="[0.04]", hurst="[0.8]", realisations="1")
+    if found != [None] and name == "work_of_adhesion_open":  # which the grid refuses
+        text = text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
+    campaign = parse_campaign(text.replace("poisson = 0.5", f"poisson = 0.5\n{keys}"))
+    assert [getattr(make_problem(campaign, task), name) for task in campaign.tasks()] == found
+    assert campaign.material.opens == (name == "strength" and keys != "")
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("stripes = 0\nstripe_amplitude = 0.5", r"stripes is 0: it must be"),
+        ("stripes = 2\nstripe_amplitude = 1", r"stripe.amplitude is 1.*: it must be"),
+        ("stripes = 2", "the amplitude of stripes of the work of adhesion is missing"),
+        ("stripe_phase = 1.0", "the number of stripes of the work of adhesion is missing"),
+        ("stripes = 2\nstripe_amplitude = 0.1\nstrength = 1e8", "is given beside a strength"),
+    ],
+)
+def test_stripes_that_cannot_be_are_refused_by_file_and_command(keys, message, capsys):
+    text = campaign_text(work_of_adhesion="[0.04]", poisson=f"0.5\n{keys}")
+    with pytest.raises(InputError, match=message):
+        check_task(campaign := parse_campaign(text), campaign.tasks()[0])
+    words = [f"--{key}".replace(" = ", "=").replace("_", "-") for key in keys.splitlines()]
+    assert main(["loop", "--hurst", "0.8", "--n0", "2", "--ratio", "4", *words]) == 2
+    assert re.search(message, capsys.readouterr().err)
