@@ -186,24 +186,6 @@ def test_nodes_find_what_the_series_finds():
     assert at_nodes.tension == pytest.approx(exact.tension, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("change", "times"),
-    [
-        (lambda p: p.mirrored(), 1.0),
-        (lambda p: p.shifted(0.3 * PERIOD), 1.0),
-        (lambda p: p.scaled(2.0, 2.0), 2.0),
-    ],
-    ids=["mirror", "shift", "scale"],
-)
-def test_ranges_keep_the_symmetries_of_the_problem(change, times):
-    """A profile twice as large in all lengths, with γ twice as large, has the same stresses."""
-    method = method_of(change(rough()), 1e8, 0.04 * times)
-    loop, reference = run_loop(method, max_penetration=0.9, load_steps=20), loop_of(1e8)
-    assert loop.valid_range == pytest.approx(times * reference.valid_range, rel=1e-3)
-    assert loop.edge_range == pytest.approx(times * reference.edge_range, rel=1e-3)
-    assert loop.touch_range == pytest.approx(times * reference.touch_range, rel=1e-3)
-
-
 def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
     """One sentence for the range, one for a loss that adhesion cannot explain."""
     assert loop_of(1e7).warnings == ()

@@ -141,23 +141,6 @@ def test_openings_lose_less_than_valleys_that_are_held_closed():
 
 
 @pytest.mark.parametrize(
-    ("change", "times"),
-    [
-        (lambda p: p.mirrored(), 1.0),
-        (lambda p: p.shifted(0.3 * PERIOD), 1.0),
-        (lambda p: p.scaled(2.0, 2.0), 2.0),
-    ],
-    ids=["mirror", "shift", "scale"],
-)
-def test_openings_keep_the_symmetries_of_the_problem(change, times):
-    """A profile twice as large, with γ and range twice as large, has the same strength."""
-    loop, _ = loop_of(change(rough()), 4e6, 0.04 * times)
-    reference, _ = rough_loop(4e6)
-    assert [jump.kind for jump in loop.jumps] == [jump.kind for jump in reference.jumps]
-    assert loop.loss == pytest.approx(times * reference.loss, rel=1e-3)
-
-
-@pytest.mark.parametrize(
     ("control", "turning_point"),
     [
         (Control(stiffness=3e13), {"max_penetration": 0.98}),

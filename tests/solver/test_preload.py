@@ -117,23 +117,6 @@ def test_the_turning_point_is_the_first_state_with_the_preload():
     assert loop.load_steps == np.count_nonzero(loop.load_step & (loop.branch == "loading")) - 1
 
 
-def test_a_preload_scales_with_lengths_and_stresses_and_is_the_same_in_a_mirror():
-    reference = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=20)
-    lengths, stresses = 7.0, 3.0
-    longer = Profile(PROFILE.period * lengths, PROFILE.coefficients * lengths)
-    scaled = rough(profile=longer, work_of_adhesion=GAMMA * lengths)
-    harder = rough(half_space=HalfSpace(stresses * 1e6, 0.5), work_of_adhesion=stresses * GAMMA)
-    mirror = rough(profile=Profile(PROFILE.period, PROFILE.coefficients.conj()))
-    for problem, preload, loss in (
-        (scaled, PRELOAD, lengths),
-        (harder, stresses * PRELOAD, stresses),
-        (mirror, PRELOAD, 1.0),
-    ):
-        loop = run_loop(make_method("sharp", problem), preload=preload, load_steps=20)
-        assert loop.turning_point == pytest.approx(reference.turning_point, rel=1e-6)
-        assert loop.loss / loss == pytest.approx(reference.loss, rel=1e-4)
-
-
 def test_loops_of_several_preloads_are_those_of_each_alone():
     method = make_method("sharp", rough())
     preloads = [800.0, 200.0, 1e9]
