@@ -12,12 +12,13 @@ that a crash is counted too.
 - ``trace``, ``pool``: ``loss_of_trace`` in one process, and with processes of its own
 - ``campaign``: a campaign in one process
 
-    python tools/fuzz/interrupts.py --seed N [--count 100] [--kind strong …] [--seconds S]
+    python tools/fuzz/interrupts.py --seed N [--kind strong …] [--seconds 60]
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import sys
 import tempfile
@@ -219,9 +220,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--kind", nargs="+", choices=KINDS, default=KINDS)
-    parser.add_argument("--count", type=int, default=100, help="of each kind")
-    parser.add_argument("--first", type=int, default=0, help="number of the first")
-    parser.add_argument("--seconds", type=float, default=np.inf, help="at most so long, in all")
+    parser.add_argument("--seconds", type=float, default=60.0, help="about so long, in all")
     args = parser.parse_args()
     until = time.monotonic() + args.seconds
     wrong = 0
@@ -230,7 +229,7 @@ def main() -> int:
         end = started + (until - started) / (len(args.kind) - place)
         isolated = Isolated(once, LIMIT)
         count: Counter[str] = Counter()
-        for number in range(args.first, args.first + args.count):
+        for number in itertools.count():
             if count and time.monotonic() > end:
                 break
             how, died = isolated(name, args.seed, number)
