@@ -7,14 +7,11 @@ import pytest
 
 from adhesis import Problem, self_affine_profile
 from adhesis.solver.grid import relax
-from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import Contact, ContactSolver
-from adhesis.solver.grid.edges import survey
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.grid.moves import Move
-from adhesis.solver.grid.pairs import pairs
 from adhesis.solver.model.control import Control
 from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
@@ -51,25 +48,6 @@ def exact_energy(method: GridMethod, mask: np.ndarray, separation: float) -> flo
 # ------------------------------------------------------------------ conjugate gradients
 
 
-@pytest.mark.parametrize("patches", [1, 3, 8])
-def test_conjugate_gradients_give_the_dense_solution(patches):
-    method = rough()
-    contact = method.solver.empty(0.4e-6)
-    contact.mask = random_contact(np.random.default_rng(patches), method.nodes, patches)
-    method.solver.solve(contact, 1e-8)
-    nodes = np.flatnonzero(contact.mask)
-    matrix = dense(method.lattice.elastic.kernel(), nodes, nodes)
-    exact = np.linalg.solve(matrix, method.lattice.height[nodes] - 0.4e-6)
-    assert np.abs(contact.stress[nodes] - exact).max() < 1e-6 * np.abs(exact).max()
-    assert not contact.stress[~contact.mask].any()
-    np.testing.assert_allclose(
-        contact.displacement,
-        method.lattice.elastic.displacement(contact.stress),
-        rtol=0,
-        atol=1e-16,
-    )
-
-
 def test_energy_error_is_of_second_order_in_the_residual():
     method = rough()
     mask = random_contact(np.random.default_rng(0), method.nodes, 4)
@@ -95,85 +73,6 @@ def test_stalled_iteration_is_reported():
     # Full contact at a mean gap: no solution exists.
     with pytest.raises(RuntimeError, match="full contact has no solution"):
         solver.solve(contact, 1e-12)
-
-
-# ------------------------------------------------------------------ local compliance
-
-
-def schur(kernel: np.ndarray, nodes: np.ndarray, j: int) -> float:
-    row = dense(kernel, np.array([j]), nodes)[0]
-    return float(kernel[0] - row @ np.linalg.solve(dense(kernel, nodes, nodes), row))
-
-
-def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
-    n = 1024
-    elastic = ElasticGrid(n, 2.0 * n, 1e6)
-    kernel = elastic.kernel()
-    compliance = EdgeCompliance(kernel)
-    lattice = Lattice(elastic, compliance, np.zeros(n), np.zeros(n), Control(), 1.0)
-    errors = []
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        patches = int(rng.integers(2, 7))
-        # Half of the sets have short patches and narrow gaps.
-        if seed % 2:
-            cuts = np.cumsum(rng.integers(1, 24, 2 * patches))
-        else:
-            cuts = np.sort(rng.choice(n - 1, 2 * patches, replace=False))
-        mask = np.zeros(n, dtype=bool)
-        for a, b in cuts.reshape(-1, 2):
-            mask[a:b] = True
-        contact = Contact(1.0, 1.0, mask, -np.ones(n) * mask, np.zeros(n))
-        # Unit gap, unit tension, no adhesion: the prices are S itself.
-        edges = survey(contact, lattice, -1.0)
-        for k in range(edges.side.size):
-            nodes = np.flatnonzero(mask)
-            exact = schur(kernel, nodes, int(edges.outer[k]))
-            errors.append(1 / edges.growth[k] / exact - 1)
-            rest = nodes[nodes != edges.inner[k]]
-            exact = schur(kernel, rest, int(edges.inner[k]))
-            errors.append(-edges.recession[k] / exact - 1)
-    # The worst are patches of one or two nodes far from all others, which no grid resolves anyway.
-    assert np.abs(errors).max() < 1.5e-2
-    assert np.median(np.abs(errors)) < 1e-3
-
-
-@pytest.mark.parametrize("gap", [27, 43, 70, 306, 700])
-def test_compliance_of_a_pair_of_edges_where_patches_fill_the_period(gap):
-    """Lengths are rounded, up to a few per cent longer than the period that they share."""
-    n = 1024
-    kernel = ElasticGrid(n, 1.0, 1e6).kernel()
-    for near in {(n - gap) // 3 + 1, (n - gap) // 2, n - gap - 2 - (n - gap) // 5}:
-        compliance = EdgeCompliance(kernel)
-        nodes = np.arange(gap, n)  # both patches, which are one here
-        across = dense(kernel, np.array([0, gap - 1]), nodes)
-        own = dense(kernel, np.array([0, gap - 1]), np.array([0, gap - 1]))
-        exact = own - across @ np.linalg.solve(dense(kernel, nodes, nodes), across.T)
-        found = compliance.across_gap(near, gap, n - gap - near)
-        assert np.abs(found - exact).max() < 0.05 * exact[0, 0]
-
-
-@pytest.mark.parametrize("level", [0.3e-6, 0.8e-6])
-def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level, monkeypatch):
-    method = rough()
-    contact = method.solver.empty(0.8 * level)
-    contact.mask = method.lattice.height > level
-    method.solver.solve(contact, 1e-6)
-    edges = method.relaxation.edges(contact)
-    dx = method.lattice.dx
-    monkeypatch.setattr("adhesis.solver.grid.pairs.COUPLING", np.inf)  # price them all
-    found = pairs(contact, edges, method.lattice)
-    assert {p.direction for p in found} == {1, -1}
-    now = exact_energy(method, contact.mask, contact.separation)
-    unit = 2 * dx * method.problem.work_of_adhesion
-    for pair in found:
-        moved = contact.mask.copy()
-        for k in pair.edges:
-            moved[edges.outer[k] if pair.direction > 0 else edges.inner[k]] = pair.direction > 0
-        cost = exact_energy(method, moved, contact.separation) - now
-        # A hundredth of the elastic part, which S prices.
-        elastic = abs(cost + pair.direction * unit)
-        assert -pair.release == pytest.approx(cost, abs=0.01 * elastic)
 
 
 # ------------------------------------------------------------------ relaxation
