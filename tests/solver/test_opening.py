@@ -20,7 +20,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
-from adhesis.solver.crack import griffith_length, judge_maximum
+from adhesis.solver.crack import griffith_length
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import (
     beyond_limit,
@@ -174,39 +174,6 @@ def test_grid_and_sharp_agree():
 
 
 # ---------------------------------------------------------------------- the crack
-
-
-def judged(tension, strength=1.0, balanced=0.01, shortest=1e-3, longest=1.0, bend=0.0):
-    """A crack in the tension σ(1 - bend x²): its mean over the angle is σ(1 - bend a²/2)."""
-
-    def release(half):
-        return half * (tension * max(0.0, 1 - bend * half**2 / 2)) ** 2 / balanced
-
-    return judge_maximum(0.0, tension, strength, balanced, 1.0, release, shortest, longest)
-
-
-def test_a_crack_in_a_uniform_tension_is_griffiths_and_its_barrier_the_closed_form():
-    crack = judged(1.5)
-    half = 0.01 / 1.5**2
-    assert crack.length == pytest.approx(2 * 1.1 * half, rel=1e-9)
-    assert crack.barrier == pytest.approx(half, rel=0.02)
-    assert crack.value == pytest.approx(-0.5)
-
-
-@pytest.mark.parametrize(
-    ("tension", "options", "opens"),
-    [
-        (0.999, {}, False),  # below the strength
-        (1.0, {}, True),
-        (1.0, {"bend": 1e4}, False),  # so peaked that no crack grows
-        (1.0, {"longest": 0.009}, False),  # longer than the patch
-        (1.0, {"shortest": 0.05}, True),
-    ],
-)
-def test_a_patch_opens_where_strength_and_growth_allow_it(tension, options, opens):
-    crack = judged(tension, **options)
-    assert (crack.value <= 0) == opens
-    assert (crack.length > 0) == opens
 
 
 def test_a_crack_grows_by_the_field_with_the_crack():
