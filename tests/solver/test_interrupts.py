@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 import time
@@ -92,34 +91,6 @@ def test_a_loop_that_is_interrupted_anywhere_ends_in_what_was_raised(chosen):
 
 
 # ------------------------------------------------------------------- what is not interrupted
-
-
-def test_work_that_is_not_to_be_interrupted_goes_on_while_the_caller_is(alarm):
-    go, later = threading.Event(), threading.Event()
-    seen: list[object] = []
-
-    @uninterrupted
-    def inner() -> None:
-        seen.append("inner")
-
-    @uninterrupted
-    def work() -> None:
-        os.kill(os.getpid(), signal.SIGALRM)
-        assert go.wait(60)
-        try:
-            inner()  # nobody waits for the rest
-        finally:
-            seen.append("end")
-            later.set()
-
-    with pytest.raises(Interrupt):
-        work()
-    assert seen == []
-    go.set()
-    assert later.wait(60)
-    assert seen == ["end"]
-    inner()
-    assert seen == ["end", "inner"]
 
 
 def test_an_interrupt_that_meets_the_start_of_a_thread_arrives_as_itself(monkeypatch):
