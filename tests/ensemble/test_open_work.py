@@ -16,7 +16,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.findings import verdict
 from adhesis.ensemble.report.paper import is_reading
 from adhesis.ensemble.report.tables.loss_tables import losses
-from adhesis.ensemble.task.compute import Runner, make_problem
+from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import beyond_zero_range
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import check as check_trace
@@ -116,16 +116,6 @@ def test_the_answer_of_a_trace_has_its_friction(monkeypatch):
 
 
 # ---------------------------------------------------------------------- campaign
-
-
-def test_zip_joins_it_with_the_work_of_adhesion():
-    joined = text("[0.02, 0.08]", seed='5\nzip = [["work_of_adhesion", "work_of_adhesion_open"]]')
-    campaign = parse_campaign(joined)
-    found = {
-        (task.work_of_adhesion, make_problem(campaign, task).gamma_open)
-        for task in campaign.tasks()
-    }
-    assert found == {(0.01, 0.02), (0.04, 0.08)}
 
 
 def test_a_row_has_its_friction():
