@@ -170,27 +170,6 @@ def test_the_document_carries_its_provenance(folder: Path, document: dict[str, A
     assert document["loss_over_work_of_adhesion"] == document["loss"]["value"] / 0.04
 
 
-def test_a_preload_is_the_turning_point_of_a_trace() -> None:
-    """Under a load to 300 Pa, with the table of a third and two thirds of it."""
-    cycle = make_cycle(HALF_SPACE, 0.005, 300.0, 4, "auto", 1e-2, Control(0.0))
-    plan = make_plan(prepared(), cycle, processes=0)
-    plan = only(plan, "answer", "p̄ 100", "p̄ 200")
-    answer = run_plan(prepared(), cycle, plan)
-    for name, stress in (("answer", 300), ("p̄ 100", 100), ("p̄ 200", 200)):
-        found = answer.result(name)
-        assert found is not None
-        assert max(found["states"]["mean_stress"]) == pytest.approx(stress)
-    document = answers.document(answer)
-    assert (document["stiffness"], document["max_stress"]) == (0.0, 300.0)
-    assert document["max_penetration"] is None
-    said = summary(answer)
-    assert "to p̄ = 300 Pa with h_max" in said
-    assert f"{answer.loss.value / 0.005:.4g} γ" in said
-    text = page_text(answer, [])
-    assert "one loop to p̄ = 300 Pa" in text
-    assert "| γ, J/m² | p̄, Pa |" in text
-
-
 @pytest.mark.parametrize(
     ("words", "control", "turns"),
     [
