@@ -37,9 +37,7 @@ def test_parallel_hdf5_means_that_ranks_wrote_a_file(findings: dict[str, Any]) -
         assert findings["writer"] == "mpio"
 
 
-def test_text_names_the_writer_and_every_library(
-    findings: dict[str, Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_text_names_the_writer_and_every_library(findings, monkeypatch, capsys):
     found = {name: value for name, value in findings.items() if name != "usable"}
     checks = [doctor.Check(**check) for check in findings["checks"]]
     diagnosis = doctor.Diagnosis(**{**found, "checks": checks})
@@ -51,9 +49,7 @@ def test_text_names_the_writer_and_every_library(
 
 
 @pytest.mark.mpi
-def test_a_launcher_of_another_mpi_is_told_from_the_right_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path, monkeypatch, capsys):
     # As the other MPI's mpirun does to these ranks: two processes, each alone in its world.
     wrong = tmp_path / "mpirun"
     wrong.write_text('#!/bin/sh\nshift 2\n"$@" & "$@"\nwait\n')

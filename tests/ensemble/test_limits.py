@@ -133,12 +133,7 @@ def test_a_python_process_survives_a_row_that_the_disk_did_not_take(finished: Pa
         (ImportError("libx.so: failed to map segment from shared object"), "failed to map segment"),
     ],
 )
-def test_what_the_system_does_not_grant_is_one_sentence_and_71(
-    error: Exception,
-    words: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_the_system_does_not_grant_is_one_sentence_and_71(error, words, monkeypatch, capsys):
     def fail(*_: object) -> int:
         try:
             raise error

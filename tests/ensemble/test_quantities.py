@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from math import inf, nan
-from pathlib import Path
 
 import pytest
 
@@ -139,9 +138,7 @@ def test_lengths_of_a_campaign_may_have_units() -> None:
     assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
 
 
-def test_a_campaign_file_is_asked_for_units_and_the_text_in_a_results_file_is_not(
-    tmp_path: Path,
-) -> None:
+def test_a_campaign_file_is_asked_for_units_and_the_text_in_a_results_file_is_not(tmp_path):
     """What is computed stays readable. Of the file: test_campaign.py."""
     assert parse_campaign(campaign_text(period="1000")).tasks()
     text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
@@ -213,9 +210,7 @@ def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: s
         (1.2, 0.112, "1.20 ± 0.11"),
     ],
 )
-def test_no_interval_leaves_the_bounds_of_its_quantity(
-    value: float, error: float, text: str
-) -> None:
+def test_no_interval_leaves_the_bounds_of_its_quantity(value, error, text):
     """A fraction of contact of more than 1 is not printed, unless it was given."""
     assert with_error(value, error, 0.0, 1.0) == text
 

@@ -294,9 +294,7 @@ def content(folder: Path) -> dict[str, bytes | None]:
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("words", "sentence"), cases())
-def test_bad_words_are_one_sentence(
-    words: list[str], sentence: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_words_are_one_sentence(words, sentence, folder, capsys):
     before = content(folder)
     assert main(words) == 2
     printed = capsys.readouterr()

@@ -46,9 +46,7 @@ def refusal(path: Path) -> str:
     return sentence
 
 
-def test_other_programs_open_a_saved_file(
-    loop: adhesis.LoopResult, content: bytes, tmp_path: Path
-) -> None:
+def test_other_programs_open_a_saved_file(loop, content, tmp_path):
     path = tmp_path / "loop.nc"
     path.write_bytes(content)
     for engine in ("h5netcdf", None):
@@ -185,9 +183,7 @@ def test_a_crafted_file_is_refused(name: str, content: bytes, tmp_path: Path) ->
     assert "checksum" not in refusal(path)
 
 
-def test_a_file_that_is_only_sealed_anew_is_loaded(
-    loop: adhesis.LoopResult, content: bytes, tmp_path: Path
-) -> None:
+def test_a_file_that_is_only_sealed_anew_is_loaded(loop, content, tmp_path):
     """Else the crafted files above could be refused for their checksum alone."""
     path = tmp_path / "loop.nc"
     path.write_bytes(content[:-SEAL])

@@ -369,9 +369,7 @@ def test_a_job_with_a_rank_that_hangs_comes_back_and_finishes(jobs: dict[str, Jo
     assert job.done_tasks() == 40
 
 
-def test_two_jobs_of_one_campaign_with_staging_lose_no_row(
-    cluster: Cluster, jobs: dict[str, Job]
-) -> None:
+def test_two_jobs_of_one_campaign_with_staging_lose_no_row(cluster, jobs):
     """The second one comes while the first runs, which then comes back and finishes."""
     first = jobs["staged"]
     first.wait(lambda: first.staged_tasks() > 0, "a first task")
@@ -411,9 +409,7 @@ def test_parts_run_as_an_array_and_are_joined(jobs: dict[str, Job]) -> None:
     assert (merge.folder / "study").is_dir()  # reported
 
 
-def test_a_job_at_its_time_limit_is_requeued_and_finishes(
-    cluster: Cluster, jobs: dict[str, Job]
-) -> None:
+def test_a_job_at_its_time_limit_is_requeued_and_finishes(cluster, jobs):
     job = jobs["limited"]
     job.wait(lambda: "USR1 received" in job.log, "signalled")
     job.wait(lambda: job.values["Restarts"] != "0", "requeued")

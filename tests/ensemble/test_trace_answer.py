@@ -238,9 +238,7 @@ def test_a_variant_that_fails_is_a_warning_and_the_answer_stands(spoiled_answer:
         run_plan(trace, cycle, spoiled(plan, "answer"))
 
 
-def test_the_page_shows_names_headers_and_warnings_as_texts(
-    spoiled_answer: Answer, tmp_path: Path
-) -> None:
+def test_the_page_shows_names_headers_and_warnings_as_texts(spoiled_answer, tmp_path):
     """Neither page has an element that a name or a header of a file brought along."""
     before = spoiled_answer.prepared
     said = ("text", "channel ![z](/etc/hostname) <script>x</script> \x1b[31m")
@@ -334,9 +332,7 @@ def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer:
 
 
 @pytest.mark.usefixtures("quick_figures")
-def test_figures_of_an_earlier_page_do_not_stay_beside_a_new_one(
-    spoiled_answer: Answer, tmp_path: Path
-) -> None:
+def test_figures_of_an_earlier_page_do_not_stay_beside_a_new_one(spoiled_answer, tmp_path):
     """An answer with neither tables nor several cut-offs; a figure of the user's own stays."""
     for name in ("tables.png", "tables.pdf", "cut-off.png", "loop.png", "mine.png"):
         (tmp_path / name).write_bytes(b"old")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -125,9 +125,7 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
     ],
 )
-def test_all_codes_of_missing_heights_are_drop_outs(
-    codes: dict[int, str], missing: int, tmp_path: Path
-) -> None:
+def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
     trace = read_trace(put(tmp_path / "t.csv", [UM, *with_codes(codes)]))
     gaps = np.flatnonzero(np.isnan(trace.heights)).tolist()
     assert gaps == (list(codes) if missing else [])
@@ -156,9 +154,7 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
 @pytest.mark.parametrize(
     ("step", "decimals"), [(0.156, 1), (0.25, 0), (1.08, 0), (0.37, 0), (3.3, 0)]
 )
-def test_positions_that_are_rounded_in_print_have_equal_steps(
-    step: float, decimals: int, tmp_path: Path
-) -> None:
+def test_positions_that_are_rounded_in_print_have_equal_steps(step, decimals, tmp_path):
     rows = [f"{step * k:.{decimals}f},{z}" for k, z in enumerate(ZS)]
     for lines in (rows, rows[::-1]):
         trace = read_trace(put(tmp_path / "t.csv", [UM, *lines]))
@@ -304,9 +300,7 @@ def test_the_shorter_one_of_two_traces_ends_where_it_does(gap: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("first", [["400"], ["0.500"], ["199.5", "400"]])
-def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(
-    first: list[str], tmp_path: Path
-) -> None:
+def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_path):
     with pytest.raises(
         InputError, match=r"line 1 of .*, at the end of a column of heights: remove it"
     ):
@@ -358,9 +352,7 @@ def wsxm(path: Path, comments: int) -> Path:
 @pytest.mark.skipif(not instrument.available(), reason="SurfaceTopography is not installed")
 @pytest.mark.parametrize("name", ["a.stp", "a.dat", "a.txt", "a.csv", "a.001", "a"])
 @pytest.mark.parametrize("comments", [1, 400])
-def test_a_file_of_an_instrument_is_known_by_its_content(
-    name: str, comments: int, tmp_path: Path
-) -> None:
+def test_a_file_of_an_instrument_is_known_by_its_content(name, comments, tmp_path):
     trace = read_trace(wsxm(tmp_path / name, comments), row=3)
     assert trace.points == 64
     assert trace.step == pytest.approx(3e-6 / 64)
@@ -388,9 +380,7 @@ def array_of_xarray() -> object:
 
 
 @pytest.mark.parametrize("make", [array_of_xarray, lambda: xr.Dataset({"z": ("x", Z)})])
-def test_objects_of_other_libraries_are_refused_with_what_can_be_read(
-    make: Callable[[], object],
-) -> None:
+def test_objects_of_other_libraries_are_refused_with_what_can_be_read(make):
     with pytest.raises(TypeError, match=r"it must be a path, .* an array or list of heights"):
         read_trace(make(), step=STEP)
 

@@ -109,12 +109,7 @@ LINES = [(block, line) for block in BLOCKS if is_of_commands(block) for line in 
     [b for b in BLOCKS if b.language == "python" and b.page not in LESSONS],
     ids=lambda block: block.name,
 )
-def test_python_runs(
-    block: Block,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_python_runs(block, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(block.text, block.name, "exec"), {"__name__": "__main__"})
     shown = capsys.readouterr().out
@@ -194,9 +189,7 @@ def test_commands_run(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("page", LESSONS, ids=lambda page: str(page.relative_to(ROOT)))
-def test_lessons_print_what_their_pages_show(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lessons_print_what_their_pages_show(page, tmp_path, monkeypatch):
     (tmp_path / "wrong.toml").write_text(wrong_example())
     monkeypatch.chdir(tmp_path)
     pieces = list(transcripts.pieces(page.read_text()))

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent.parent
+
+
 def test_the_made_up_measurement_is_read_as_it_was_made(tmp_path: Path) -> None:
     code = (
         "import sys; sys.path.insert(0, 'examples'); from pathlib import Path\n"

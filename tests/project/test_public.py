@@ -19,6 +19,8 @@ REFERENCE = (ROOT / "docs" / "reference.rst").read_text()
 PUBLIC = sorted({*re.findall(r"auto\w+:: adhesis\.(\w+)$", REFERENCE, re.MULTILINE)} - {"open"})
 BESIDE = ["open"]
 """Public as well, but not taken by a star import: it would replace a built-in name."""
+
+
 def test_the_public_names_are_those_of_the_reference() -> None:
     assert sorted(adhesis.__all__) == PUBLIC
     beside = {"annotations", "import_module", "TYPE_CHECKING"}

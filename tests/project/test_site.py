@@ -24,9 +24,7 @@ def test_every_page_is_in_the_contents() -> None:
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_examples_run(
-    path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_examples_run(path, monkeypatch, capsys):
     """Each says something and draws something."""
     import matplotlib as mpl
 

@@ -236,7 +236,7 @@ def interleave(folder: Path, seed: int) -> None:
             assert [*(folder / "disk1").iterdir(), *folder.glob("s.h5.*")] == [], at_work
 
 
-@pytest.mark.parametrize("first", (0, 10, 20))
+@pytest.mark.parametrize("first", [0, 10, 20])
 def test_no_interleaving_of_jobs_loses_a_row(tmp_path: Path, first: int) -> None:
     with ThreadPoolExecutor(8) as pool:
         for done in [
@@ -416,9 +416,7 @@ def stage_of(shared: Path) -> Path:
         (VICTIM, "mkdir -m 755 $stage", ""),
     ],
 )
-def test_a_folder_that_others_could_have_filled_is_refused(
-    shared: Path, account: int, planted: str, words: str
-) -> None:
+def test_a_folder_that_others_could_have_filled_is_refused(shared, account, planted, words):
     (shared / "work" / "precious").write_text("a line")
     if os.geteuid() == 0:
         os.chown(shared / "work" / "precious", VICTIM, VICTIM)
@@ -450,9 +448,7 @@ def test_the_folder_is_private_and_a_job_that_comes_back_finds_it(shared: Path) 
 
 @pytest.mark.parametrize("name", ["s.h5.copy", "s.h5.staging"])
 @pytest.mark.parametrize("planted", ["ln -s precious {}", "ln -s missing {}", "mkfifo {}"])
-def test_links_and_pipes_beside_the_results_are_not_followed(
-    shared: Path, name: str, planted: str
-) -> None:
+def test_links_and_pipes_beside_the_results_are_not_followed(shared, name, planted):
     assert shell(shared, f"echo a line >precious; {planted.format(name)}").returncode == 0
     done = shell(shared, "stage_in; echo new rows >$results; code=0; stage_out; exit $code")
     refused = name == "s.h5.staging"

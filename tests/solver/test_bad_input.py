@@ -227,9 +227,7 @@ OF_ROWS: dict[str, Callable[[Any], Any]] = {
     ],
     ids=lambda v: repr(v)[:20],
 )
-def test_what_is_no_row_of_numbers_is_refused(
-    name: str, row: Any, error: type[Exception], text: str
-) -> None:
+def test_what_is_no_row_of_numbers_is_refused(name, row, error, text):
     with pytest.raises(error) as caught:
         OF_ROWS[name](row)
     assert str(caught.value).startswith(name + text)
