@@ -93,19 +93,8 @@ def answer(**change: Any) -> Any:
 
 
 NOT_NUMBERS: list[Any] = [
-    True,
-    np.bool_(False),
-    "1",
-    b"1",
-    None,
-    1j,
-    [1.0],
-    (1.0,),
-    np.array([1.0]),
-    np.array([]),
-    {},
-    object(),
-    np.ma.masked,
+    *(True, np.bool_(False), "1", b"1", None, 1j, {}, object(), np.ma.masked),
+    *([1.0], (1.0,), np.array([1.0]), np.array([])),
 ]
 # Each parameter that is one number, and its rule.
 NUMBERS: dict[str, tuple[Callable[[Any], Any], Bounds]] = {
