@@ -15,7 +15,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,20 +23,12 @@ from typing import Protocol
 import pytest
 
 from adhesis.ensemble.run import launch
-from tests.support.campaign_support import campaign_text, done_rows
+from tests.support.campaign_support import campaign_text, done_rows, wait_until
 from tests.support.launchers import PATH
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPT = ROOT / "jobs" / "slurm.sh"
 pytestmark = pytest.mark.slurm
-
-
-def wait_for(what: Callable[[], object], text: str, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while not what():
-        if time.monotonic() > end:
-            raise TimeoutError(f"{text}: not within {seconds:.0f} s")
-        time.sleep(0.2)
 
 
 def processes_in(folder: Path, word: str) -> list[int]:
@@ -192,13 +183,13 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
         socket_path = folder / "munge.socket"
         files = [f"--{name}-file={folder}/munge.{name}" for name in ("key", "pid", "log", "seed")]
         start("munged", "--foreground", "--force", f"--socket={socket_path}", *files)
-        wait_for(socket_path.exists, "munged", 20)
+        wait_until(socket_path.exists, 20)
         start("slurmctld", "-D", "-f", folder / "slurm.conf")
         start("slurmd", "-D", "-f", folder / "slurm.conf")
         try:
-            wait_for(idle, "an idle node", 60)
-        except TimeoutError as error:
-            reason = f"{error}\n{cluster.logs()}"
+            wait_until(idle, 60, 0.2)
+        except AssertionError:
+            reason = f"no idle node within 60 s\n{cluster.logs()}"
             if os.environ.get("CI"):
                 pytest.fail(reason)
             pytest.skip(f"Slurm is installed, but does not start here: {reason}")
@@ -247,11 +238,10 @@ class Job:
     def wait(self, what: Callable[[], object], text: str, seconds: float = 90) -> None:
         """Wait for a condition; the job and all logs in the message."""
         try:
-            wait_for(what, text, seconds)
-        except TimeoutError as error:
-            raise AssertionError(
-                f"{error}\n{self.values}\n{self.log}\n{self.cluster.logs()}"
-            ) from error
+            wait_until(what, seconds, 0.2)
+        except AssertionError as error:
+            about = f"{text}: not within {seconds:.0f} s\n{self.values}\n{self.log}\n"
+            raise AssertionError(about + self.cluster.logs()) from error
 
 
 class Submit(Protocol):

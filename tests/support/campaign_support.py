@@ -187,12 +187,12 @@ def hung_launchers() -> list[int]:
     ]
 
 
-def wait_until(condition: Callable[[], bool], seconds: float = 150.0) -> None:
+def wait_until(condition: Callable[[], bool], seconds: float = 150.0, every: float = 0.02) -> None:
     """Wait for a condition; AssertionError if it does not come true."""
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited too long"
-        time.sleep(0.02)
+        time.sleep(every)
 
 
 def done_rows(path: Path) -> int:
