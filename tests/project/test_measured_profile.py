@@ -1,25 +1,19 @@
-"""examples/measured_profile.py: from a file to a page, and the same by the command."""
+"""examples/measured_profile.py: the measurement that it makes up is read as it was made."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import runpy
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent.parent
+from adhesis import prepare_trace, read_trace
+
+SCRIPT = Path(__file__).parent.parent.parent / "examples" / "measured_profile.py"
 
 
-def test_the_made_up_measurement_is_read_as_it_was_made(tmp_path: Path) -> None:
-    code = (
-        "import sys; sys.path.insert(0, 'examples'); from pathlib import Path\n"
-        "import measured_profile as m\n"
-        f"m.write_made_up_measurement(Path({str(tmp_path / 't.csv')!r}))"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
-    from adhesis import prepare_trace, read_trace
-
+def test_the_made_up_measurement_is_read_as_it_was_made(tmp_path):
+    runpy.run_path(str(SCRIPT))["write_made_up_measurement"](tmp_path / "t.csv")
     trace = read_trace(tmp_path / "t.csv")
     assert (trace.points, trace.drop_outs) == (2001, 3)
     assert trace.length == pytest.approx(2e-3)
