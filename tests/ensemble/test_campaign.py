@@ -401,6 +401,10 @@ def test_a_number_may_become_an_axis_and_an_axis_longer():
     assert compare(old, grown).grown == ("material.young",)
     assert compare(old, parse_campaign(campaign_text(young="[2e6, 3e6]"))).other
     assert compare(old, parse_campaign(campaign_text(max_penetration="[0.6, 0.3]"))).other
+    fewer, some = (
+        parse_campaign(under(f"preload = {p}")) for p in ("[100, 400]", "[100, 300, 400]")
+    )
+    assert compare(fewer, some).other[0].startswith("cycle.preload is")  # stops of one branch
     # Pairs that were computed must be pairs still.
     paired = {"seed": '5\nzip = [["hurst", "h_rms"]]'}
     one = parse_campaign(campaign_text(h_rms="[1e-6, 2e-6]", **paired))
