@@ -74,23 +74,6 @@ def test_a_cell_is_one_point_on_all_axes(file, data):
     assert all(cell.done == 3 for cell in data.cells[:-1])
 
 
-def test_differences_are_taken_between_cells_that_differ_in_gamma_alone(data):
-    assert len(data.paired) == 2 * 2 * 3
-    for pair in data.paired:
-        low, high = (
-            next(
-                c
-                for c in data.cells
-                if (c.hurst, c.work_of_adhesion, c.others) == (pair.hurst, gamma, pair.others)
-            )
-            for gamma in (0.01, 0.04)
-        )
-        both = min(low.done, high.done)
-        expected = high.values["loss"][:both] - low.values["loss"][:both]
-        assert (pair.loss.n, pair.lower, pair.upper) == (both, 0.01, 0.04)
-        assert pair.loss.mean == pytest.approx(expected.mean())
-
-
 def test_curves_and_states_of_a_cell_are_in_its_own_units(data):
     for cell in data.cells:
         top = dict(cell.others)["max_penetration"]
