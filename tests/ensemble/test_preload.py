@@ -174,7 +174,7 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     path = tmp_path / "trace.csv"
     np.savetxt(path, np.transpose([x, z]), delimiter=",")
     words = ["trace", str(path), "--unit", "m", "--work-of-adhesion", "0.002", "--young", "1e6"]
-    words += ["--poisson", "0.5", "--quick", "--quiet", "--processes", "1", "--load-steps", "8"]
+    words += ["--poisson", "0.5", "--quick", "--quiet", "--processes", "1", "--load-steps", "3"]
     assert main([*words, "--preload", "300", "--to", str(tmp_path / "out")]) == 0
     assert "to a preload of 300 Pa at a fixed separation" in capsys.readouterr().out
     document = json.loads((tmp_path / "out" / "trace.json").read_text())
@@ -182,7 +182,7 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     assert document["max_penetration"] is None
     assert document["loop"]["turning_stress"] == pytest.approx(300.0, rel=1e-8)
     prepared = prepare_trace(read_trace(path, unit="m"))
-    scene = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.002, "load_steps": 8}
+    scene = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.002, "load_steps": 3}
     latest = {"max_penetration": 0.5, "quick": True, "processes": 0}
     far = adhesis.loss_of_trace(prepared, **scene, preload=1e9, **latest)
     (others,) = (text for text in far.warnings if "did not turn at the preload" in text)
