@@ -128,19 +128,14 @@ preload = 200; max_penetration =; stiffness = 1e9 -> max_penetration is missing
 preload = 200; max_penetration = 1.2 ->
     max_penetration is 1.2: it must be a positive number from 1e-12 to 0.999999
 preload = [200, 200.0] -> a list of different values
-max_penetration = [0.5, 1] -> max_penetration is 1.0: it must be a positive number from
-adhesion_range = 1e-8; strength = 3e6 -> adhesion_range and strength: at most one of them
 work_of_adhesion_open = 0.02 -> _open is 0.02: it must be at least the work of adhesion, 0.04
-work_of_adhesion_open = [0.02, 0.08] -> work_of_adhesion_open is 0.02: it must be at least
 work_of_adhesion_open = 0.08; work_of_adhesion = [0, 0.04] ->
     must be left out, as γ is 0, in every cell
 work_of_adhesion_open = 0.08; strength = 3e9 -> _open and a range or strength: at most one
-work_of_adhesion_open = 0.08; adhesion_range = 1e-12 -> and a range or strength: at most one
 work_of_adhesion_open = 0.08; method = "grid" ->
     [solver] method is 'grid' beside a work_of_adhesion_open
 # rules that hold in every cell
 n0 = [1, 2]; ratio = [3, 60000] -> n0 · ratio is 120000
-n0 = 2; ratio = 90000 -> n0 · ratio is 180000
 ratio = [4, 16]; rolloff = [2, 8] -> rolloff is 8
 max_penetration = [0.6, 0.3]; field_penetrations = [0.1] ->
     field_penetrations is given beside several max_penetration

@@ -90,20 +90,14 @@ doctor --in text -> --in is text: it must be a folder
 # the profile and the material of a loop
 loop -> no profile is given: give one of --hurst, --heights and --trace
 LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
-LOOP --amplitudes gauss -> --amplitudes is 'gauss': it must be one of
 LOOP --method magic -> --method is 'magic': it must be one of grid
 LOOP --unit um -> --unit belongs to --trace
 LOOP --exclude 1mm:2mm -> --exclude belongs to --trace
 LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
 LOOP --h-rms 10 -> --h-rms is 10, which would be 10 m: give its unit, as in 10um (10m,
-LOOP --h-rms 100mm -> rms slope is
 LOOP --layer 5 -> --layer is 5, which would be 5 m: give its unit
-LOOP --layer 1e-3 -> poisson is 0.5
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
-LOOP --work-of-adhesion-open 0.01 -> -open is 0.01 J/m²: it must be at least the work of
-LOOP --work-of-adhesion-open 0.08 --strength 1e9 -> beside a strength of
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
-LOOP --work-of-adhesion-open 0.08 --nodes-per-wave 32 -> --nodes-per-wave is 32 besi
 loop --heights none.npy --period 1e-3 -> with --heights the material has to be given
 loop --trace none.csv --young 1e6 -> with --trace the material has to be given
 loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
@@ -112,11 +106,8 @@ loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
 WAVE --hurst 0.8 -> --hurst and --heights are given: give one of --hurst, --heights and --trace
 WAVE --seed 4 -> --seed belongs to --hurst
 WAVE --delimiter : -> --delimiter is ':': it must be one of
-WAVE --strength 1e4 --adhesion-range 1e-9 -> --adhesion-range is 1e-09 and
-WAVE --strength 1e-4 -> --strength is 0.0001 Pa: it must be at least
 WAVE --measure projected -> --measure is 'projected': it must be one of arc, flat
 # the path of a loop
-LOOP --path=-0.5,out -> it must start with loading
 LOOP --path=out -> holds no turning point
 LOOP --path=0.5,x -> must be numbers with commas
 LOOP --path=0.5 --max-penetration 0.5 -> a loop has one of them
@@ -135,7 +126,6 @@ LOOP --preload 20kPa --stiffness 0 -> For a weight give --max-stress 20kPa with
 LOOP --preload 20kPa --max-stress 1 -> --max-stress and --preload are given
 LOOP --preload 20kPa --path 0.5,0.2 -> --path and --preload are given
 LOOP --preload 20kPa --max-penetration 0.5,0.6 -> beside --preload: it must be one
-LOOP --preload 1kPa --max-penetration 1 -> --max-penetration is 1.0: it must be
 LOOP --preload 20bar -> --preload is '20bar': its unit must be one of Pa, kPa
 LOOP --preload 20kPa,2e4 -> --preload is 20kPa,2e4: turning points must differ
 # outputs of a loop
@@ -176,10 +166,8 @@ TRACE --plan -> states no unit
 TRACE --plan --unit um --columns 3 -> --columns is 3: it must name two of the 2
 TRACE --plan --unit um --columns 2 -> header states no step with its unit: give
 TRACE --plan --unit um --columns x -> --columns is 'x': it must be two whole
-TRACE --plan --unit um --cut-off 1m -> --cut-off is 1 m
 TRACE --plan --unit um --tip-radius 5 -> --tip-radius is 5, which would be 5 m
 TRACE --plan --unit um --tip-radius 5m -> trusted from 50 µm on (what a tip of
-TRACE --plan --unit um --tip-radius=-1um -> --tip-radius is -1e-06: it must be
 TRACE --plan --unit um --max-stress 5 -> a weight or a machine?
 TRACE --plan --unit um --stiffness 0 -> (--stiffness 0) needs --max-stress
 TRACE --plan --unit um --max-penetration deep -> --max-penetration is 'deep'
@@ -202,7 +190,6 @@ TRACE --plan --unit um --exclude 0.3mm:0.2mm ->
     --exclude holds the range from 300 µm to 200 µm: a range must begin
 TRACE --unit um --to out --work-of-adhesion 0.04,0.02 --work-of-adhesion-open 0.1 ->
     beside 2 works of adhesion: give one of
-TRACE --unit um --to out --work-of-adhesion-open 0.01 -> -open is 0.01 J/m²: it must be at least the
 TRACE --unit um --to out --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' besi
 loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --seed 1 ->
     --seed belongs to --hurst
