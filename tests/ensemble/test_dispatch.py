@@ -163,20 +163,6 @@ def test_the_longest_tasks_go_first_once_they_are_known():
     assert [schedule.take(), schedule.take(), schedule.take()] == [(3,), (1,), ()]
 
 
-def test_rounds_go_one_after_the_other_and_the_longest_first_within():
-    """An interrupted campaign keeps averages over about as many realisations in every cell."""
-    group_of = {i: "short" if i < 10 else "long" for i in range(20)}
-    round_of = {i: i % 10 for i in range(20)}
-    schedule = Schedule(range(20), group_of, {"short": 1.0, "long": 5.0}, round_of)
-    assert [schedule.take() for _ in range(4)] == [(10,), (0,), (11,), (1,)]
-    schedule.measured("short", 9.0)
-    schedule.measured("long", 2.0)
-    assert [schedule.take() for _ in range(4)] == [(2,), (12,), (3,), (13,)]
-    assert schedule.take(time_left=5.0) == (14,)  # the first round that has one that fits
-    schedule.add([0, 10])  # tasks that come later stand where their round stands
-    assert [schedule.take() for _ in range(4)] == [(0,), (10,), (4,), (5,)]
-
-
 def test_times_of_an_earlier_run_count_as_often_as_they_were_measured():
     """From them the time of a group of which nothing is known is estimated, by its prior."""
     groups = {0: "short", 1: "long"}
