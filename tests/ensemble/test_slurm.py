@@ -18,7 +18,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
@@ -244,22 +243,8 @@ class Job:
             raise AssertionError(about + self.cluster.logs()) from error
 
 
-class Submit(Protocol):
-    """How a job is submitted; see :func:`submit`."""
-
-    def __call__(
-        self,
-        *words: str,
-        realisations: int = 3,
-        launcher: str = "",
-        silence: int = 120,
-        staging: str = "",
-    ) -> Job:
-        """Submit."""
-
-
 @pytest.fixture(scope="module")
-def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Submit:
+def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Job]:
     """Return what submits a campaign of 4 times so many tasks, from a folder with a comma.
 
     All is the real command but for the mechanics and the report. A rank of a first start computes
@@ -305,7 +290,7 @@ exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
 
 
 @pytest.fixture(scope="module")
-def jobs(cluster: Cluster, submit: Submit) -> dict[str, Job]:
+def jobs(cluster: Cluster, submit: Callable[..., Job]) -> dict[str, Job]:
     """Every job of this module."""
     # Slurm looks at its clocks twice a minute and signals up to a minute early: soon, that is.
     limited = ("--ntasks=2", "--time=2", "--signal=B:USR1@85")

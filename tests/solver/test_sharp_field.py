@@ -16,6 +16,7 @@ from adhesis.solver.sharp.field.gap_field import GapField, respond_at_fixed_edge
 from adhesis.solver.sharp.field.opening_series import fine_opening
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
+from tests.support.dense import solve_densely
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
@@ -244,3 +245,41 @@ def test_hundreds_of_patches_in_one_period():
     pressure = waves * amplitude * y
     assert abs(field.pressure / pressure - 1) < 1e-9
     assert np.abs(field.opening).max() < 1e-8 * amplitude * waves
+
+
+@pytest.mark.parametrize("order", range(22))
+def test_a_gap_is_solved_by_the_inverse_of_its_block_at_every_order(order):
+    """Of 4 to 128 nodes."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=5, h_rms=1e-6, seed=2)
+    model = FieldModel(FIXED_SEPARATION, 20.0, StressSource(profile).panels)
+    gaps, separation = np.array([[1.0, 5.5]]), 0.6 * profile.h_max * profile.q0
+    field = solve_field(gaps, separation, model, np.array([order]))
+    dense = solve_densely(gaps, separation, model, np.array([order]))
+    assert field.pressure == pytest.approx(dense.pressure, rel=1e-11)
+    assert np.abs(field.opening - dense.opening).max() < 1e-11 * np.abs(dense.opening).max()
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_openings_at_fine_nodes_are_sums_of_their_modes(k):
+    """Numbers of nodes with each of the small factors, all of them enough."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=25, h_rms=1e-6, seed=2)
+    model = FieldModel(FIXED_SEPARATION, 20.0, StressSource(profile).panels)
+    gaps = np.array([[0.3, 0.8], [1.0, 2.0], [2.3, 5.1]])
+    field = solve_field(gaps, 0.5 * profile.h_max * profile.q0, model)
+    sizes = set()
+    for per_wave in np.geomspace(0.1, 15, 50):
+        theta, opening, _, modes = field.fine_opening(k, per_wave)
+        size = len(theta)
+        assert len(opening) == len(modes) == size
+        sizes.add(size)
+        exact = field.sum_modes(k, theta, modes)
+        np.testing.assert_allclose(opening, exact, atol=1e-12 * np.abs(exact).max())
+    for size in sizes:
+        rest = size + 1
+        for factor in (2, 3, 5):
+            while rest % factor == 0:
+                rest //= factor
+        assert rest == 1
+        assert (size + 1) % 4 == 0
+    if k == 2:  # of many nodes
+        assert all(any((size + 1) % factor == 0 for size in sizes) for factor in (9, 10, 15))
