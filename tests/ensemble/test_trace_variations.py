@@ -8,7 +8,6 @@ lines, columns beside, and rounding of the positions. Nothing else may come back
 from __future__ import annotations
 
 import random
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -186,6 +185,7 @@ def draw_text(seed: int) -> Text:
         lines.insert(0, in_signs(first))
     end = "\r\r\n" if blanks == "crcrlf" else draw.choice(["\n", "\r\n", "\r"])
     data = end.join([*head, *lines, ""]).encode(encoding, errors="replace")
+    is_whole &= encoding.startswith("utf") or (encoding == "latin-1" and b"?" not in data)
     return Text(data, step, heights, options, told, is_whole)
 
 
@@ -213,15 +213,16 @@ def outcome(seed: int, folder: Path) -> tuple[str, str | None]:
         trace = read_trace(path, **text.options)  # type: ignore[arg-type]
     except InputError as refusal:
         sentence = str(refusal)
-        # a step or unit may be lost in an encoding without its signs
-        is_fair = not text.is_whole or re.search("give (step|unit|decimal)", sentence)
-        return sentence, None if is_fair and "\n" not in sentence else f"{seed}: {sentence}"
+        return sentence, f"{seed}: {sentence}" if text.is_whole or "\n" in sentence else None
     wrong = problem_of(text, trace)
     return "", f"{seed}: {wrong}; {text.told} {trace.notes}" if wrong else None
 
 
 def test_no_variation_is_read_as_another_trace_and_all_whole_ones_are_read(tmp_path: Path) -> None:
-    """Another block or a checksum at the end, or a count on top, makes them something else."""
+    """Whole is what neither ends with another block or a checksum nor begins with a count.
+
+    Names, units and steps in other encodings than UTF and Latin-1 need not be understood.
+    """
     found = [outcome(seed, tmp_path) for seed in range(VARIATIONS)]
     assert [wrong for _, wrong in found if wrong] == []
     assert sum(not refusal for refusal, _ in found) > 0.4 * VARIATIONS
