@@ -7,7 +7,9 @@ import pytest
 
 from adhesis import Problem, self_affine_profile
 from adhesis.solver.grid import relax
+from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import Contact, ContactSolver
+from adhesis.solver.grid.edges import survey
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.method import GridMethod
@@ -73,6 +75,62 @@ def test_stalled_iteration_is_reported():
     # Full contact at a mean gap: no solution exists.
     with pytest.raises(RuntimeError, match="full contact has no solution"):
         solver.solve(contact, 1e-12)
+
+
+# ------------------------------------------------------------------ local compliance
+
+
+def schur(kernel: np.ndarray, nodes: np.ndarray, j: int) -> float:
+    row = dense(kernel, np.array([j]), nodes)[0]
+    return float(kernel[0] - row @ np.linalg.solve(dense(kernel, nodes, nodes), row))
+
+
+def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
+    n = 1024
+    elastic = ElasticGrid(n, 2.0 * n, 1e6)
+    kernel = elastic.kernel()
+    compliance = EdgeCompliance(kernel)
+    lattice = Lattice(elastic, compliance, np.zeros(n), np.zeros(n), Control(), 1.0)
+    errors = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        patches = int(rng.integers(2, 7))
+        # Half of the sets have short patches and narrow gaps.
+        if seed % 2:
+            cuts = np.cumsum(rng.integers(1, 24, 2 * patches))
+        else:
+            cuts = np.sort(rng.choice(n - 1, 2 * patches, replace=False))
+        mask = np.zeros(n, dtype=bool)
+        for a, b in cuts.reshape(-1, 2):
+            mask[a:b] = True
+        contact = Contact(1.0, 1.0, mask, -np.ones(n) * mask, np.zeros(n))
+        # Unit gap, unit tension, no adhesion: the prices are S itself.
+        edges = survey(contact, lattice, -1.0)
+        for k in range(edges.side.size):
+            nodes = np.flatnonzero(mask)
+            exact = schur(kernel, nodes, int(edges.outer[k]))
+            errors.append(1 / edges.growth[k] / exact - 1)
+            rest = nodes[nodes != edges.inner[k]]
+            exact = schur(kernel, rest, int(edges.inner[k]))
+            errors.append(-edges.recession[k] / exact - 1)
+    # The worst are patches of one or two nodes far from all others, which no grid resolves anyway.
+    assert np.abs(errors).max() < 1.5e-2
+    assert np.median(np.abs(errors)) < 1e-3
+
+
+@pytest.mark.parametrize("gap", [27, 43, 70, 306, 700])
+def test_compliance_of_a_pair_of_edges_where_patches_fill_the_period(gap):
+    """Lengths are rounded, up to a few per cent longer than the period that they share."""
+    n = 1024
+    kernel = ElasticGrid(n, 1.0, 1e6).kernel()
+    for near in {(n - gap) // 3 + 1, (n - gap) // 2, n - gap - 2 - (n - gap) // 5}:
+        compliance = EdgeCompliance(kernel)
+        nodes = np.arange(gap, n)  # both patches, which are one here
+        across = dense(kernel, np.array([0, gap - 1]), nodes)
+        own = dense(kernel, np.array([0, gap - 1]), np.array([0, gap - 1]))
+        exact = own - across @ np.linalg.solve(dense(kernel, nodes, nodes), across.T)
+        found = compliance.across_gap(near, gap, n - gap - near)
+        assert np.abs(found - exact).max() < 0.05 * exact[0, 0]
 
 
 # ------------------------------------------------------------------ relaxation
