@@ -20,7 +20,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
-from adhesis.solver.crack import griffith_length
+from adhesis.solver.crack import Crack, griffith_length, largest_excess
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import (
     beyond_limit,
@@ -66,6 +66,12 @@ def loop_of(
 
 def troughs_problem(strength: float = STRENGTH) -> Problem:
     return Problem(TROUGHS, SOLID, GAMMA, strength=strength)
+
+
+def test_the_largest_excess_opens_first_with_what_equals_it():
+    cracks = [Crack(float(i), 1 - value, value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
+    assert [crack.position for crack in largest_excess(cracks)] == [1.0, 3.0]
+    assert largest_excess(cracks[:1]) == []
 
 
 def test_grid_opens_a_closed_trough_there_too():

@@ -7,6 +7,7 @@ import pytest
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from adhesis.solver._kernels import local_minima
+from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation
 from tests.support.scenes import HALF_SPACE
@@ -33,6 +34,19 @@ def test_the_deepest_place_gets_a_patch_and_of_equal_ones_the_first_from_the_cre
     assert places(adhesive, [-3e-5, -3e-5, -2e-5]) == [0]  # the crest is at θ = 0
     # Without adhesion nothing runs, so that the order does not matter.
     assert places(nucleation(0.0), [-1e-2, -3e-2, 1.0, -2e-2]) == [0, 1, 3]
+
+
+def test_seeds_that_meet_are_one_patch() -> None:
+    """In a gap from 1 to 2: seeds apart, that meet each other, that meet the patches beside."""
+    gaps, widths = np.array([[1.0, 2.0], [3.0, 7.0]]), np.array([0.1, 0.1])
+
+    def first_gap(*centres: float) -> list[float]:
+        found = with_patches(gaps, np.array(centres), widths)
+        return [round(float(end), 6) for end in found[:-1].ravel()]
+
+    assert first_gap(1.3, 1.6) == [1.0, 1.25, 1.35, 1.55, 1.65, 2.0]
+    assert first_gap(1.35, 1.4) == [1.0, 1.3, 1.45, 2.0]
+    assert first_gap(1.02, 1.98) == [1.07, 1.93]
 
 
 @pytest.mark.parametrize("seed", [1, 9])
