@@ -32,28 +32,13 @@ _NAME = "Source"
 
 @dataclass(frozen=True)
 class Part:
-    """Figures that one command makes.
-
-    Attributes
-    ----------
-    commands : tuple of str
-        Words after ``python``, run in the folder of the checkout; OUT is a folder for what they
-        make, RANKS the options of a run.
-    made : str
-        Glob of what is kept of it, below OUT.
-    folder : str
-        Where that goes, below docs/.
-    name : str
-        Under which name, if it has another one there.
-    data : str
-        Where its CSV files go, below the checkout.
-    """
+    """Figures that commands make: words after ``python``; OUT is a folder for what they make."""
 
     commands: tuple[str, ...]
-    made: str
-    folder: str
-    name: str = ""
-    data: str = ""
+    made: str  # glob of what is kept, below OUT
+    folder: str  # where that goes, below docs/
+    name: str = ""  # under which name, if it has another one there
+    data: str = ""  # where its CSV files go, below the checkout
 
 
 def _paper() -> tuple[str, ...]:
