@@ -336,9 +336,7 @@ def test_a_file_of_many_tasks_is_as_large_as_its_data(tmp_path):
 HOLD_LOCK = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
-from adhesis.ensemble.run.lock import RunLock, holder
-from adhesis.ensemble.task.dataset import KEPT
-from adhesis.ensemble.task.row import RESULT_DATASETS
+from adhesis.ensemble.run.lock import RunLock
 RunLock(sys.argv[1]).acquire(4, 0.0)
 print("held", flush=True)
 time.sleep(60)

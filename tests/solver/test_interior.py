@@ -69,24 +69,6 @@ def nearly_full_contact():
     return method, state
 
 
-def test_a_closed_trough_carries_the_tension_of_full_contact():
-    """σ = σ_full + p̄ in closed form, but for the narrow gap far away."""
-    method, state = nearly_full_contact()
-    profile, modulus = method.problem.profile, method.problem.half_space.modulus
-    x = np.linspace(0, PERIOD, 4096, endpoint=False)
-    m = np.arange(3)
-    wave = np.exp(1j * np.multiply.outer(x, m) * profile.q0)
-    full = modulus * (wave @ (m * profile.q0 * profile.coefficients)).real
-    tension = -(full + state.mean_stress)
-    inside = (x - state.edges[0, 0]) % PERIOD < state.edges[0, 1] - state.edges[0, 0]
-    trough = inside & (tension > np.roll(tension, 1)) & (tension >= np.roll(tension, -1))
-    place = np.flatnonzero(trough)[np.argmax(tension[trough])]
-    found = method.largest_tension([state])
-    assert found is not None
-    assert found.tension == pytest.approx(tension[place], rel=0.03)
-    assert found.position == pytest.approx(x[place], abs=0.02 * PERIOD)
-
-
 def test_the_tension_is_that_of_an_independent_solution():
     """From the openings of the Riemann-Hilbert solution, with the kernel of the half-space."""
     method, state = nearly_full_contact()
@@ -167,23 +149,6 @@ def test_grid_and_sharp_agree():
     assert sharp.interior is not None
     assert grid.interior is not None
     assert grid.interior.position == pytest.approx(sharp.interior.position, abs=1e-3 * PERIOD)
-
-
-def test_nodes_find_what_the_series_finds():
-    """The way that every method has, which knows fields alone."""
-    method, states = method_of(rough(), 1e8), []
-    run_loop(
-        method,
-        max_penetration=0.9,
-        load_steps=10,
-        on_state=lambda branch, state: states.append(state),
-    )
-    some = [state for state in states if state.patches][::10]
-    exact, at_nodes = method.largest_tension(some), Method.largest_tension(method, some)
-    assert exact is not None
-    assert at_nodes is not None
-    assert at_nodes.state == exact.state
-    assert at_nodes.tension == pytest.approx(exact.tension, rel=0.01)
 
 
 def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
