@@ -43,13 +43,7 @@ from tests.support.fake_run import fake_engine
 
 
 class Damage:
-    """A finished campaign whose copies are damaged.
-
-    Parameters
-    ----------
-    folder : path
-        For the files.
-    """
+    """A finished campaign whose copies are damaged; its files are in ``folder``."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -2,7 +2,6 @@
 
     make figures-of-docs                         all of them (an hour of two cores)
     make figures-of-docs ARGS='loop paper'       some
-    make figures-of-docs ARGS=--check            says of which commit each is
 
 A stamp is a text "Source" inside the PNG: version and commit of adhesis, and the command.
 """
@@ -15,7 +14,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,28 +32,13 @@ _NAME = "Source"
 
 @dataclass(frozen=True)
 class Part:
-    """Figures that one command makes.
-
-    Attributes
-    ----------
-    commands : tuple of str
-        Words after ``python``, run in the folder of the checkout; OUT is a folder for what they
-        make, RANKS the options of a run.
-    made : str
-        Glob of what is kept of it, below OUT.
-    folder : str
-        Where that goes, below docs/.
-    name : str
-        Under which name, if it has another one there.
-    data : str
-        Where its CSV files go, below the checkout.
-    """
+    """Figures that commands make: words after ``python``; OUT is a folder for what they make."""
 
     commands: tuple[str, ...]
-    made: str
-    folder: str
-    name: str = ""
-    data: str = ""
+    made: str  # glob of what is kept, below OUT
+    folder: str  # where that goes, below docs/
+    name: str = ""  # under which name, if it has another one there
+    data: str = ""  # where its CSV files go, below the checkout
 
 
 def _paper() -> tuple[str, ...]:
@@ -95,19 +78,6 @@ def stamp(path: Path, text: str) -> None:
         picture.save(path, pnginfo=about, dpi=picture.info.get("dpi"))
 
 
-def stamped(path: Path) -> str | None:
-    """Return the text that :func:`stamp` put there, None without one."""
-    with Image.open(path) as picture:
-        text: str | None = picture.info.get(_NAME)
-    return text
-
-
-def figures(part: Part) -> list[Path]:
-    """Return the figures of a part that the documentation has."""
-    pattern = part.name or part.made.rpartition("/")[2]
-    return [p for p in sorted((ROOT / "docs" / part.folder).glob(pattern)) if p.suffix == ".png"]
-
-
 def source(name: str) -> str:
     """Return the stamp of a part's figures."""
     version = versions()["adhesis_version"]
@@ -117,7 +87,6 @@ def source(name: str) -> str:
 def make(name: str, ranks: int) -> None:
     """Run the commands of a part and put what they made into docs/, stamped."""
     part = PARTS[name]
-    made: set[Path] = set()
     with tempfile.TemporaryDirectory() as folder:
         for command in part.commands:
             words = command.replace("OUT", folder).split()
@@ -135,29 +104,18 @@ def make(name: str, ranks: int) -> None:
                 to.write_text(re.sub(r" \(\[PDF\]\([^)]*\)\)", "", to.read_text("utf-8")), "utf-8")
             if to.suffix == ".png":
                 stamp(to, source(name))
-            made.add(to)
             print(to.relative_to(ROOT), flush=True)
-    for path in set(figures(part)) - made if made else ():  # of a figure that has another name now
-        path.unlink()
-        print(f"{path.relative_to(ROOT)} removed", flush=True)
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """Make or check; returns 1 if a check finds one without a stamp."""
+def main() -> None:
+    """Make all, or those that are named."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0], allow_abbrev=False)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="default: all")
     parser.add_argument("--ranks", type=int, default=1, help="ranks of the campaigns' runs")
-    parser.add_argument("--check", action="store_true", help="only say of which commit each is")
-    args = parser.parse_args(words)
-    if args.check:
-        found = {path: stamped(path) for part in PARTS.values() for path in figures(part)}
-        for path, text in found.items():
-            print(f"{path.relative_to(ROOT)}: {text or 'not stamped'}")
-        return 0 if all(found.values()) else 1
+    args = parser.parse_args()
     for name in args.parts or PARTS:
         make(name, args.ranks)
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -301,16 +301,6 @@ def independent_clearance(method: Method, state: ContactState) -> float:
     return float(opening.min() / (profile.h_max * profile.q0)) + room
 
 
-def compared_tightly(scene: Scene, number: int) -> bool:
-    """Whether the scene of this number is followed again far more accurately.
-
-    Those of many patches always are: errors of a single jump show in nothing else.
-    """
-    if scene.n0 * scene.ratio > _MOST_WAVES:
-        return True
-    return number % (TIGHT if scene.g > _WEAK else 4 * TIGHT) == 0
-
-
 def judge(scene: Scene, number: int) -> dict[str, Any]:
     """Follow a scene and say what came of it."""
     started = time.process_time()
@@ -323,7 +313,8 @@ def judge(scene: Scene, number: int) -> dict[str, Any]:
         found |= {"loss": loop.loss, "loss_error": loop.loss_error, "races": loop.races}
         found |= {"audit": loop.audit_residual, "drops": loop.loss_from_drops}
         found |= {"openings": loop.openings, "barrier": loop.barrier, **inside}
-        if compared_tightly(scene, number):
+        many = scene.n0 * scene.ratio > _MOST_WAVES  # of a single jump nothing else shows the error
+        if many or number % (TIGHT if scene.g > _WEAK else 4 * TIGHT) == 0:
             found["kind"] = "tight"
             _compare(found, loop, follow(scene, min(1e-5, 1e-2 * scene.accuracy))[0])
         elif number % GRID == 1 and scene.n0 * scene.ratio <= 40 and scene.g > 0.03:

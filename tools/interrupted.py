@@ -16,11 +16,8 @@ class Interrupt(RuntimeError):
 def interrupted(work: Work, delay: float) -> str:
     """Interrupt ``work`` after ``delay`` seconds; returns what it ended in.
 
-    Returns
-    -------
-    str
-        "raised" (what the handler raised), "done" (before that), "lost" (the handler raised, and
-        nothing arrived), or another exception.
+    "raised" (what the handler raised), "done" (before that), "lost" (the handler raised, and
+    nothing arrived), or another exception.
     """
     raised: list[Interrupt] = []
 

@@ -9,7 +9,6 @@ what tests, linters and the optional formats of instruments need besides.
 from __future__ import annotations
 
 import re
-import sys
 import tomllib
 from collections.abc import Iterable
 from importlib.metadata import distribution
@@ -54,7 +53,7 @@ def write(path: Path, versions: dict[str, str]) -> None:
     path.write_text("\n".join([*head, *(versions[key] for key in sorted(versions))]) + "\n")
 
 
-def main() -> int:
+def main() -> None:
     """Write both."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
@@ -62,8 +61,7 @@ def main() -> int:
     tests = closure([text for name in TEST_EXTRAS for text in extras[name]])
     write(ROOT / "requirements.lock", runs)
     write(ROOT / "requirements-test.lock", {k: v for k, v in tests.items() if k not in runs})
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

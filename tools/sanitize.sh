@@ -14,7 +14,7 @@ cd build/sanitized
 export ASAN_OPTIONS=detect_leaks=0 LD_PRELOAD
 LD_PRELOAD="$(c++ -print-file-name=libasan.so) $(c++ -print-file-name=libubsan.so)"
 export PYTHONPATH=$PWD
-"$python" -m pytest -q -p no:cacheprovider tests/solver/test_linear.py tests/solver/test_sine.py \
+"$python" -m pytest -q -p no:cacheprovider \
     tests/solver/test_descent.py tests/solver/test_sharp_field.py tests/solver/test_touch.py \
     tests/solver/test_sharp_many.py "$@"
 "$python" tools/fuzz/loops.py --seed 1 --scenes "${SCENES:-200}"

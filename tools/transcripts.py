@@ -45,63 +45,38 @@ _FACTOR = 3.0
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of a lesson: what is typed, what is shown for it, and where that stands.
+    """A piece of a lesson: what is typed, what is shown for it, and where that stands."""
 
-    Attributes
-    ----------
-    kind : {"command", "python", "session", "file"}
-    typed : str
-    shown : str
-        Output as the page has it; empty for Python without answers and for files.
-    start, end : int
-        Place of ``shown`` in the text of the page.
-    indent : str
-        Before each line of ``shown``.
-    """
-
-    kind: str
+    kind: str  # "command", "python", "session" or "file"
     typed: str
-    shown: str
-    start: int
-    end: int
-    indent: str
+    shown: str = ""  # output as the page has it; none for Python without answers and for files
+    start: int = 0  # place of ``shown`` in the text of the page
+    end: int = 0
 
 
 def pieces(text: str) -> Iterator[Piece]:
     """Find what a page runs, in order."""
     fences = r"^```(?P<language>console|python|pycon|toml)\n(?P<fenced>.*?)^```$"
-    indented = r"(?<=\n\n)(?P<indented>    \$ [^\n]*\n(?:    [^\n]*\n)*)"
-    for found in re.finditer(f"{fences}|{indented}", text, re.MULTILINE | re.DOTALL):
+    for found in re.finditer(fences, text, re.MULTILINE | re.DOTALL):
         language = found["language"]
         if language in ("python", "toml"):
-            kind = "python" if language == "python" else "file"
-            yield Piece(kind, found["fenced"], "", 0, 0, "")
+            yield Piece("python" if language == "python" else "file", found["fenced"])
             continue
-        name = "fenced" if language else "indented"
-        indent = "" if language else "    "
         if language == "pycon":
-            prompt, typed = r">>> ", r">>> .*\n(?:\.\.\.(?: .*)?\n)*"
+            kind, prompt, typed = "session", r">>> ", r">>> .*\n(?:\.\.\.(?: .*)?\n)*"
         else:
-            prompt, typed = r"\$ ", r"\$ (?:.*\\\n)*.*\n"
-        answers = re.compile(
-            rf"^{indent}(?P<typed>{typed})(?P<shown>(?:(?!{indent}{prompt}).*\n)*)", re.MULTILINE
-        )
-        for answer in answers.finditer(found[name]):
-            start, end = (found.start(name) + place for place in answer.span("shown"))
+            kind, prompt, typed = "command", r"\$ ", r"\$ (?:.*\\\n)*.*\n"
+        answers = re.compile(rf"^(?P<typed>{typed})(?P<shown>(?:(?!{prompt}).*\n)*)", re.MULTILINE)
+        for answer in answers.finditer(found["fenced"]):
+            start, end = (found.start("fenced") + place for place in answer.span("shown"))
             words = re.sub(r"^(\$|>>>|\.\.\.) ?", "", answer["typed"], flags=re.MULTILINE)
-            shown = re.sub(rf"^{indent}", "", answer["shown"], flags=re.MULTILINE)
-            kind = "session" if language == "pycon" else "command"
-            yield Piece(kind, words, shown, start, end, indent)
+            yield Piece(kind, words, answer["shown"], start, end)
 
 
 def run(piece: Piece, names: dict[str, object]) -> str:
     """Run a piece in the working directory; returns what it prints, stdout before stderr.
 
-    Parameters
-    ----------
-    piece : Piece
-    names : dict
-        Names of the Python session; they are kept from piece to piece.
+    ``names`` are those of the Python session, kept from piece to piece.
     """
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -193,8 +168,7 @@ def renewed(page: Path, run_pieces: list[tuple[Piece, str]]) -> str:
     for piece, printed in reversed(run_pieces):
         if piece.kind in ("python", "file") or "…" in piece.shown:
             continue
-        lines = "".join(piece.indent + line for line in printed.splitlines(keepends=True))
-        text = text[: piece.start] + lines + text[piece.end :]
+        text = text[: piece.start] + printed + text[piece.end :]
     return text
 
 

@@ -18,7 +18,6 @@ from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megab
 from adhesis.ensemble.bench.scenes import (
     GROWTH,
     ONE_WAVE,
-    PAPER,
     SMALL_ROUGH,
     TWO_WAVES,
 )
@@ -48,24 +47,14 @@ def test_ratio_is_interpolated_between_grid_runs():
 
 
 def test_ratio_is_a_bound_outside_the_grid_runs():
-    better, worse = ratios([*GRID, line("sharp", 1e-6, 0.5, 1e-6), line("sharp", 0.9, 0.5, 0.9)])
+    better, worse = ratios([*GRID, line("sharp", 1e-6, 0.5, 0.0), line("sharp", 0.9, 0.5, 0.9)])
     assert (better.converged.bound, better.converged.value) == (">", pytest.approx(4.0**4 / 0.5))
     assert (worse.converged.bound, worse.converged.value) == ("<", pytest.approx(4.0 / 0.5))
 
 
-def test_an_exact_loss_is_better_than_any_grid():
-    (ratio,) = ratios([*GRID, line("sharp", 1e-6, 1.0, 0.0)])
-    assert (ratio.converged.bound, ratio.converged.value) == (">", pytest.approx(4.0**4))
-
-
-def test_a_grid_run_that_is_beaten_by_a_cheaper_one_does_not_count():
-    wasted = line("grid", 1024, 1e6, 2.0**-4)
-    (ratio,) = ratios([*GRID, wasted, line("sharp", 1e-2, 1.0, 2.0**-3)])
-    assert ratio.converged.value == ratio.cheapest.value == pytest.approx(4.0**3)
-
-
 def test_a_grid_that_is_right_by_chance_is_told_beside_those_that_stay_right():
     coarse, *finer = GRID
+    finer.append(line("grid", 1024, 1e6, 2.0**-4))  # which a cheaper one beats
     lucky = replace(coarse, measured=replace(coarse.measured, loss=1.0 - 2.0**-3))
     (ratio,) = ratios([lucky, *finer, line("sharp", 1e-2, 1.0, 2.0**-3)])
     assert ratio.cheapest.value == pytest.approx(4.0)
@@ -93,14 +82,6 @@ def test_exponents_are_those_of_the_times():
     assert (waves.variable, waves.least, waves.most) == ("wave numbers", 1000, 10_000)
     assert waves.of_loop == pytest.approx(np.log10(5))
     assert waves.of_solution == pytest.approx(0, abs=1e-9)
-
-
-def test_paper_scale_is_the_paper_s():
-    profile = PAPER.problem().profile
-    assert profile.highest_harmonic == 1000
-    assert profile.h_rms == pytest.approx(1e-6)
-    assert (PAPER.max_penetration, PAPER.load_steps, PAPER.work_of_adhesion) == (0.9, 40, 0.04)
-    assert max(scene.n0 * scene.ratio for scene in GROWTH) == 100_000
 
 
 def test_one_wave_is_measured_against_its_exact_loss():

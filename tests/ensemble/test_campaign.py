@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Iterator
 
@@ -14,10 +15,11 @@ from hypothesis import strategies as st
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
-from adhesis.ensemble.campaign.tasks import WHOLE, Part
+from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.task.compute import make_problem
+from adhesis.ensemble.task.compute import check_task, make_problem
 from adhesis.ensemble.task.fields import field_plan
+from adhesis.solver.model.pattern import stripes
 from tests.support.campaign_support import ROOT, campaign_text
 from tests.support.wrong_values import outside
 
@@ -126,19 +128,14 @@ preload = 200; max_penetration =; stiffness = 1e9 -> max_penetration is missing
 preload = 200; max_penetration = 1.2 ->
     max_penetration is 1.2: it must be a positive number from 1e-12 to 0.999999
 preload = [200, 200.0] -> a list of different values
-max_penetration = [0.5, 1] -> max_penetration is 1.0: it must be a positive number from
-adhesion_range = 1e-8; strength = 3e6 -> adhesion_range and strength: at most one of them
 work_of_adhesion_open = 0.02 -> _open is 0.02: it must be at least the work of adhesion, 0.04
-work_of_adhesion_open = [0.02, 0.08] -> work_of_adhesion_open is 0.02: it must be at least
 work_of_adhesion_open = 0.08; work_of_adhesion = [0, 0.04] ->
     must be left out, as γ is 0, in every cell
 work_of_adhesion_open = 0.08; strength = 3e9 -> _open and a range or strength: at most one
-work_of_adhesion_open = 0.08; adhesion_range = 1e-12 -> and a range or strength: at most one
 work_of_adhesion_open = 0.08; method = "grid" ->
     [solver] method is 'grid' beside a work_of_adhesion_open
 # rules that hold in every cell
 n0 = [1, 2]; ratio = [3, 60000] -> n0 · ratio is 120000
-n0 = 2; ratio = 90000 -> n0 · ratio is 180000
 ratio = [4, 16]; rolloff = [2, 8] -> rolloff is 8
 max_penetration = [0.6, 0.3]; field_penetrations = [0.1] ->
     field_penetrations is given beside several max_penetration
@@ -298,24 +295,6 @@ def test_seeds_are_a_promise():
     assert [t.seed for t in tasks[:2]] == [4232842298785526, 2383740928328724]
 
 
-def test_tasks_by_number_are_those_by_column():
-    campaign = parse_campaign(campaign_text(realisations="3", **AXES))
-    for part in (WHOLE, Part(2, 5)):
-        tasks = campaign.tasks(part)
-        assert len(tasks) == len(list(tasks)) == campaign.rows(part).size
-        for name in ("hurst", "work_of_adhesion", "realisation", "seed"):
-            assert tasks.column(name).tolist() == [getattr(task, name) for task in tasks]
-        for name in tasks.names:
-            assert tasks.column(name).tolist() == [dict(task.others)[name] for task in tasks]
-        first = {}
-        for task in tasks:
-            first.setdefault(task.cell, task)
-        assert list(tasks.of_cells()) == list(first.values())
-    assert list(tasks[1:3]) == [tasks[1], tasks[2]]
-    with pytest.raises(IndexError):
-        tasks[len(tasks)]
-
-
 def test_too_many_tasks_are_counted_and_not_made():
     """Three lists of two thousand values make 8e9 cells, which no memory holds."""
     many = [f"[{', '.join(f'{low + k * step:.4g}' for k in range(2000))}]" for low, step in (
@@ -417,6 +396,10 @@ def test_a_number_may_become_an_axis_and_an_axis_longer():
     assert compare(old, grown).grown == ("material.young",)
     assert compare(old, parse_campaign(campaign_text(young="[2e6, 3e6]"))).other
     assert compare(old, parse_campaign(campaign_text(max_penetration="[0.6, 0.3]"))).other
+    fewer, some = (
+        parse_campaign(under(f"preload = {p}")) for p in ("[100, 400]", "[100, 300, 400]")
+    )
+    assert compare(fewer, some).other[0].startswith("cycle.preload is")  # stops of one branch
     # Pairs that were computed must be pairs still.
     paired = {"seed": '5\nzip = [["hurst", "h_rms"]]'}
     one = parse_campaign(campaign_text(h_rms="[1e-6, 2e-6]", **paired))
@@ -449,12 +432,48 @@ def test_fields_under_a_load_are_kept_at_parts_of_it():
     assert plan.max_stress == 300
 
 
-def test_the_strength_of_the_interface_is_a_key_of_the_material_and_may_be_an_axis():
-    text = campaign_text(poisson="0.5\nadhesion_range = [1e-8, 2e-8]")
-    campaign = parse_campaign(text)
-    assert campaign.material.opens
-    assert not parse_campaign(campaign_text()).material.opens
-    found = {make_problem(campaign, task).strength for task in campaign.tasks()}
-    assert found == {0.01 / 1e-8, 0.04 / 1e-8, 0.01 / 2e-8, 0.04 / 2e-8}
-    given = parse_campaign(campaign_text(poisson="0.5\nstrength = 3e6"))
-    assert {make_problem(given, task).strength for task in given.tasks()} == {3e6}
+# Keys of [material] that make an interface, γ = 0.04 J/m²; what the problems of the tasks have.
+INTERFACES: list[tuple[str, str, list[object]]] = [
+    ("", "strength", [math.inf]),
+    ("adhesion_range = [1e-8, 2e-8]", "strength", [4e6, 2e6]),
+    ("strength = 3e6", "strength", [3e6]),
+    ("", "work_of_adhesion_open", [None]),
+    ('work_of_adhesion_open = ["50 mJ/m2", 0.08]', "work_of_adhesion_open", [0.05, 0.08]),
+    ("work_of_adhesion_open = 0.04", "work_of_adhesion_open", [None]),  # also with the method grid
+    ("", "pattern", [None]),
+    ("stripes = 2\nstripe_amplitude = 0.1", "pattern", [stripes(2, 0.1)]),
+    (
+        "stripes = [2, 8]\nstripe_amplitude = [0.1, 0.3]\nstripe_phase = 0.5",
+        "pattern",
+        [stripes(n, e, 0.5) for n in (2, 8) for e in (0.1, 0.3)],
+    ),
+]
+
+
+@pytest.mark.parametrize(("keys", "name", "found"), INTERFACES)
+def test_keys_of_the_interface_reach_every_task_and_may_be_axes(keys, name, found):
+    text = campaign_text(work_of_adhesion="[0.04]", hurst="[0.8]", realisations="1")
+    if found != [None] and name == "work_of_adhesion_open":  # which the grid refuses
+        text = text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
+    campaign = parse_campaign(text.replace("poisson = 0.5", f"poisson = 0.5\n{keys}"))
+    assert [getattr(make_problem(campaign, task), name) for task in campaign.tasks()] == found
+    assert campaign.material.opens == (name == "strength" and keys != "")
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("stripes = 0\nstripe_amplitude = 0.5", r"stripes is 0: it must be"),
+        ("stripes = 2\nstripe_amplitude = 1", r"stripe.amplitude is 1.*: it must be"),
+        ("stripes = 2", "the amplitude of stripes of the work of adhesion is missing"),
+        ("stripe_phase = 1.0", "the number of stripes of the work of adhesion is missing"),
+        ("stripes = 2\nstripe_amplitude = 0.1\nstrength = 1e8", "is given beside a strength"),
+    ],
+)
+def test_stripes_that_cannot_be_are_refused_by_file_and_command(keys, message, capsys):
+    text = campaign_text(work_of_adhesion="[0.04]", poisson=f"0.5\n{keys}")
+    with pytest.raises(InputError, match=message):
+        check_task(campaign := parse_campaign(text), campaign.tasks()[0])
+    words = [f"--{key}".replace(" = ", "=").replace("_", "-") for key in keys.splitlines()]
+    assert main(["loop", "--hurst", "0.8", "--n0", "2", "--ratio", "4", *words]) == 2
+    assert re.search(message, capsys.readouterr().err)

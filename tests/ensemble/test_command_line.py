@@ -17,6 +17,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command import main as command_line
 from adhesis.ensemble.command.main import COMMANDS, main, module_of, parser_of
 from adhesis.ensemble.errors import RankError
+from adhesis.ensemble.quantities import Quantity
 from adhesis.ensemble.results.layout import create
 from adhesis.solver import checks
 from adhesis.solver.registry import METHOD_NAMES
@@ -127,7 +128,7 @@ def required(name: str) -> list[str]:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_refuses_what_it_cannot_read(name, capsys):
-    """An unknown option, a missing value, an empty one, and a text in place of a number."""
+    """Unknown or without a value, empty, another unit, no choice, a text in place of a number."""
     assert "unrecognized arguments: --speed" in refused(capsys, [name, *required(name), "--speed"])
     for action in parser_of(name)._actions:
         if not action.option_strings or action.nargs == 0:
@@ -136,6 +137,11 @@ def test_every_option_refuses_what_it_cannot_read(name, capsys):
         assert f"{option}: expected" in refused(capsys, [name, option])
         if action.choices is None:
             assert f"{option} is ''" in refused(capsys, [name, option, ""])
+        if isinstance(getattr(action.type, "__self__", None), Quantity):
+            for text in ("5 parsec", "5um5", "0,3nm"):
+                assert f"{option} is {text!r}: it" in refused(capsys, [name, option, text])
+        if action.choices is not None:
+            assert f"{option} is 'x': it must be one of" in refused(capsys, [name, option, "x"])
         if action.type in (int, float):
             assert f"{option} is 'x': it must be a" in refused(capsys, [name, option, "x"])
         if action.type is int:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
 from markdown_it import MarkdownIt
@@ -20,7 +16,7 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.session import run_campaign
-from tests.support.campaign_support import adhesis, campaign_text, run_python, write_campaign
+from tests.support.campaign_support import campaign_text, run_python
 from tests.support.fake_run import fake_engine
 
 HOSTILE = [
@@ -156,37 +152,3 @@ def test_a_run_through_a_link_makes_and_grows_the_file_that_it_leads_to(tmp_path
             assert len(file) == campaign.task_count
             assert np.all(file.status() == 1)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["r.h5", "real.h5", "scratch"]
-
-
-# ---------------------------------------------------------------------------------- full disk
-
-
-@pytest.fixture
-def full_disk(tmp_path):
-    """A small file system of its own without a free byte."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or shutil.which("mount") is None:
-        pytest.skip("only root can mount a file system to fill")
-    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        pytest.skip("no file system can be mounted here")
-    try:
-        with (folder / "filler").open("wb", buffering=0) as filler:
-            for size in (4096, 1):
-                while True:
-                    try:
-                        filler.write(bytes(size))
-                    except OSError:
-                        break
-        yield folder
-    finally:
-        subprocess.run(["umount", str(folder)], check=True)
-
-
-def test_a_disk_that_is_full_at_the_start_is_one_sentence_and_74(tmp_path, full_disk):
-    process = adhesis("run", write_campaign(tmp_path), "--out", full_disk / "r.h5", fake="")
-    assert process.returncode == 74
-    (line,) = process.stderr.splitlines()
-    assert "r.h5.lock cannot be written: No space left on device" in line
-    assert os.listdir(full_disk) == ["filler"]

@@ -19,7 +19,6 @@ from adhesis import (
     Problem,
     make_method,
     run_loop,
-    run_path,
     self_affine_profile,
     single_wave,
 )
@@ -112,14 +111,6 @@ def test_a_frame_shows_the_exact_surface_and_patches(control):
         assert np.abs(scene.surface - exact).max() < 1e-9
         assert np.diff(scene.patches, axis=1).sum() == pytest.approx(2 * state.internal)
     assert next(len(s.patches) for s in scenes.scenes if len(s.patches)) == 2  # across the period
-
-
-def test_a_path_is_filmed_too():
-    problem = Problem(single_wave(1e-6, 1e-3), MATERIAL, 1e-3)
-    path = run_path(ExactWave(problem), [0.5, 0.2, 0.6], load_steps=4)
-    film = path.film(frames=10)
-    assert len(film) >= 10
-    assert "path: work" in film.page
 
 
 # ---------------------------------------------------------------------- files

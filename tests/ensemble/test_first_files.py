@@ -33,9 +33,7 @@ def listed(text: str) -> list[tuple[str, str]]:
     return found
 
 
-def test_a_new_campaign_runs_as_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_new_campaign_runs_as_it_is(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["new", "my.toml"]) == 0
     assert capsys.readouterr().out.startswith("wrote       my.toml\n")
@@ -55,9 +53,7 @@ def test_a_new_campaign_lists_every_key_of_the_page() -> None:
 
 
 @pytest.mark.parametrize(("table", "key"), KEYS)
-def test_a_key_in_a_comment_shows_its_default_or_a_value_that_is_allowed(
-    table: str, key: str
-) -> None:
+def test_a_key_in_a_comment_shows_its_default_or_a_value_that_is_allowed(table, key):
     text = campaign_template()
     line = next(
         line
@@ -91,9 +87,7 @@ def test_a_key_in_a_comment_shows_its_default_or_a_value_that_is_allowed(
 SAMPLE = "ee3eef042a9a60b37058b75ada90394d5b83ad112bde53187398f61592cdd5e7"
 
 
-def test_the_sample_is_a_trace_and_the_same_everywhere(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_sample_is_a_trace_and_the_same_everywhere(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["sample", "t.csv"]) == 0
     shown = capsys.readouterr().out

@@ -7,7 +7,6 @@ import io
 import json
 import os
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -116,9 +115,7 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
 
 @pytest.mark.parametrize("read", [read_heights, read_trace], ids=["heights", "trace"])
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_foreign_files_are_refused_in_one_short_sentence(
-    kind: str, read: Callable[[Path], object], tmp_path: Path
-) -> None:
+def test_foreign_files_are_refused_in_one_short_sentence(kind, read, tmp_path):
     name, data, words = FOREIGN[kind]
     path = tmp_path / name
     path.write_bytes(data)
@@ -129,9 +126,7 @@ def test_foreign_files_are_refused_in_one_short_sentence(
 
 
 @pytest.mark.parametrize("read", [read_heights, read_trace], ids=["heights", "trace"])
-def test_a_file_that_may_not_be_read_is_refused(
-    read: Callable[[Path], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_may_not_be_read_is_refused(read, tmp_path, monkeypatch):
     path = tmp_path / "a.csv"
     path.write_text("1")
 
@@ -229,12 +224,7 @@ def test_no_shift_of_a_periodic_profile_is_warned_of() -> None:
 
 
 @pytest.mark.parametrize("path", [(), ("--path", "0.5,0.2,0.4,out")], ids=["loop", "path"])
-def test_the_warning_goes_to_stderr_json_and_exit_code(
-    path: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_warning_goes_to_stderr_json_and_exit_code(path, tmp_path, monkeypatch, capsys):
     # The method is of a single wave: only the heights that are read are tilted.
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
@@ -282,9 +272,7 @@ def test_a_campaign_may_have_a_utf_8_mark(tmp_path: Path) -> None:
         (b"\x89PNG\r\n\x1a\n\0\0", "it is not UTF-8 text (it holds zero bytes)"),
     ],
 )
-def test_a_campaign_in_another_encoding_is_refused(
-    data: bytes, reason: str, tmp_path: Path
-) -> None:
+def test_a_campaign_in_another_encoding_is_refused(data, reason, tmp_path):
     path = tmp_path / "c.toml"
     path.write_bytes(data)
     with pytest.raises(InputError) as refusal:

@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -22,70 +21,36 @@ from tests.support.campaign_support import (
 )
 
 ANOTHER_USER = 23456
-# Values of ulimit: open files, of which Python itself needs 5, and kB of memory and of files.
-LIMITS = {
-    "n": (5, 8, 16, 32, 64),
-    "v": (150_000, 300_000, 600_000, 1_000_000, 2_000_000),
-    "f": (0, 8, 50, 150, 1000),
-    "u": (1, 4, 8, 16, 32),
-}
 MATERIAL = ("--work-of-adhesion", "0.01", "--young", "1e6", "--poisson", "0.5")
 LOOP = ("--hurst", "0.8", "--n0", "1", "--ratio", "4", "--load-steps", "4", "--method", "grid")
 WORDS: dict[str, tuple[object, ...]] = {
     "new": ("n.toml",),
     "run": ("{}/c.toml", "--out", "r.h5"),
     "status": ("{}/r.h5",),
-    "verify": ("{}/r.h5",),
-    "merge": ("{}/r.h5", "--out", "all.h5"),
-    "report": ("{}/r.h5", "--to", "report"),
     "loop": (*LOOP, *MATERIAL, "--accuracy", "0.1", "--quiet", "--json", "l.json"),
-    "trace": ("{}/s.csv", "--unit", "um", *MATERIAL, "--plan"),
-    "sample": ("s.csv",),
-    "validate": ("--method", "grid"),
     "bench": ("--quick", "--to", "bench"),
     "doctor": (),
-    "completion": ("bash",),
 }
-# The value of each limit that is hardest to bear, and the commands that meet it each in a way of
-# their own: with few modules or many, files, threads, processes. --slow: all commands and values.
-HARDEST = {
-    "n": (5, ("new", "run", "loop", "doctor")),
-    "v": (600_000, ("run", "loop")),
-    "f": (0, ("new", "run", "loop", "doctor")),
-    "u": (1, ("run", "loop", "bench", "doctor")),
-}
-RANGES = {"n": ("status",), "v": ("status",), "f": ("run",), "u": ("status",)}
-AS_OTHERS = pytest.mark.slow(reason="a start of Python each, refused where other commands are")
-
-
-def case(limit: str, value: int, name: str) -> Any:
-    """Return the case, marked as slow if others are like it."""
-    hardest, names = HARDEST[limit]
-    alone = (value == hardest and name in names) or (
-        name in RANGES[limit] and value == LIMITS[limit][2]
-    )
-    return pytest.param(limit, value, name, marks=() if alone else AS_OTHERS)
-
-
+# Values of ulimit: open files, of which Python itself needs 5, kB of memory and of files, and
+# processes; with each the commands that meet it in a way of their own.
 CASES = [
-    case(limit, value, name)
-    for limit, values in LIMITS.items()
-    for name in WORDS
-    for value in (values if name in (*RANGES[limit], "merge") else (HARDEST[limit][0],))
-    if (limit, name) not in (("f", "bench"), ("f", "report"))  # see test_outputs.py: both write so
+    (limit, value, name)
+    for limit, value, names in (
+        *(("n", 5, "new run loop doctor"), ("n", 16, "status")),
+        *(("v", 600_000, "run loop status"), ("f", 0, "new run loop doctor"), ("f", 50, "run")),
+        *(("u", 1, "run loop bench doctor"), ("u", 8, "status")),
+    )
+    for name in names.split()
 ]
-# It goes on for long where files are limited; its first line shows that it has begun.
-LONG = {"validate"}
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a campaign, its results file of about 500 kB, and a trace."""
+    """A folder with a campaign, and its results file of about 500 kB."""
     folder = tmp_path_factory.mktemp("finished")
     path = write_campaign(folder, realisations="40")
     done = adhesis_here("run", path, "--out", folder / "r.h5", fake="")
     assert done.returncode == 0, done.stderr
-    assert adhesis_here("sample", folder / "s.csv").returncode == 0
     return folder
 
 
@@ -108,12 +73,8 @@ def limited(
         stderr=subprocess.PIPE,
         text=True,
     )
-    assert process.stdout is not None
-    first = process.stdout.readline() if words[0] in LONG else ""
-    if first:
-        process.terminate()
     out, errors = process.communicate(timeout=120)
-    return subprocess.CompletedProcess(words, process.returncode, first + out, errors)
+    return subprocess.CompletedProcess(words, process.returncode, out, errors)
 
 
 @pytest.mark.parametrize(("limit", "value", "name"), CASES)
@@ -135,12 +96,11 @@ def test_a_command_under_a_limit_ends_in_one_sentence_and_leaves_nothing_half_wr
     if name == "doctor" and done.returncode == 1:
         assert "FAIL" in done.stdout
         return
-    began = name in LONG and done.returncode == 143 and done.stdout != ""
     allowed = {"f": {74}, "v": {71}}.get(limit, {71, 74})  # an output may need the file too many
-    assert began or done.returncode in allowed, done.stderr
+    assert done.returncode in allowed, done.stderr
     # without the lines that tell every ten seconds how far it is
-    sentences = [line for line in done.stderr.splitlines() if not line.endswith(" s)")]
-    assert began or (len(sentences) == 1 and sentences[0].startswith(f"adhesis {name}: "))
+    (sentence,) = (line for line in done.stderr.splitlines() if not line.endswith(" s)"))
+    assert sentence.startswith(f"adhesis {name}: ")
 
 
 def test_a_python_process_survives_a_row_that_the_disk_did_not_take(finished: Path) -> None:
@@ -173,12 +133,7 @@ def test_a_python_process_survives_a_row_that_the_disk_did_not_take(finished: Pa
         (ImportError("libx.so: failed to map segment from shared object"), "failed to map segment"),
     ],
 )
-def test_what_the_system_does_not_grant_is_one_sentence_and_71(
-    error: Exception,
-    words: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_the_system_does_not_grant_is_one_sentence_and_71(error, words, monkeypatch, capsys):
     def fail(*_: object) -> int:
         try:
             raise error

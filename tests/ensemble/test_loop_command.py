@@ -69,20 +69,6 @@ def test_stripes_lower_the_loss_of_a_wave_whose_crest_is_weak(wave_file, tmp_pat
     assert "J/m² along the profile)" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--stripes", 0, "--stripe-amplitude", 0.5), "--stripes is 0: it must be"),
-        (("--stripes", 4, "--stripe-amplitude", 1), "--stripe-amplitude is 1.0: it must be"),
-        (("--stripes", 4), "the amplitude of stripes of the work of adhesion is missing"),
-        ((*STRIPES, "--adhesion-range", "1e-12"), "a pattern of the work of adhesion is given"),
-    ],
-)
-def test_wrong_stripes_are_refused(wave_file, capsys, words, message):
-    assert run(*wave_words(wave_file, *words)) == 2
-    assert message in capsys.readouterr().err
-
-
 @pytest.mark.usefixtures("exact_method")
 def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, capsys):
     out = tmp_path / "loop.json"

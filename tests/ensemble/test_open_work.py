@@ -16,7 +16,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.findings import verdict
 from adhesis.ensemble.report.paper import is_reading
 from adhesis.ensemble.report.tables.loss_tables import losses
-from adhesis.ensemble.task.compute import Runner, make_problem
+from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import beyond_zero_range
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import check as check_trace
@@ -117,34 +117,6 @@ def test_the_answer_of_a_trace_has_its_friction(monkeypatch):
 
 
 # ---------------------------------------------------------------------- campaign
-
-
-def test_it_is_a_key_of_the_material_and_may_be_an_axis():
-    campaign = parse_campaign(text('["50 mJ/m2", 0.08]'))
-    assert campaign.has_axis("work_of_adhesion_open")
-    found = {
-        (task.work_of_adhesion, make_problem(campaign, task).work_of_adhesion_open)
-        for task in campaign.tasks()
-    }
-    assert found == {(0.01, 0.05), (0.01, 0.08), (0.04, 0.05), (0.04, 0.08)}
-    assert parse_campaign(campaign_text()).material.work_of_adhesion_open is None
-
-
-def test_zip_joins_it_with_the_work_of_adhesion():
-    joined = text("[0.02, 0.08]", seed='5\nzip = [["work_of_adhesion", "work_of_adhesion_open"]]')
-    campaign = parse_campaign(joined)
-    found = {
-        (task.work_of_adhesion, make_problem(campaign, task).gamma_open)
-        for task in campaign.tasks()
-    }
-    assert found == {(0.01, 0.02), (0.04, 0.08)}
-
-
-def test_equal_works_of_adhesion_are_those_of_one():
-    campaign = parse_campaign(
-        campaign_text(work_of_adhesion="[0.04]", poisson="0.5\nwork_of_adhesion_open = 0.04")
-    )  # also with the method grid
-    assert make_problem(campaign, campaign.tasks()[0]).work_of_adhesion_open is None
 
 
 def test_a_row_has_its_friction():

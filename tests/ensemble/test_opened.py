@@ -116,13 +116,15 @@ def test_every_figure_of_the_report_has_a_method_that_returns_it(results):
     assert results.plot.loss_against_hurst().axes[-1].get_xlabel() == "Hurst exponent $H$"
 
 
-def test_every_figure_is_drawn_into_axes_that_are_given(results):
+def test_every_figure_is_drawn_into_axes_that_are_given(tmp_path):
     """A figure of a user's own has the curves, scales and labels of the one of the report."""
+    plan = campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=4)
+    results = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan)))
     names = [name for name in vars(Plots) if name[0] != "_" and name != "loss_along"]
     for name in names:
         draw = getattr(results.plot, name)
         alone = draw()
-        mine = Figure(figsize=(6, 20), layout="constrained")
+        mine = Figure(figsize=(6, 20))
         given = mine.subplots(len(alone.axes), 1, squeeze=False)
         assert draw(ax=given) is mine
         for panel, own in zip(given[:, 0], alone.axes, strict=True):

@@ -74,9 +74,7 @@ def test_a_full_disk_costs_one_output_and_neither_the_others_nor_the_loss(ask: A
     assert "</svg>" in Path("f.svg").read_text()
 
 
-def test_a_failure_in_the_middle_leaves_the_old_file(
-    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_failure_in_the_middle_leaves_the_old_file(ask, monkeypatch, tmp_path):
     Path("o.json").write_text("old")
 
     def full(*_: object) -> None:

@@ -278,9 +278,7 @@ def refused_by(call: Callable[[], object]) -> None:
 
 
 @pytest.mark.parametrize("kind", [kind for kind in MADE if kind != "file"])
-def test_what_stands_in_the_place_of_the_lock_is_refused(
-    kind: str, place: Callable[..., str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_stands_in_the_place_of_the_lock_is_refused(kind, place, capsys):
     place(kind, ".h5.lock")
     run = adhesis.Campaign("c.toml").tables
     refused_by(lambda: run_campaign(run, "crafted.h5", engine=fake_engine("")))
@@ -289,9 +287,7 @@ def test_what_stands_in_the_place_of_the_lock_is_refused(
 
 
 @pytest.mark.parametrize("kind", MADE)
-def test_what_stands_in_the_place_of_the_unfinished_file_is_removed_and_not_followed(
-    kind: str, place: Callable[..., str]
-) -> None:
+def test_what_stands_in_the_place_of_the_unfinished_file_is_removed_and_not_followed(kind, place):
     place(kind, ".h5.part")
     run = adhesis.Campaign("c.toml").tables
     if kind == "folder":

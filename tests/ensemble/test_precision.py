@@ -109,12 +109,6 @@ def test_a_cell_is_described_with_quantity_both_ends_and_verdict():
     assert "… and 5 more" in many[-1]
 
 
-def test_looks_are_after_the_first_and_every_batch():
-    assert looks(8, 4, 20) == [8, 12, 16, 20]
-    assert looks(8, 5, 20) == [8, 13, 18, 20]
-    assert looks(8, 4, 8) == [8]
-
-
 def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
     rng = np.random.default_rng(2)
     losses = rng.normal(1, 0.2, 200)
@@ -134,17 +128,6 @@ def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
     assert 1.98 * rare.std(ddof=1) / np.sqrt(rare.size) / rare.mean() < 0.06
     assert not precision(rare, 0.07).narrow
     assert enough(np.full(200, np.nan), at, 0.05) == 200  # all failed: there is an end
-
-
-def test_a_wide_look_starts_the_count_of_looks_again():
-    """Two narrow looks lapse when a large loss makes the next one wide."""
-    at = looks(8, 8, 200)
-    losses = np.tile([0.9, 1.1], 100)
-    losses[40] = 1.6  # seen first at the look at 48
-    found = [precision(losses[:n], 0.045).narrow for n in at]
-    assert found[:7] == [False, False, False, True, True, False, True]  # 8, 16, … 56 realisations
-    assert all(found[6:])
-    assert enough(losses, at, 0.045) == at[9]
 
 
 @pytest.mark.parametrize(
@@ -168,20 +151,20 @@ def test_fewest_realisations_are_those_of_a_cell_without_any_spread(first, batch
     ids=["normal", "lognormal 0.5", "lognormal 1", "heavy tail"],
 )
 def test_intervals_at_the_stop_cover_the_mean(draw, wanted):
-    """A thousand campaigns of known mean 1: at least 93 % of the intervals hold it.
+    """Four hundred campaigns of known mean 1: at least 93 % of the intervals hold it.
 
     More kinds of losses, and other wishes: benchmarks/precision_coverage.py.
     """
     rng, most = np.random.default_rng(7), 600
     at, held, counts = looks(16, 16, most), 0, []
-    for _ in range(1000):
+    for _ in range(400):
         losses = draw(rng, most)
         count = enough(losses, at, wanted)
         assert count is not None
         low, high = interval(losses[:count])
         held += low <= 1 <= high
         counts.append(count)
-    assert held >= 930
+    assert held >= 0.93 * 400
     assert np.median(counts) < 0.55 * most  # it is the rule that stops, not the end
 
 

@@ -111,9 +111,7 @@ def test_pilot_loops_short_of_their_preload_are_reported():
 
     text = campaign_text(realisations="1").replace("max_penetration = 0.6", "preload = 5000")
     campaign = parse_campaign(text)
-    (warning,) = (
-        s for s in str(price(campaign, compute=falls_short)).splitlines() if "WARN" in s
-    )
+    (warning,) = (s for s in str(price(campaign, compute=falls_short)).splitlines() if "WARN" in s)
     assert warning == (
         "WARNING: 2 of 4 pilot loops do not reach the preload, and turn at the latest turning "
         "point: at load steps the mean stress is at most 1.2 kPa. Rougher profiles, a stiffer "
@@ -163,14 +161,6 @@ def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
     reported = price(campaign, path, compute=compute)
     assert (reported.done, reported.pilots) == (6, 2)
     assert reported.seconds == pytest.approx(cost(campaign.tasks()[6]) + cost(campaign.tasks()[7]))
-
-
-def test_a_results_file_of_another_campaign_is_refused(tmp_path):
-    path = tmp_path / "r.h5"
-    create(path, parse_campaign(campaign_text()))
-    other = parse_campaign(campaign_text(period="2e-3"))
-    with pytest.raises(InputError, match=r"r\.h5 holds another campaign: .*period"):
-        price(other, path, compute=compute)
 
 
 def test_loops_on_one_loading_branch_are_tried_together(monkeypatch):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from math import inf, nan
-from pathlib import Path
 
 import pytest
 
@@ -47,29 +46,14 @@ REFUSED: list[tuple[Quantity, str, str]] = [
     (LENGTH, "um", "is 'um': it must be a length"),
     (LENGTH, "5 parsec", f"is '5 parsec': its unit must be one of {LENGTHS}"),
     (LENGTH, "1,5mm", "is '1,5mm': it must be a length"),
-    (LENGTH, "5um5", "is '5um5': it must be a length"),
     (LENGTH, "9" * 400 + "x", "…': its unit must be one of m, cm"),
-    (
-        LENGTH,
-        "20",
-        "is 20, which would be 20 m: give its unit, as in 20um (20m, if metres are meant)",
-    ),
+    (LENGTH, "20", "which would be 20 m: give its unit, as in 20um (20m, if metres are meant)"),
     (HEIGHT, "0.4", "is 0.4, which would be 0.4 m: give"),
     (STRESS, "", "is '': it must be a stress, as in 2e4 (Pa) or 20kPa"),
-    (
-        STRESS,
-        "1mPa",
-        "is '1mPa': its unit must be one of Pa, kPa, MPa, GPa",
-    ),  # a thousandth of 1 Pa
-    (STRESS, "1 bar", "is '1 bar': its unit must be one of Pa"),
-    (
-        WORK_OF_ADHESION,
-        "20",
-        "is 20, which would be 20 J/m²: give its unit, as in 20mJ/m2 (20J/m2, if",
-    ),
+    (STRESS, "1mPa", "is '1mPa': its unit must be one of Pa, kPa, MPa, GPa"),  # no thousandth
+    (WORK_OF_ADHESION, "20", "which would be 20 J/m²: give its unit, as in 20mJ/m2 (20J/m2, if"),
     (WORK_OF_ADHESION, "20mJ", f"is '20mJ': {IS_WORK}"),
     (WORK_OF_ADHESION, "0,02", f"is '0,02': {IS_WORK}"),
-    (WORK_OF_ADHESION, "20kJ/m2", f"its unit must be one of {WORKS}"),
     (WORK_OF_ADHESION, "20J/m", f"its unit must be one of {WORKS}"),
     (WORK_OF_ADHESION, "20mN/m²", f"its unit must be one of {WORKS}"),
     (WORK_OF_ADHESION, "20Nm", "it must be a number in J/m²"),
@@ -139,9 +123,7 @@ def test_lengths_of_a_campaign_may_have_units() -> None:
     assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
 
 
-def test_a_campaign_file_is_asked_for_units_and_the_text_in_a_results_file_is_not(
-    tmp_path: Path,
-) -> None:
+def test_a_campaign_file_is_asked_for_units_and_the_text_in_a_results_file_is_not(tmp_path):
     """What is computed stays readable. Of the file: test_campaign.py."""
     assert parse_campaign(campaign_text(period="1000")).tasks()
     text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
@@ -213,9 +195,7 @@ def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: s
         (1.2, 0.112, "1.20 ± 0.11"),
     ],
 )
-def test_no_interval_leaves_the_bounds_of_its_quantity(
-    value: float, error: float, text: str
-) -> None:
+def test_no_interval_leaves_the_bounds_of_its_quantity(value, error, text):
     """A fraction of contact of more than 1 is not printed, unless it was given."""
     assert with_error(value, error, 0.0, 1.0) == text
 

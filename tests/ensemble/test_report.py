@@ -40,7 +40,6 @@ from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
-from adhesis.ensemble.report.tables.loss_tables import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
@@ -202,12 +201,6 @@ def test_the_largest_tension_is_not_placed_where_contact_is_lost(data):
     headings = [column.heading for column in mechanism_tables.mechanisms(data).columns]
     assert "largest tension (kPa)" in headings
     assert "last contact lost at Δ/h_max" in headings
-
-
-def test_every_work_of_a_table_has_its_unit(data):
-    for column in works(data).columns:
-        if column.heading and "[J/m^2]" in column.name:
-            assert column.heading.endswith("J/m²)"), column.heading
 
 
 def test_jumps_by_kind_add_up_to_all_drops(data):

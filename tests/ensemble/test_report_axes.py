@@ -17,7 +17,6 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.catalogue import sections
-from adhesis.ensemble.report.figures.loops import _bands
 from adhesis.ensemble.report.figures.style import style
 from adhesis.ensemble.report.tables.loss_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
@@ -72,23 +71,6 @@ def test_a_cell_is_one_point_on_all_axes(file, data):
             np.testing.assert_array_equal(cell.values["loss"], raw.loss.values[mine.values])
     assert data.cells[-1].done == 2
     assert all(cell.done == 3 for cell in data.cells[:-1])
-
-
-def test_differences_are_taken_between_cells_that_differ_in_gamma_alone(data):
-    assert len(data.paired) == 2 * 2 * 3
-    for pair in data.paired:
-        low, high = (
-            next(
-                c
-                for c in data.cells
-                if (c.hurst, c.work_of_adhesion, c.others) == (pair.hurst, gamma, pair.others)
-            )
-            for gamma in (0.01, 0.04)
-        )
-        both = min(low.done, high.done)
-        expected = high.values["loss"][:both] - low.values["loss"][:both]
-        assert (pair.loss.n, pair.lower, pair.upper) == (both, 0.01, 0.04)
-        assert pair.loss.mean == pytest.approx(expected.mean())
 
 
 def test_curves_and_states_of_a_cell_are_in_its_own_units(data):
@@ -242,16 +224,6 @@ def test_units_are_those_in_which_the_campaign_was_written(tmp_path):
     heading, _, first, *_ = losses(aggregate(path)).markdown().splitlines()
     assert [cell.strip() for cell in heading.split("|")[2:4]] == ["γ (mJ/m²)", "h_rms (µm)"]
     assert [cell.strip() for cell in first.split("|")[2:4]] == ["10", "0.5"]
-
-
-def test_a_curve_that_ends_early_has_its_shading():
-    """A loop that turns at a stress has no states beyond: its curve is NaN there."""
-    x = np.array([0.0, 1.0, 2.0, np.nan])
-    ((middle, low, high),) = _bands(x, x + 1, x + 2)
-    assert middle[0] < 0.1
-    assert middle[-1] > 1.9
-    assert high - low == pytest.approx(np.ones(low.size), abs=0.1)
-    assert _bands(x[3:], x[3:], x[3:]) == []
 
 
 def test_spectra_are_of_cells_that_have_fields(tmp_path):

@@ -15,29 +15,19 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
 from adhesis.ensemble.run import launch
-from tests.support.campaign_support import campaign_text, done_rows
+from tests.support.campaign_support import campaign_text, done_rows, wait_until
 from tests.support.launchers import PATH
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPT = ROOT / "jobs" / "slurm.sh"
 pytestmark = pytest.mark.slurm
-
-
-def wait_for(what: Callable[[], object], text: str, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while not what():
-        if time.monotonic() > end:
-            raise TimeoutError(f"{text}: not within {seconds:.0f} s")
-        time.sleep(0.2)
 
 
 def processes_in(folder: Path, word: str) -> list[int]:
@@ -192,13 +182,13 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
         socket_path = folder / "munge.socket"
         files = [f"--{name}-file={folder}/munge.{name}" for name in ("key", "pid", "log", "seed")]
         start("munged", "--foreground", "--force", f"--socket={socket_path}", *files)
-        wait_for(socket_path.exists, "munged", 20)
+        wait_until(socket_path.exists, 20)
         start("slurmctld", "-D", "-f", folder / "slurm.conf")
         start("slurmd", "-D", "-f", folder / "slurm.conf")
         try:
-            wait_for(idle, "an idle node", 60)
-        except TimeoutError as error:
-            reason = f"{error}\n{cluster.logs()}"
+            wait_until(idle, 60, 0.2)
+        except AssertionError:
+            reason = f"no idle node within 60 s\n{cluster.logs()}"
             if os.environ.get("CI"):
                 pytest.fail(reason)
             pytest.skip(f"Slurm is installed, but does not start here: {reason}")
@@ -247,29 +237,14 @@ class Job:
     def wait(self, what: Callable[[], object], text: str, seconds: float = 90) -> None:
         """Wait for a condition; the job and all logs in the message."""
         try:
-            wait_for(what, text, seconds)
-        except TimeoutError as error:
-            raise AssertionError(
-                f"{error}\n{self.values}\n{self.log}\n{self.cluster.logs()}"
-            ) from error
-
-
-class Submit(Protocol):
-    """How a job is submitted; see :func:`submit`."""
-
-    def __call__(
-        self,
-        *words: str,
-        realisations: int = 3,
-        launcher: str = "",
-        silence: int = 120,
-        staging: str = "",
-    ) -> Job:
-        """Submit."""
+            wait_until(what, seconds, 0.2)
+        except AssertionError as error:
+            about = f"{text}: not within {seconds:.0f} s\n{self.values}\n{self.log}\n"
+            raise AssertionError(about + self.cluster.logs()) from error
 
 
 @pytest.fixture(scope="module")
-def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Submit:
+def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Job]:
     """Return what submits a campaign of 4 times so many tasks, from a folder with a comma.
 
     All is the real command but for the mechanics and the report. A rank of a first start computes
@@ -315,7 +290,7 @@ exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
 
 
 @pytest.fixture(scope="module")
-def jobs(cluster: Cluster, submit: Submit) -> dict[str, Job]:
+def jobs(cluster: Cluster, submit: Callable[..., Job]) -> dict[str, Job]:
     """Every job of this module."""
     # Slurm looks at its clocks twice a minute and signals up to a minute early: soon, that is.
     limited = ("--ntasks=2", "--time=2", "--signal=B:USR1@85")
@@ -369,9 +344,7 @@ def test_a_job_with_a_rank_that_hangs_comes_back_and_finishes(jobs: dict[str, Jo
     assert job.done_tasks() == 40
 
 
-def test_two_jobs_of_one_campaign_with_staging_lose_no_row(
-    cluster: Cluster, jobs: dict[str, Job]
-) -> None:
+def test_two_jobs_of_one_campaign_with_staging_lose_no_row(cluster, jobs):
     """The second one comes while the first runs, which then comes back and finishes."""
     first = jobs["staged"]
     first.wait(lambda: first.staged_tasks() > 0, "a first task")
@@ -411,9 +384,7 @@ def test_parts_run_as_an_array_and_are_joined(jobs: dict[str, Job]) -> None:
     assert (merge.folder / "study").is_dir()  # reported
 
 
-def test_a_job_at_its_time_limit_is_requeued_and_finishes(
-    cluster: Cluster, jobs: dict[str, Job]
-) -> None:
+def test_a_job_at_its_time_limit_is_requeued_and_finishes(cluster, jobs):
     job = jobs["limited"]
     job.wait(lambda: "USR1 received" in job.log, "signalled")
     job.wait(lambda: job.values["Restarts"] != "0", "requeued")

@@ -9,14 +9,12 @@ import pytest
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
-from adhesis.ensemble.run.attempt import TimeLimit
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.loading.path_record import Record
 from adhesis.solver.loading.zero_range import InteriorTension
 from adhesis.solver.method import MethodReport, PathError
 from adhesis.solver.model.jump import JUMP_KINDS, Jump
@@ -172,28 +170,6 @@ def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_compute
     assert bits(stopped(campaign, tasks[1])) == alone[1]
     other = campaign.sharing(campaign.tasks()[1])
     assert bits(stopped(campaign, other[2])) == bits(Runner()(campaign, other[2]))
-
-
-@pytest.mark.parametrize("moment", [1, 2, 5])
-def test_a_loading_branch_that_was_interrupted_is_not_gone_on_with(monkeypatch, moment):
-    """A time limit may end it anywhere, as here between a state and the end of its step."""
-    campaign = parse_campaign(TURNS)
-    tasks = campaign.sharing(campaign.tasks()[0])
-    runner = Runner()
-    runner(campaign, tasks[0])
-    visit, seen = Record.visit, []
-
-    def interrupted(record, *state):
-        visit(record, *state)
-        seen.append(state)
-        if len(seen) == moment:
-            raise TimeLimit
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Record, "visit", interrupted)
-        with pytest.raises(TimeLimit):
-            runner(campaign, tasks[1])
-    assert bits(runner(campaign, tasks[2])) == bits(Runner()(campaign, tasks[2]))
 
 
 def test_loops_that_share_a_loading_branch_are_those_of_campaigns_of_their_own():

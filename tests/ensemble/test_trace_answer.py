@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import importlib.util
 import json
 import os
 import re
 import signal
-import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,7 +19,6 @@ from matplotlib.image import imread
 from adhesis import Control, Problem, make_method, run_loop, self_affine_profile
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.run.dispatch import Unresponsive
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import (
     COVERAGE,
@@ -37,10 +33,10 @@ from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
 from adhesis.ensemble.trace.variants import Plan, Run, make_plan
+from benchmarks.trace_coverage import case, judged
 from tests.support.scenes import HALF_SPACE
-from tools.interrupted import Interrupt, interrupted
+from tools.interrupted import Interrupt
 
-ROOT = Path(__file__).parents[2]
 N, LENGTH = 400, 1e-3
 PROFILE = self_affine_profile(0.8, period=LENGTH, n0=4, ratio=6, seed=2, h_rms=1e-6)
 X = LENGTH / N * np.arange(N)
@@ -174,27 +170,6 @@ def test_the_document_carries_its_provenance(folder: Path, document: dict[str, A
     assert document["loss_over_work_of_adhesion"] == document["loss"]["value"] / 0.04
 
 
-def test_a_preload_is_the_turning_point_of_a_trace() -> None:
-    """Under a load to 300 Pa, with the table of a third and two thirds of it."""
-    cycle = make_cycle(HALF_SPACE, 0.005, 300.0, 4, "auto", 1e-2, Control(0.0))
-    plan = make_plan(prepared(), cycle, processes=0)
-    plan = only(plan, "answer", "p̄ 100", "p̄ 200")
-    answer = run_plan(prepared(), cycle, plan)
-    for name, stress in (("answer", 300), ("p̄ 100", 100), ("p̄ 200", 200)):
-        found = answer.result(name)
-        assert found is not None
-        assert max(found["states"]["mean_stress"]) == pytest.approx(stress)
-    document = answers.document(answer)
-    assert (document["stiffness"], document["max_stress"]) == (0.0, 300.0)
-    assert document["max_penetration"] is None
-    said = summary(answer)
-    assert "to p̄ = 300 Pa with h_max" in said
-    assert f"{answer.loss.value / 0.005:.4g} γ" in said
-    text = page_text(answer, {})
-    assert "one loop to p̄ = 300 Pa" in text
-    assert "| γ, J/m² | p̄, Pa |" in text
-
-
 @pytest.mark.parametrize(
     ("words", "control", "turns"),
     [
@@ -263,9 +238,7 @@ def test_a_variant_that_fails_is_a_warning_and_the_answer_stands(spoiled_answer:
         run_plan(trace, cycle, spoiled(plan, "answer"))
 
 
-def test_the_page_shows_names_headers_and_warnings_as_texts(
-    spoiled_answer: Answer, tmp_path: Path
-) -> None:
+def test_the_page_shows_names_headers_and_warnings_as_texts(spoiled_answer, tmp_path):
     """Neither page has an element that a name or a header of a file brought along."""
     before = spoiled_answer.prepared
     said = ("text", "channel ![z](/etc/hostname) <script>x</script> \x1b[31m")
@@ -359,9 +332,7 @@ def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer:
 
 
 @pytest.mark.usefixtures("quick_figures")
-def test_figures_of_an_earlier_page_do_not_stay_beside_a_new_one(
-    spoiled_answer: Answer, tmp_path: Path
-) -> None:
+def test_figures_of_an_earlier_page_do_not_stay_beside_a_new_one(spoiled_answer, tmp_path):
     """An answer with neither tables nor several cut-offs; a figure of the user's own stays."""
     for name in ("tables.png", "tables.pdf", "cut-off.png", "loop.png", "mine.png"):
         (tmp_path / name).write_bytes(b"old")
@@ -485,24 +456,6 @@ def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
             os.kill(pid, 0)
 
 
-def test_a_process_that_hangs_leaves_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    trace, cycle, plan = small_plan()
-
-    def hang(*_: object) -> None:
-        raise Unresponsive("rank 1 has not answered for 120 s")
-
-    monkeypatch.setattr(Loops, "run", hang)
-    with pytest.raises(NoAnswer, match="rank 1 has not answered for 120 s"):
-        run_plan(trace, cycle, plan)
-
-
-def test_a_loop_of_a_trace_that_is_interrupted_has_not_failed() -> None:
-    """Where it runs in this process: its own failures are words, an interrupt is none of them."""
-    trace, cycle, plan = small_plan()
-    ended = {interrupted(lambda: run_plan(trace, cycle, plan), t) for t in (1e-4, 0.1, 0.2, 0.3)}
-    assert ended <= {"raised", "done"}
-
-
 def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     """And are priced before any work, with a word on what would be cheaper."""
     n = 100_000
@@ -525,22 +478,10 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     assert seconds == sorted(seconds, reverse=True)  # the longest first
 
 
-@pytest.fixture(scope="module")
-def coverage() -> ModuleType:
-    path = ROOT / "benchmarks" / "trace_coverage.py"
-    spec = importlib.util.spec_from_file_location("trace_coverage", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["trace_coverage"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.usefixtures("quick_figures")
-def test_known_losses_lie_within_their_intervals(coverage: ModuleType, tmp_path: Path) -> None:
+def test_known_losses_lie_within_their_intervals(tmp_path: Path) -> None:
     """A case of the benchmark with fewer waves; all of it: benchmarks/trace_coverage.py."""
-    row = coverage.judged(coverage.case(1, waves=40), tmp_path)
+    row = judged(case(1, waves=40), tmp_path)
     assert row["loss"]["covered"], row
     assert row.keys() >= set(answers.QUANTITIES)
 

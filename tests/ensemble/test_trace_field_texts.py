@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -48,35 +48,15 @@ def put(path: Path, text: str | Iterable[str] | bytes, encoding: str = "utf-8") 
 
 
 Options = dict[str, object]
+# Other encodings, delimiters, quotes, blanks and headers: test_trace_variations.py.
 READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
-    "a sampling length above the step": (
-        ["Sampling length: 0.8 mm", "Pitch: 0.5 um", "Z (um)", *ZS],
-        {},
-    ),
-    "a height of a step": (["Step height: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}),
-    "a mean spacing": (["RSm (mean spacing): 21.4 um", "dx = 0.5 um", "Z (um)", *ZS], {}),
-    "a pitch of the rows": (["Pitch Y: 5 um", "Pitch X: 0.5 um", "Z (um)", *ZS], {}),
-    "a cut-off": (["Z (um)", "Cut-off (mm): 0.8", "Step (um): 0.5", *ZS], {}),
-    "quoted": (['"x (um)","z (um)"', *(f'"{x}","{z}"' for x, z in PAIRS)], {}),
-    "a quoted column": ([UM, *(f'"{x}",{z}' for x, z in PAIRS)], {}),
     "quoted, decimal commas": (
         [UM, *(f'"{x}","{z}"'.replace(".", ",") for x, z in PAIRS)],
         {},
     ),
     "quoted names with delimiters": (['"x, along (um)","z, up (um)"', *TWO], {}),
-    "CR CR LF": ("\r\r\n".join([UM, *TWO, ""]), {}),
-    "a blank line after each row": ([UM, "", *(f"{row}\n" for row in TWO)], {}),
-    "a blank line after each height": (["dx: 0.5 um", "z (um)", "", *(f"{z}\n" for z in ZS)], {}),
-    "a blank line after two rows": ([UM, *(r + k % 2 * "\n" for k, r in enumerate(TWO))], {}),
     "rows of empty fields between": (["x (um)\tz (um)", *(f"\t\n{x}\t{z}" for x, z in PAIRS)], {}),
-    "rows of empty fields below": ([UM, *TWO, *[","] * 5], {}),
-    "rows of empty fields within": ([UM, *TWO[:50], ",", ",", *TWO[50:]], {}),
-    "empty columns": (["Lateral um,Height um,", *(f"{row},," for row in TWO)], {}),
     "an empty column before": ([f",{UM}", *(f",{row}" for row in TWO)], {}),
-    "a first column that counts": (
-        ["Pitch: 0.5 um", "No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
-        {},
-    ),
     "a count and an interval in quotes": (
         [
             '"Measurement data interval","0.5","um"',
@@ -89,14 +69,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {"columns": [2], "step": STEP},
     ),
-    "signs for units": (["x (㎛),z (㎛)", *TWO], {}),
-    "signs for other units": (
-        ["x (㎜);z (㎚)", *(f"{float(x) / 1e3:.6f};{1e3 * float(z):.3f}" for x, z in PAIRS)],
-        {},
-    ),
-    "names with numbers": (["X1 (um),Z1 (um)", *TWO], {}),
-    "names with a delimiter behind": (["x [um],z [um],", *(f"{row}," for row in TWO)], {}),
-    "a minus sign of typesetters": ([UM, *(row.replace("-", "\u2212") for row in TWO)], {}),
     "a column that marks": (
         ["X;Z;valid", "[um];[um];[1/0]", *(f"{row.replace(',', ';')};1" for row in TWO)],
         {"columns": [1, 2]},
@@ -109,7 +81,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
-    "Korean, with a unit": ("\n".join(["위(㎛),높이(㎛)", *TWO]).encode("cp949"), {"unit": "um"}),
     "an option against a line that names no column": (
         ["Evaluation length in mm", *TWO],
         {"unit": "um"},
@@ -119,7 +90,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["dx: 500 nm", "Z (nm)", *(f"{1e3 * float(z):.3f}".replace(".", ",") for z in ZS)],
         {},
     ),
-    "Latin-1": ("\n".join(["Höhe x [µm],z [µm]", *TWO]).encode("latin-1"), {}),
 }  # fmt: skip
 
 
@@ -155,9 +125,7 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
     ],
 )
-def test_all_codes_of_missing_heights_are_drop_outs(
-    codes: dict[int, str], missing: int, tmp_path: Path
-) -> None:
+def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
     trace = read_trace(put(tmp_path / "t.csv", [UM, *with_codes(codes)]))
     gaps = np.flatnonzero(np.isnan(trace.heights)).tolist()
     assert gaps == (list(codes) if missing else [])
@@ -186,9 +154,7 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
 @pytest.mark.parametrize(
     ("step", "decimals"), [(0.156, 1), (0.25, 0), (1.08, 0), (0.37, 0), (3.3, 0)]
 )
-def test_positions_that_are_rounded_in_print_have_equal_steps(
-    step: float, decimals: int, tmp_path: Path
-) -> None:
+def test_positions_that_are_rounded_in_print_have_equal_steps(step, decimals, tmp_path):
     rows = [f"{step * k:.{decimals}f},{z}" for k, z in enumerate(ZS)]
     for lines in (rows, rows[::-1]):
         trace = read_trace(put(tmp_path / "t.csv", [UM, *lines]))
@@ -334,9 +300,7 @@ def test_the_shorter_one_of_two_traces_ends_where_it_does(gap: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("first", [["400"], ["0.500"], ["199.5", "400"]])
-def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(
-    first: list[str], tmp_path: Path
-) -> None:
+def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_path):
     with pytest.raises(
         InputError, match=r"line 1 of .*, at the end of a column of heights: remove it"
     ):
@@ -388,9 +352,7 @@ def wsxm(path: Path, comments: int) -> Path:
 @pytest.mark.skipif(not instrument.available(), reason="SurfaceTopography is not installed")
 @pytest.mark.parametrize("name", ["a.stp", "a.dat", "a.txt", "a.csv", "a.001", "a"])
 @pytest.mark.parametrize("comments", [1, 400])
-def test_a_file_of_an_instrument_is_known_by_its_content(
-    name: str, comments: int, tmp_path: Path
-) -> None:
+def test_a_file_of_an_instrument_is_known_by_its_content(name, comments, tmp_path):
     trace = read_trace(wsxm(tmp_path / name, comments), row=3)
     assert trace.points == 64
     assert trace.step == pytest.approx(3e-6 / 64)
@@ -418,9 +380,7 @@ def array_of_xarray() -> object:
 
 
 @pytest.mark.parametrize("make", [array_of_xarray, lambda: xr.Dataset({"z": ("x", Z)})])
-def test_objects_of_other_libraries_are_refused_with_what_can_be_read(
-    make: Callable[[], object],
-) -> None:
+def test_objects_of_other_libraries_are_refused_with_what_can_be_read(make):
     with pytest.raises(TypeError, match=r"it must be a path, .* an array or list of heights"):
         read_trace(make(), step=STEP)
 

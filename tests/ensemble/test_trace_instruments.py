@@ -66,9 +66,7 @@ def test_a_map_needs_a_row(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", instrument_files.WRITERS)
-def test_half_a_file_is_one_sentence_and_code_2(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_half_a_file_is_one_sentence_and_code_2(name, tmp_path, capsys):
     path = tmp_path / name
     instrument_files.WRITERS[name](path, STEP, Z)
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])

@@ -191,9 +191,7 @@ def test_what_is_excluded_at_an_end_is_cut_off_and_positions_stay() -> None:
 
 
 @pytest.mark.parametrize(("sign", "word"), [(1.0, "crest"), (-1.0, "trough")])
-def test_a_feature_far_out_of_all_others_is_warned_of_with_what_leaves_it_out(
-    sign: float, word: str
-) -> None:
+def test_a_feature_far_out_of_all_others_is_warned_of_with_what_leaves_it_out(sign, word):
     found = prepared(Z + sign * RIDGE)
     (feature,) = found.features
     assert feature.is_crest == (sign > 0)

@@ -294,9 +294,7 @@ def test_what_is_in_doubt_is_refused_in_one_sentence(kind: str, tmp_path: Path) 
 CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
 
 
-def test_a_plan_is_said_and_nothing_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_plan_is_said_and_nothing_is_written(tmp_path, capsys):
     path = tmp_path / "t.txt"
     path.write_text("\n".join([UM, *rows(";", ",")]))
     assert main(["trace", str(path), *CONTACT, "--plan", "--tip-radius", "2um"]) == 0

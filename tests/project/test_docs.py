@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
-import adhesis
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
@@ -110,12 +109,7 @@ LINES = [(block, line) for block in BLOCKS if is_of_commands(block) for line in 
     [b for b in BLOCKS if b.language == "python" and b.page not in LESSONS],
     ids=lambda block: block.name,
 )
-def test_python_runs(
-    block: Block,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_python_runs(block, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(block.text, block.name, "exec"), {"__name__": "__main__"})
     shown = capsys.readouterr().out
@@ -195,9 +189,7 @@ def test_commands_run(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("page", LESSONS, ids=lambda page: str(page.relative_to(ROOT)))
-def test_lessons_print_what_their_pages_show(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lessons_print_what_their_pages_show(page, tmp_path, monkeypatch):
     (tmp_path / "wrong.toml").write_text(wrong_example())
     monkeypatch.chdir(tmp_path)
     pieces = list(transcripts.pieces(page.read_text()))
@@ -256,24 +248,6 @@ def test_the_reference_of_commands_is_that_of_the_parsers() -> None:
     text = commands_page.PAGE.read_text()
     assert re.findall(r"^## adhesis (\w+)$", text, re.MULTILINE) == list(COMMANDS)
     assert text == commands_page.page(text)
-
-
-def test_the_entries_to_cite_are_those_of_the_citation_file() -> None:
-    cited = yaml_lines((ROOT / "CITATION.cff").read_text())
-    text = (ROOT / "docs" / "citing.md").read_text()
-    entries = next(b.text for b in blocks(ROOT / "docs" / "citing.md") if b.language == "bibtex")
-    for value in cited:
-        assert value in " ".join(entries.split()), value
-    assert f"version = {{{adhesis.__version__}}}" in entries
-    assert "CITATION.cff" in text
-
-
-def yaml_lines(text: str) -> list[str]:
-    """Return what of the citation file an entry has to hold."""
-    folded = re.sub(r"title: >-\n +", "title: ", text)
-    names = "title|family-names|given-names|journal|volume|year|doi"
-    found = re.findall(rf"^ +(?:- )?(?:{names}): (.*)$", folded, re.MULTILINE)
-    return [value.strip('"') for value in found]
 
 
 def test_exit_codes_of_the_page_are_those_of_the_commands() -> None:

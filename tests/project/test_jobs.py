@@ -159,9 +159,7 @@ def slurm(
         (75, {"SIGNAL": "TERM"}, "requeue"),  # ahead of a preemption
     ],
 )
-def test_slurm_job_is_requeued_reported_or_left(
-    cluster: Cluster, code: int, env: dict[str, str], action: str
-) -> None:
+def test_slurm_job_is_requeued_reported_or_left(cluster, code, env, action):
     done, seen = slurm(cluster, "study.toml", CODE=str(code), **env)
     assert (done.returncode, seen) == (code, action), done.stdout + done.stderr
 
@@ -205,9 +203,7 @@ def test_signal_between_the_start_of_a_run_and_its_number_reaches_it(cluster: Cl
         ({}, 1),
     ],
 )
-def test_slurm_job_has_the_ranks_that_slurm_gave(
-    cluster: Cluster, env: dict[str, str], ranks: int
-) -> None:
+def test_slurm_job_has_the_ranks_that_slurm_gave(cluster, env, ranks):
     slurm(cluster, "study.toml", **env)
     assert [words[:2] for words in cluster.calls("mpirun")] == [["-n", str(ranks)]]
     assert not re.search(r"^#SBATCH --n(odes|tasks)", (JOBS / "slurm.sh").read_text(), re.MULTILINE)
@@ -240,9 +236,7 @@ def test_slurm_job_has_the_ranks_that_slurm_gave(
         ),
     ],
 )
-def test_slurm_job_passes_options_on(
-    cluster: Cluster, arguments: list[str], env: dict[str, str], run: str
-) -> None:
+def test_slurm_job_passes_options_on(cluster, arguments, env, run):
     done, action = slurm(cluster, *arguments, **env)
     assert done.returncode == 0, done.stderr
     assert cluster.calls("adhesis")[0] == ["run", *run.split()]

@@ -78,21 +78,6 @@ def test_dependencies_are_what_is_imported() -> None:
     assert imported | LOADED_BY_NAME == {IMPORTED_AS.get(name, name) for name in declared}
 
 
-def test_lists_of_versions_hold_all_that_is_declared_and_nothing_of_this_machine() -> None:
-    extras = project()["optional-dependencies"]
-    assert isinstance(extras, dict)
-    runs, tests = locked(), locked("requirements-test.lock")
-    assert names(list(project()["dependencies"]) + extras["mpi"]) <= set(runs)  # type: ignore[call-overload]
-    # What building h5py without isolation needs in the environment.
-    assert {"setuptools", "cython", "pkgconfig", "packaging", "numpy", "mpi4py"} <= set(runs)
-    assert names(extras["dev"] + extras["instruments"]) <= set(tests)
-    assert set(runs) & set(tests) == set()  # `make run` installs no more than it needs
-    for name in ("requirements.lock", "requirements-test.lock"):
-        text = (ROOT / name).read_text()
-        assert "://" not in text
-        assert "@" not in text
-
-
 def test_lists_of_versions_leave_nothing_to_resolve() -> None:
     """Set-up installs them without asking what else they need."""
     for lists in (["requirements.lock"], ["requirements.lock", "requirements-test.lock"]):

@@ -236,11 +236,11 @@ def interleave(folder: Path, seed: int) -> None:
             assert [*(folder / "disk1").iterdir(), *folder.glob("s.h5.*")] == [], at_work
 
 
-@pytest.mark.parametrize("first", range(0, 60, 20))
+@pytest.mark.parametrize("first", [0, 10, 20])
 def test_no_interleaving_of_jobs_loses_a_row(tmp_path: Path, first: int) -> None:
     with ThreadPoolExecutor(8) as pool:
         for done in [
-            pool.submit(interleave, tmp_path / f"{seed}", seed) for seed in range(first, first + 20)
+            pool.submit(interleave, tmp_path / f"{seed}", seed) for seed in range(first, first + 10)
         ]:
             done.result()
 
@@ -285,21 +285,6 @@ def test_a_second_job_touches_nothing_of_the_first(real: Site) -> None:
     assert first.returncode == 0, text
     assert done_rows(real.folder / "s.h5") == 40
     assert not staged(real).exists()
-
-
-def test_a_job_waits_for_the_run_of_a_script_that_was_killed(real: Site) -> None:
-    first = real.start(STAGING="disk1")
-    wait_until(lambda: done_rows(staged(real)) == 3)
-    first.kill()
-    first.wait()
-    refused = real.start("--patience", "0", STAGING="disk1")
-    assert refused.wait(60) == 2  # the run goes on alone
-    second = real.start("--patience", "60", STAGING="disk1")
-    (real.folder / "free").touch()
-    text, _ = second.communicate(timeout=120)
-    assert second.returncode == 0, text
-    assert "40 of 40 tasks done; 0 computed" in text
-    assert done_rows(real.folder / "s.h5") == 40
 
 
 def test_rows_of_a_killed_run_come_back(real: Site) -> None:
@@ -431,9 +416,7 @@ def stage_of(shared: Path) -> Path:
         (VICTIM, "mkdir -m 755 $stage", ""),
     ],
 )
-def test_a_folder_that_others_could_have_filled_is_refused(
-    shared: Path, account: int, planted: str, words: str
-) -> None:
+def test_a_folder_that_others_could_have_filled_is_refused(shared, account, planted, words):
     (shared / "work" / "precious").write_text("a line")
     if os.geteuid() == 0:
         os.chown(shared / "work" / "precious", VICTIM, VICTIM)
@@ -465,9 +448,7 @@ def test_the_folder_is_private_and_a_job_that_comes_back_finds_it(shared: Path) 
 
 @pytest.mark.parametrize("name", ["s.h5.copy", "s.h5.staging"])
 @pytest.mark.parametrize("planted", ["ln -s precious {}", "ln -s missing {}", "mkfifo {}"])
-def test_links_and_pipes_beside_the_results_are_not_followed(
-    shared: Path, name: str, planted: str
-) -> None:
+def test_links_and_pipes_beside_the_results_are_not_followed(shared, name, planted):
     assert shell(shared, f"echo a line >precious; {planted.format(name)}").returncode == 0
     done = shell(shared, "stage_in; echo new rows >$results; code=0; stage_out; exit $code")
     refused = name == "s.h5.staging"

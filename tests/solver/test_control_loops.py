@@ -101,16 +101,3 @@ def test_a_stiff_machine_gives_the_loop_at_fixed_separation(rough):
     assert [j.kind for j in stiff.jumps] == [j.kind for j in fixed.jumps]
     soft = [loop_of(rough, 0.01, k * unit, 0.6).loss for k in (10.0, 1.0)]
     assert fixed.loss < soft[0] < soft[1]
-
-
-@pytest.mark.parametrize("relative", [np.inf, 1.0, 0.0])
-def test_mirror_shift_and_scale_change_nothing(rough, relative):
-    unit = Problem(rough, HALF_SPACE, 0.0).stress_scale / rough.h_max
-    here = loop_of(rough, 0.01, relative * unit, 0.4)
-    same = 1e-6 if relative == 1 else 1e-5
-    for other in (rough.mirrored(), rough.shifted(0.3 * PERIOD)):
-        assert loop_of(other, 0.01, relative * unit, 0.4).loss == pytest.approx(here.loss, rel=same)
-    # lengths a hundredfold: γ/(E* λ) and k λ/E* stay
-    large = loop_of(rough.scaled(100, 100), 1.0, relative * unit / 100, 0.4)
-    assert large.loss_dimensionless == pytest.approx(here.loss_dimensionless, rel=same)
-    assert [j.kind for j in large.jumps] == [j.kind for j in here.jumps]

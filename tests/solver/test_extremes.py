@@ -131,6 +131,7 @@ def test_a_plain_path_is_a_loop_bit_by_bit(share, stiffness, turn, load_steps):
     path = run_path(method, [point], load_steps=load_steps)
     assert path.work == loop.loss == other.loss > 0
     assert path.loss_from_drops == loop.loss_from_drops
+    assert (path.energy_change, path.ends_out, path.minor_loops) == (0, True, ())
     for column in ("separation", "mean_stress", "contact_fraction", "load_step"):
         assert np.array_equal(getattr(path, column), getattr(loop, column))
         assert np.array_equal(getattr(other, column), getattr(loop, column))

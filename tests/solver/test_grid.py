@@ -201,7 +201,7 @@ def test_more_than_two_hundred_patches():
     a[crests] = AMPLITUDE / 2
     a[1] = AMPLITUDE / 50
     gamma = 0.01 * wave(0.2).work_of_adhesion / crests
-    method = GridMethod(Problem(Profile(PERIOD, a), HALF_SPACE, gamma), nodes_per_wave=16)
+    method = GridMethod(Problem(Profile(PERIOD, a), HALF_SPACE, gamma), nodes_per_wave=8)
     h_max = method.problem.profile.h_max
     state = method.follow(method.detached(h_max), 0.7 * h_max).states[-1]
     assert state.patches > 200

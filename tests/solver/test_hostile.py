@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from adhesis import Control, LoopResult, run_loop
-from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.method import SharpMethod
 from tools.hostile import draw, independent_clearance, judge
 
@@ -56,37 +55,6 @@ def test_the_error_covers_a_loop_whose_loss_one_fold_makes(seed, number, max_str
     )
     assert abs(loop.loss - reference.loss_from_drops) < loop.loss_error
     assert loop.loss_error < scene.accuracy * loop.loss
-
-
-@pytest.mark.parametrize(
-    ("control", "turning_point"),
-    [
-        (Control(), {"max_penetration": 0.3}),
-        (Control(stiffness=3e9), {"max_penetration": 0.3}),
-        (Control(stiffness=0), {"max_stress": 50.0}),
-    ],
-    ids=("separation", "stiffness", "load"),
-)
-def test_a_fold_moves_with_the_openings_of_its_edges(control, turning_point, monkeypatch):
-    """A work of adhesion that is 0.02 % larger acts as openings that are 0.01 % smaller."""
-    share = 1e-4
-    folds = []
-    displacement = Point.fold_displacement
-
-    def noted(point, change, by_prescribed):
-        folds.append((point, by_prescribed))
-        return displacement(point, change, by_prescribed)
-
-    monkeypatch.setattr(Point, "fold_displacement", noted)
-    for larger in (1.0, (1 + share) ** 2):
-        problem = replace(draw(77001, 60), g=0.3 * larger).problem()
-        method = SharpMethod(replace(problem, control=control), accuracy=1e-5)
-        run_loop(method, **turning_point, load_steps=2)
-    count = len(folds) // 2
-    assert count == (1 if control.is_load else 2)
-    for (before, by_prescribed), (after, _) in zip(folds[:count], folds[count:], strict=True):
-        expected = displacement(before, -share * before.field.opening.ravel(), by_prescribed)
-        assert after.at - before.at == pytest.approx(expected, rel=0.02)
 
 
 def test_an_edge_that_leaps_to_and_fro_over_a_minimum_comes_to_rest():

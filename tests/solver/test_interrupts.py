@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 import time
@@ -94,34 +93,6 @@ def test_a_loop_that_is_interrupted_anywhere_ends_in_what_was_raised(chosen):
 # ------------------------------------------------------------------- what is not interrupted
 
 
-def test_work_that_is_not_to_be_interrupted_goes_on_while_the_caller_is(alarm):
-    go, later = threading.Event(), threading.Event()
-    seen: list[object] = []
-
-    @uninterrupted
-    def inner() -> None:
-        seen.append("inner")
-
-    @uninterrupted
-    def work() -> None:
-        os.kill(os.getpid(), signal.SIGALRM)
-        assert go.wait(60)
-        try:
-            inner()  # nobody waits for the rest
-        finally:
-            seen.append("end")
-            later.set()
-
-    with pytest.raises(Interrupt):
-        work()
-    assert seen == []
-    go.set()
-    assert later.wait(60)
-    assert seen == ["end"]
-    inner()
-    assert seen == ["end", "inner"]
-
-
 def test_an_interrupt_that_meets_the_start_of_a_thread_arrives_as_itself(monkeypatch):
     """A signal may reach another thread, and its handler then runs though signals are held."""
     name = next(n for n in ("_start_joinable_thread", "_start_new_thread") if hasattr(threading, n))
@@ -136,13 +107,3 @@ def test_an_interrupt_that_meets_the_start_of_a_thread_arrives_as_itself(monkeyp
     monkeypatch.setattr(threading, name, interrupted_start)
     with pytest.raises(Interrupt):
         uninterrupted(lambda: time.sleep(0.2))()
-
-
-def test_uninterrupted_work_returns_and_raises_as_it_does_by_itself():
-    @uninterrupted
-    def divide(a: float, *, by: float) -> tuple[float, bool]:
-        return a / by, threading.current_thread() is threading.main_thread()
-
-    assert divide(6, by=3) == (2.0, False)
-    with pytest.raises(ZeroDivisionError):
-        divide(1, by=0)

@@ -45,18 +45,6 @@ def test_kind_and_largest_changed_patch(before, after, kind, length):
     assert largest == pytest.approx(length)
 
 
-def test_kind_does_not_depend_on_the_origin():
-    before, after = patches((0.1, 0.2), (0.5, 0.7)), patches((0.1, 0.75))
-    for shift in np.linspace(0, 1, 21):
-
-        def moved(edges: np.ndarray, shift: float = shift) -> np.ndarray:
-            left = (edges[:, 0] + shift) % 1.0
-            new = np.column_stack((left, left + edges[:, 1] - edges[:, 0]))
-            return new[np.argsort(new[:, 0])]
-
-        assert classify(moved(before), moved(after), 1.0) == ("merging", pytest.approx(0.65))
-
-
 def test_only_running_edges_are_small_scale():
     kinds = {
         kind: Jump("loading", 0.0, 0.0, kind, 1, 1, 0.1, 0.2, 0.1).small_scale

@@ -19,7 +19,7 @@ def loop_of(
     profile: Profile, gamma: float, measure: Measure, method: MethodName = "sharp"
 ) -> LoopResult:
     problem = Problem(profile, SOFT, gamma, measure=measure)
-    nodes_per_wave = 64 if method == "grid" else None
+    nodes_per_wave = 16 if method == "grid" else None
     chosen = make_method(method, problem, nodes_per_wave=nodes_per_wave)
     return run_loop(chosen, max_penetration=0.7, load_steps=5)
 

@@ -29,16 +29,6 @@ def problem_of(work_of_adhesion: float = 0.01, control: Control | None = None) -
     return Problem(ROUGH, HALF_SPACE, work_of_adhesion, control or Control())
 
 
-def test_a_path_of_one_turning_point_is_a_loop():
-    path = run_path(make_method("sharp", problem_of()), [0.8], load_steps=8)
-    loop = run_loop(make_method("sharp", problem_of()), max_penetration=0.8, load_steps=8)
-    assert path.work == pytest.approx(loop.loss, rel=1e-12)
-    assert path.loss_from_drops == loop.loss_from_drops
-    assert path.energy_change == 0
-    assert path.ends_out
-    assert path.minor_loops == ()
-
-
 def test_load_steps_of_a_leg_are_multiples_and_marks():
     axis = Axis(0.9, 3)
     assert axis.between(0.0, 0.9) == pytest.approx([0.0, 0.3, 0.6, 0.9])

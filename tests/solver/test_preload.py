@@ -117,23 +117,6 @@ def test_the_turning_point_is_the_first_state_with_the_preload():
     assert loop.load_steps == np.count_nonzero(loop.load_step & (loop.branch == "loading")) - 1
 
 
-def test_a_preload_scales_with_lengths_and_stresses_and_is_the_same_in_a_mirror():
-    reference = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=20)
-    lengths, stresses = 7.0, 3.0
-    longer = Profile(PROFILE.period * lengths, PROFILE.coefficients * lengths)
-    scaled = rough(profile=longer, work_of_adhesion=GAMMA * lengths)
-    harder = rough(half_space=HalfSpace(stresses * 1e6, 0.5), work_of_adhesion=stresses * GAMMA)
-    mirror = rough(profile=Profile(PROFILE.period, PROFILE.coefficients.conj()))
-    for problem, preload, loss in (
-        (scaled, PRELOAD, lengths),
-        (harder, stresses * PRELOAD, stresses),
-        (mirror, PRELOAD, 1.0),
-    ):
-        loop = run_loop(make_method("sharp", problem), preload=preload, load_steps=20)
-        assert loop.turning_point == pytest.approx(reference.turning_point, rel=1e-6)
-        assert loop.loss / loss == pytest.approx(reference.loss, rel=1e-4)
-
-
 def test_loops_of_several_preloads_are_those_of_each_alone():
     method = make_method("sharp", rough())
     preloads = [800.0, 200.0, 1e9]
@@ -250,18 +233,6 @@ def test_a_mean_stress_that_a_branch_does_not_have_is_refused(tmp_path):
     assert again.preload_reached
     with pytest.raises(ValueError, match="holds no contact states"):
         again.at_stress(100.0)
-
-
-def test_a_loss_under_a_weight_says_so_where_it_stands():
-    weight = run_loop(make_method("sharp", rough(Control(0.0))), max_stress=PRELOAD, load_steps=5)
-    note = f"under a weight; it falls off at {1e-3 * weight.pull_off_stress:.3g} kPa: drops before"
-    (line,) = (line for line in str(weight).splitlines() if line.startswith("loss"))
-    assert note in line
-    assert "under a weight" in repr(weight)
-    assert note in weight._repr_html_()
-    machine = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=5)
-    assert machine.loss_note == ""
-    assert "weight" not in str(machine) + repr(machine) + machine._repr_html_()
 
 
 def test_a_closing_drop_that_is_negative_is_doubted():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from adhesis import Problem, Profile, self_affine_profile, single_wave
 from adhesis.solver._kernels import (
@@ -17,6 +16,7 @@ from adhesis.solver.sharp.field.gap_field import GapField, respond_at_fixed_edge
 from adhesis.solver.sharp.field.opening_series import fine_opening
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
+from tests.support.dense import solve_densely
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
@@ -24,7 +24,6 @@ from tests.support.scenes import HALF_SPACE
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
 
 MOST_NODES = 21  # the order of the rule with the most nodes
-TWENTY_NODES = 13
 
 
 @pytest.fixture(scope="module")
@@ -199,52 +198,6 @@ def test_derivatives_by_what_is_prescribed(source, separation, name):
     )
 
 
-@pytest.mark.parametrize("k", range(3))
-def test_moments_against_brute_force(source, k):
-    """Compressed panels give the Chebyshev moments that 60,000 plain nodes give.
-
-    Those of the lower modes from the load at the nodes, those of the ends from openings of f = 0.
-    """
-    gaps = np.array([[1.0, 1.004], [1.02, 3.0], [3.00001, 4.0]])
-    model = FieldModel(FIXED_SEPARATION, 30.0, source.panels)
-    field = solve_field(gaps, 1e-3, model, np.full(3, TWENTY_NODES))
-    left, right = gaps[k]
-    before, after = gaps[k - 1, 1] - 2 * np.pi * (k == 0), gaps[k - 2, 0] + 2 * np.pi * (k == 2)
-    ends = np.log((np.array([left, right]) - before) / (after - np.array([left, right])))
-    alpha = (ends[1] - ends[0]) / 2
-    count = 60_000
-    t = (np.arange(count) + 0.5) * np.pi / count
-    # η = (ln((θ-A)/(B-θ)) - middle)/α, from the nearer end
-    eta, sine = np.cos(t), np.sin(t)
-    grown = np.expm1(alpha * (1 + eta))
-    place = left + grown / (1 / (left - before) + (1 + grown) / (after - left))
-    stretch = alpha / (1 / (place - before) + 1 / (after - place))
-    load = source.panels.stress(place)[0] * stretch
-    n = np.arange(1, 21)
-    expected = 2 / count * (np.sin(np.outer(n, t)) * sine) @ load
-    node = np.arange(20, 0, -1) * np.pi / 21
-    own = field.load[field.offset[k] : field.offset[k + 1]]
-    found = 2 / np.pi * (np.sin(np.outer(n, node)) / np.sin(node)) @ own
-    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
-    sides = np.array([-1.0, 1.0])
-    whole = np.array([(1 - eta) @ load, (1 + eta) @ load]) / count
-    higher = whole - (sides[:, None] ** (n - 1)) @ expected
-    slope = np.array([1 / (x - before) + 1 / (after - x) for x in (left, right)]) / alpha
-    opened = field.edge_openings(np.zeros(field.theta.size))[2 * k : 2 * k + 2]
-    assert np.abs(opened + np.sqrt(2 * slope) * higher).max() < (
-        1e-9 * np.abs(np.sqrt(2 * slope) * whole).max()
-    )
-
-
-def test_mean_gap_is_the_separation(source, separation):
-    field = solved_field(source, GAPS, separation, 1e-10)
-    total = 0.0
-    for k in range(5):
-        shape = fine_opening(field, k)
-        total += float(shape.weight @ shape.opening)
-    assert abs(total / (2 * np.pi * separation) - 1) < 1e-9
-
-
 def test_edge_opening_against_the_edge_stress_of_the_grid():
     """K of four patches on the grid: first order in dx, and the constant of its edge node.
 
@@ -294,26 +247,39 @@ def test_hundreds_of_patches_in_one_period():
     assert np.abs(field.opening).max() < 1e-8 * amplitude * waves
 
 
-@pytest.mark.parametrize("side", [0, 1])
-def test_a_half_plane_crack_opens_by_the_integral_of_the_stress_on_its_faces(side):
-    """C = -(2/π) ∫ S(ρ)/sqrt(ρ) dρ by quadrature, ρ the distance from the edge into the gap."""
-    source = StressSource(self_affine_profile(0.8, period=1.0, n0=2, ratio=3, seed=1, h_rms=1e-4))
-    waves = np.fft.rfft(source.panels.stress(np.arange(64) * 2 * np.pi / 64)[0]) / 32
+@pytest.mark.parametrize("order", range(22))
+def test_a_gap_is_solved_by_the_inverse_of_its_block_at_every_order(order):
+    """Of 4 to 128 nodes."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=5, h_rms=1e-6, seed=2)
+    model = FieldModel(FIXED_SEPARATION, 20.0, StressSource(profile).panels)
+    gaps, separation = np.array([[1.0, 5.5]]), 0.6 * profile.h_max * profile.q0
+    field = solve_field(gaps, separation, model, np.array([order]))
+    dense = solve_densely(gaps, separation, model, np.array([order]))
+    assert field.pressure == pytest.approx(dense.pressure, rel=1e-11)
+    assert np.abs(field.opening - dense.opening).max() < 1e-11 * np.abs(dense.opening).max()
 
-    def integral(m: int, part: str, of) -> float:
-        near, _ = quad(lambda x: of(m * x), 0, 1, weight="alg", wvar=(-0.5, 0))
-        far, _ = quad(lambda x: x**-0.5, 1, np.inf, weight=part, wvar=m)
-        return near + far
 
-    into_gap = 1 - 2 * side
-    for theta in (0.37, 2.9):
-        total = 0.0
-        for m in range(2, 7):
-            wave = waves[m] * np.exp(1j * m * theta)
-            total += wave.real * integral(m, "cos", np.cos)
-            total -= into_gap * wave.imag * integral(m, "sin", np.sin)
-        step = 1e-5
-        places = theta + step * np.array([-1.0, 0.0, 1.0])
-        (before, value, after), (_, slope, _) = source.panels.half_plane_opening(places, side)
-        assert value == pytest.approx(-2 / np.pi * total, rel=1e-5)
-        assert slope == pytest.approx((after - before) / (2 * step), rel=1e-5)
+@pytest.mark.parametrize("k", range(3))
+def test_openings_at_fine_nodes_are_sums_of_their_modes(k):
+    """Numbers of nodes with each of the small factors, all of them enough."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=25, h_rms=1e-6, seed=2)
+    model = FieldModel(FIXED_SEPARATION, 20.0, StressSource(profile).panels)
+    gaps = np.array([[0.3, 0.8], [1.0, 2.0], [2.3, 5.1]])
+    field = solve_field(gaps, 0.5 * profile.h_max * profile.q0, model)
+    sizes = set()
+    for per_wave in np.geomspace(0.1, 15, 50):
+        theta, opening, _, modes = field.fine_opening(k, per_wave)
+        size = len(theta)
+        assert len(opening) == len(modes) == size
+        sizes.add(size)
+        exact = field.sum_modes(k, theta, modes)
+        np.testing.assert_allclose(opening, exact, atol=1e-12 * np.abs(exact).max())
+    for size in sizes:
+        rest = size + 1
+        for factor in (2, 3, 5):
+            while rest % factor == 0:
+                rest //= factor
+        assert rest == 1
+        assert (size + 1) % 4 == 0
+    if k == 2:  # of many nodes
+        assert all(any((size + 1) % factor == 0 for size in sizes) for factor in (9, 10, 15))

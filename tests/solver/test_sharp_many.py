@@ -9,22 +9,16 @@ from adhesis import HalfSpace, Problem, self_affine_profile
 from adhesis.solver._kernels import (
     FieldModel,
     LoadingDevice,
-    count_negative,
     on_new_tree,
-    pair_again,
-    pair_runs,
     set_up_response,
     solve_field,
 )
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import move_edges
-from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
-from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import LONGEST_STEP
 from tests.support import next_to_a_fold
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
@@ -61,14 +55,6 @@ def test_field_equals_the_dense_one(profile, gaps, tolerance):
     assert np.abs(tree.opening - dense.opening).max() < 2 * tolerance * scale
     assert tree.pressure == pytest.approx(dense.pressure, rel=2 * tolerance)
     assert tree.unit_mean == pytest.approx(dense.unit_mean, rel=2 * tolerance)
-
-
-def test_same_bits(profile):
-    """No order of sums depends on anything but the gaps."""
-    source = StressSource(profile, 1e-5)
-    ends = random_gaps(33, 0.2, 1.0)
-    one, two = (solved(source, ends, 1e-3, 1e-5)[0] for _ in range(2))
-    assert one.opening.tobytes() == two.opening.tobytes()
 
 
 def test_work_grows_as_the_number_of_gaps(profile):
@@ -139,30 +125,6 @@ def loaded(profile):
     return method, state
 
 
-def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded):
-    """Openings and pressure after Newton's step against those of all gaps solved anew."""
-    method, state = loaded
-    edges, gaps = method.edges, state.internal.gaps
-    law, model = edges.law, edges.model
-    wrong, moved = [], []
-    for way in (4e-3, 2e-3):
-        at = state.separation * method.q0 * (1 - way)
-        response = set_up_response(gaps, at, None, law, model)
-        newton = response.solve(at, law, model)
-        assert newton.stable
-        ends = move_edges(gaps, newton.motion)
-        after = response.solve_separately(ends, newton.pressure, at, model)
-        anew = solve_field(ends, at, model, response.orders)
-        before = solve_field(gaps, at, model, response.orders)
-        scale = np.abs(anew.opening).max()
-        wrong.append(np.abs(after.opening - anew.opening).max() / scale)
-        moved.append(np.abs(before.opening - anew.opening).max() / scale)
-        assert after.weight @ after.scaled_opening == pytest.approx(2 * np.pi * at, rel=1e-12)
-        assert after.pressure == pytest.approx(anew.pressure, rel=1e-2 * moved[-1])
-    assert wrong[0] < 1e-2 * moved[0]
-    assert wrong[1] < 0.3 * wrong[0]
-
-
 @pytest.fixture
 def many_gaps(loaded):
     """Edges of many gaps, and a point of theirs."""
@@ -231,44 +193,6 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_gaps_that_come_and_go_leave_the_other_runs_of_the_tree_as_they_are(seed):
-    """Every run joins neighbours, and those that stay hold the gaps that they held."""
-    rng = np.random.default_rng(seed)
-    children = pair_runs(20)
-    for _ in range(30):
-        before = (len(children) + 1) // 2
-        # some stay, in order, others come
-        stay = np.flatnonzero(rng.random(before) < rng.choice([0.5, 0.95]))
-        source = np.full(max(2, before + rng.integers(-3, 4), len(stay) + 1), -1)
-        source[np.sort(rng.choice(len(source), len(stay), replace=False))] = stay
-        again, same = pair_again(children, source)
-        gaps, known = gaps_of_runs(again), gaps_of_runs(children)
-        assert gaps[-1] == list(range(len(source)))
-        for run, of_run in enumerate(gaps):
-            assert of_run == list(range(of_run[0], of_run[-1] + 1))
-            if same[run] >= 0:
-                assert known[same[run]] == [source[k] for k in of_run]
-        assert (same[: len(source)] == source).all()
-        children = again
-
-
-def test_runs_without_a_change_are_taken_over():
-    children = pair_runs(64)
-    source = np.delete(np.arange(64), 21)  # the patch between the gaps of a pair goes
-    source[20] = -1
-    _, same = pair_again(children, source)
-    assert (same[63:] < 0).sum() == 5  # all runs above the new gap: log2(64) - 1
-
-
-def gaps_of_runs(children):
-    """List the gaps of every run of a tree."""
-    gaps = []
-    for run, (one, two) in enumerate(children):
-        gaps.append([run] if one < 0 else gaps[one] + gaps[two])
-    return gaps
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
     """Gaps merge, close and open, one after the other, each response set up from the last one."""
@@ -292,41 +216,6 @@ def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
         for lasting, built in zip(response.potential, anew.potential, strict=True):
             assert np.abs(lasting - built).max() < 1e-4 * np.abs(built).max()
         assert anew.negative == response.negative
-
-
-@pytest.mark.parametrize("negative", range(4))
-def test_negative_eigenvalues_that_appear_together_are_counted(negative):
-    """Of a pair of halves whose first one has none, and all directions of which are alike."""
-    rng = np.random.default_rng(negative)
-    n = 12
-    root, _ = np.linalg.qr(rng.standard_normal((n, n)))
-    softest = np.where(np.arange(n) < negative, 1.5, 0.5)  # of the interaction over the stiffness
-    response = root @ np.diag(np.linspace(1, 2, n)) @ root.T
-    inverse_root = np.linalg.inv(np.linalg.cholesky(response))
-    other, _ = np.linalg.qr(rng.standard_normal((n, n)))
-    interaction = inverse_root.T @ other @ np.diag(softest) @ other.T @ inverse_root
-    both = np.block([[interaction, np.eye(n)], [np.eye(n), response]])
-    assert (np.linalg.eigvalsh(both) < 0).sum() == n - negative
-    assert count_negative(interaction, response) == n - negative
-
-
-def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
-    """A jump and its rival need two in turn; what is forgotten is set up anew."""
-    method, state = loaded
-    edges, gaps = method.edges, state.internal.gaps
-    at = state.separation * method.q0
-    kept = KeptResponses(edges)
-    first = kept.at(gaps, at)
-    assert kept.at(gaps, at) is first
-    fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
-    assert kept.near(fewer, at, None) is not first
-    version = first.version
-    assert kept.at(gaps, at) is first
-    assert first.version == version
-    assert kept.at(gaps.copy(), at) is first  # equal gaps, but not those that it was solved for
-    assert first.version > version
-    kept.forget()
-    assert kept.at(gaps, at) is not first
 
 
 def test_no_step_leads_to_another_branch():
@@ -364,24 +253,6 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
     found, _ = edges.relax(next_to_a_fold.GAPS, next_to_a_fold.SEPARATION, reach)
     assert isinstance(found, Point)
     assert edges.count.fields < 2000
-
-
-def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(many_gaps, monkeypatch):
-    """A response is found by the number of gaps; where it does not serve, nor do its orders."""
-    edges, point = many_gaps
-    known = edges.responses.at(point.gaps, point.at)
-    asked = []
-
-    def near(gaps, prescribed, least):
-        asked.append(least)
-        return known if len(asked) == 1 else None
-
-    monkeypatch.setattr(edges.responses, "near", near)
-    others = point.gaps + 3 * edges.wave
-    with pytest.raises(NoState, match="no field"):
-        edges.relax(others, point.at, edges.wave)
-    assert known.is_outgrown
-    assert asked == [None, None]
 
 
 def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():

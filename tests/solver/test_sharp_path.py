@@ -16,11 +16,8 @@ from adhesis import (
 )
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp.continuation import branch as stable_branch
-from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.gap.full_contact_stress import patches_between
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.nucleation.location import field_at_fixed_edges, locate
 from tests.support.explicit_solution import explicit_openings
 
 SOLID = HalfSpace(young=1e6, poisson=0.5)
@@ -99,30 +96,6 @@ def test_no_state_overlaps_where_narrow_gaps_close_fast():
         for state in states[:: max(1, len(states) // 20)]:
             assert least_gap(profile, state) > -1e-5 * profile.h_max  # that of the field's error
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
-
-
-def test_a_touch_on_the_last_step_to_a_fold_is_found_with_edges_held():
-    profile = profile_of(0.35, 3, 2, 7496, "rayleigh")
-    method = SharpMethod(Problem(profile, SOLID, 1e-3))
-    h_max = profile.h_max * profile.q0
-    state = method.follow(method.detached(profile.h_max), 0.8 * profile.h_max).states[-1]
-    point = method.edges.equilibrium(state.internal.gaps, 0.8 * h_max, 0.01)
-    clear, _ = method.nucleation.minimum(point.field)
-    assert clear > 1e-2 * h_max
-    solve = field_at_fixed_edges(method.edges)
-
-    def touch_before(end):
-        trail = [point, solve(point, point, end)]
-        return locate(method.nucleation, solve, trail, 0.0, clear, method.nucleation.tolerance)[0]
-
-    assert touch_before(0.799 * h_max) is None
-    found = touch_before(0.2 * h_max)
-    assert 0.2 * h_max < found.point.at < 0.8 * h_max
-    np.testing.assert_array_equal(found.point.gaps, point.gaps)
-    _, opening = explicit_openings(profile, point.gaps, found.point.at)
-    touch = found.seeds[0]
-    assert touch.opening == pytest.approx(0, abs=1e-6 * h_max)
-    assert opening.min() == pytest.approx(0, abs=1e-4 * h_max)  # at the nodes next to the touch
 
 
 def test_states_come_in_the_order_of_the_path_at_any_accuracy():
@@ -276,36 +249,3 @@ def test_the_error_told_covers_the_error_made_on_random_scenes():
         assert min(jump.energy_drop for jump in result.jumps) > 0
         ratios.append(result.loss_error / error)
     assert np.median(ratios) < 10
-
-
-def test_a_step_across_a_fold_that_is_none_is_taken_once(monkeypatch):
-    """Newton's iteration fails short of a fold that is seen, and beyond it the branch goes on.
-
-    So it was with 200 patches and accuracy 4e-3: what lay beyond bent sharply, steps across were to
-    be halved, and could not be.
-    """
-    method = SharpMethod(Problem(single_wave(1e-6, PERIOD), SOLID, 0.01), accuracy=0.03)
-    finest = method.follower.resolution.jump
-    real = stable_branch.correct
-    calls, feigned = [], []
-
-    def correct(edges, predictor, at):
-        calls.append(predictor)
-        assert len(calls) < 2000, "the same step is taken for ever"
-        if not feigned and predictor.way and predictor.fold_distance > 20 * finest:
-            feigned.append(predictor)
-        if predictor in feigned:
-            predictor.fold_distance = 1.5 * finest
-            if not 1 < abs(at - predictor.point.at) / predictor.fold_distance < 1.5:
-                return None
-            predictor = Predictor(predictor.point)
-        return real(edges, predictor, at)
-
-    def bends(branch, output, point):
-        return 5.0 if calls[-1] in feigned else 0.0
-
-    monkeypatch.setattr(stable_branch, "correct", correct)
-    monkeypatch.setattr(stable_branch.Branch, "_trapezoid_error", bends)
-    result = run_loop(method, max_penetration=0.5, load_steps=10)
-    assert feigned
-    assert result.pull_off_penetration < 0

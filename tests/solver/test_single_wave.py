@@ -143,23 +143,6 @@ def test_energy_is_the_work_of_the_mean_stress(alpha, measure):
         assert derivative(w.energy, a, d) / path == pytest.approx(force, rel=1e-8)
 
 
-@pytest.mark.parametrize("measure", ["flat", "arc"])
-@pytest.mark.parametrize("alpha", [0.05, 0.3, 0.6, 5.0])
-def test_loss_is_the_loop_integral(alpha, measure):
-    """Sum of drops = ∮ p̄ dΔ, here the integral between fold and touch by quadrature."""
-    w = wave(alpha, measure)
-    loop = w.loop
-    integral = quad(
-        lambda a: float(w.mean_stress(a) * w.separation_slope(a)),
-        loop.fold_half_width,
-        loop.touch_half_width,
-        epsrel=1e-12,
-    )[0]
-    assert loop.loss == pytest.approx(integral, rel=1e-10)
-    assert loop.touch_drop > 0
-    assert loop.fold_drop > 0
-
-
 @pytest.mark.parametrize("alpha", [0.01, 0.3, 3.0])
 def test_branch_has_one_fold_and_the_jump_runs_downhill(alpha):
     """At first touch U falls all the way to a_in, so descent cannot stop before it."""

@@ -1,16 +1,89 @@
-"""Mirror-symmetric profiles: their loops are those of profiles that are hardly asymmetric."""
+"""Invariances of every kind of loop, and mirror-symmetric profiles."""
 
 from __future__ import annotations
+
+from functools import cache
 
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, Profile, make_method, run_loop
+from adhesis import (
+    AdhesionPattern,
+    Control,
+    HalfSpace,
+    Problem,
+    Profile,
+    make_method,
+    run_loop,
+    self_affine_profile,
+)
 from adhesis.solver.loading.loop_result import LoopResult
 from tests.support.grids import grid_of
 
 SOFT = HalfSpace(1e6, 0.5)
 SHIFT = np.exp(1e-7j)
+
+
+# ---------------------------------------------------------------------- mirror, shift and scale
+
+
+def rough(n0: int, ratio: int, seed: int) -> Profile:
+    return self_affine_profile(0.8, period=2e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
+
+
+UNEVEN = AdhesionPattern([0, 0.1 - 0.1j, 0, 0.05j, 0, 0, 0, 0.08])
+DEEP = {"max_penetration": 0.7}
+# Problem, turning point, and how near the losses are: by the accuracy with which jumps are found.
+SCENES: dict[str, tuple[Problem, dict[str, float], float]] = {
+    "stiff": (Problem(rough(2, 8, 0), HalfSpace(1e8, 0.5), 0.04), DEEP, 1e-3),
+    "opens": (Problem(rough(2, 8, 0), HalfSpace(1e9, 0.5), 0.04, strength=4e6), DEEP, 1e-3),
+    "separation": (Problem(rough(3, 8, 4), SOFT, 0.01), DEEP, 1e-5),
+    "stiffness": (Problem(rough(3, 8, 4), SOFT, 0.01, Control(1e10)), DEEP, 1e-5),
+    "load": (Problem(rough(3, 8, 4), SOFT, 0.01, Control(0.0)), {"max_stress": 500.0}, 1e-5),
+    "preload": (Problem(rough(4, 5, 1), SOFT, 0.005), {"preload": 500.0}, 1e-4),
+    "pattern": (Problem(rough(2, 6, 3), SOFT, 2e-3, pattern=UNEVEN), DEEP, 1e-5),
+    "two works": (Problem(rough(2, 3, 3), SOFT, 2e-3, work_of_adhesion_open=4e-3), DEEP, 1e-5),
+}
+
+
+def loop_of(problem: Problem, turn: dict[str, float]) -> LoopResult:
+    return run_loop(make_method("sharp", problem, accuracy=1e-4), **turn, load_steps=10)
+
+
+@cache
+def reference(name: str) -> LoopResult:
+    return loop_of(*SCENES[name][:2])
+
+
+@pytest.mark.parametrize(("lengths", "stresses"), [(1.0, 1.0), (2.0, 3.0)])
+@pytest.mark.parametrize("name", SCENES)
+def test_mirror_shift_and_scale_change_nothing(name, lengths, stresses):
+    """Of profile, material, interface and control; a loop of its own units, from the other side."""
+    problem, turn, near = SCENES[name]
+    profile, pattern, opened = problem.profile, problem.pattern, problem.work_of_adhesion_open
+    other = Problem(
+        profile.mirrored().shifted(0.3 * profile.period).scaled(lengths, lengths),
+        HalfSpace(stresses * problem.half_space.young, 0.5),
+        lengths * stresses * problem.work_of_adhesion,
+        Control(problem.control.stiffness * stresses / lengths),
+        strength=None if np.isinf(problem.strength) else stresses * problem.strength,
+        work_of_adhesion_open=opened and lengths * stresses * opened,
+        pattern=pattern and pattern.mirrored().shifted(0.3),
+    )
+    scale = 1.0 if turn is DEEP else stresses
+    here, there = reference(name), loop_of(other, {k: scale * v for k, v in turn.items()})
+    assert [jump.kind for jump in there.jumps] == [jump.kind for jump in here.jumps]
+    assert len(here.jumps) > 2
+    scale = stresses if "max_stress" in turn else 1.0
+    assert there.turning_point == pytest.approx(scale * here.turning_point, rel=1e-6)
+    for value in ("loss", "friction"):
+        expected = lengths * stresses * getattr(here, value)
+        assert getattr(there, value) == pytest.approx(expected, rel=near, abs=0)
+    for value in ("valid_range", "edge_range", "touch_range"):
+        assert getattr(there, value) == pytest.approx(lengths * getattr(here, value), rel=1e-3)
+
+
+# ---------------------------------------------------------------------- symmetric profiles
 
 
 def bumpy(wave: int, amplitude: float, shift: complex = 1.0) -> Profile:

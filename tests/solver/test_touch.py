@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any, cast
-
 import numpy as np
 import pytest
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from adhesis.solver._kernels import local_minima
-from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation
-from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation, Touch
+from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation
 from tests.support.scenes import HALF_SPACE
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3
@@ -41,6 +36,19 @@ def test_the_deepest_place_gets_a_patch_and_of_equal_ones_the_first_from_the_cre
     assert places(nucleation(0.0), [-1e-2, -3e-2, 1.0, -2e-2]) == [0, 1, 3]
 
 
+def test_seeds_that_meet_are_one_patch() -> None:
+    """In a gap from 1 to 2: seeds apart, that meet each other, that meet the patches beside."""
+    gaps, widths = np.array([[1.0, 2.0], [3.0, 7.0]]), np.array([0.1, 0.1])
+
+    def first_gap(*centres: float) -> list[float]:
+        found = with_patches(gaps, np.array(centres), widths)
+        return [round(float(end), 6) for end in found[:-1].ravel()]
+
+    assert first_gap(1.3, 1.6) == [1.0, 1.25, 1.35, 1.55, 1.65, 2.0]
+    assert first_gap(1.35, 1.4) == [1.0, 1.3, 1.45, 2.0]
+    assert first_gap(1.02, 1.98) == [1.07, 1.93]
+
+
 @pytest.mark.parametrize("seed", [1, 9])
 def test_a_touch_is_found_in_a_gap_whose_other_minimum_is_far_from_touching(seed: int) -> None:
     """In stiff contact the surfaces come together beside an edge, at a minimum that appears."""
@@ -48,31 +56,6 @@ def test_a_touch_is_found_in_a_gap_whose_other_minimum_is_far_from_touching(seed
     stiff = Problem(profile, HalfSpace(1e12, 0.5), 0.04)
     found = run_loop(SharpMethod(stiff, accuracy=1e-2), max_penetration=0.9, load_steps=4)
     assert abs(found.audit_residual) < 1e-4
-
-
-def test_seeds_that_meet_are_one_patch() -> None:
-    """In a gap from 1 to 2: seeds apart, that meet each other, that meet the patches beside."""
-    gaps, widths = np.array([[1.0, 2.0], [3.0, 7.0]]), np.array([0.1, 0.1])
-
-    def first_gap(*centres: float) -> list[float]:
-        found = with_patches(gaps, np.array(centres), widths)
-        assert found[-1].tolist() == [3.0, 7.0]
-        return [round(float(end), 6) for end in found[:-1].ravel()]
-
-    assert first_gap(1.3, 1.6) == [1.0, 1.25, 1.35, 1.55, 1.65, 2.0]
-    assert first_gap(1.35, 1.4) == [1.0, 1.3, 1.45, 2.0]
-    assert first_gap(1.02, 1.98) == [1.07, 1.93]
-    open_surface = with_patches(np.empty((0, 2)), np.array([1.0, 1.06, 4.0]), np.full(3, 0.1))
-    np.testing.assert_allclose(open_surface, [[1.11, 3.95], [4.05, 0.95 + 2 * np.pi]])
-
-
-@pytest.mark.parametrize("gamma", [1e-5, 1e-4])
-def test_a_seed_is_narrower_than_the_first_equilibrium_that_it_grows_to(gamma: float) -> None:
-    wave = SingleWave(AMPLITUDE, PERIOD, HALF_SPACE.modulus, gamma)
-    q0 = 2 * np.pi / PERIOD
-    gaps = nucleation(gamma).insert_seeds(np.empty((0, 2)), [Touch(0.0, 0.0, AMPLITUDE * q0)])
-    width = (2 * np.pi - (gaps[0, 1] - gaps[0, 0])) / q0
-    assert 0.2 < width / (2 * wave.half_width(AMPLITUDE)) < 0.6
 
 
 def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None:
@@ -103,23 +86,3 @@ def test_every_touch_of_paper_scale_is_located(hurst: float, seed: int) -> None:
     method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.04))
     loop = run_loop(method, max_penetration=0.6, load_steps=20)
     assert abs(loop.audit_residual) < 1e-4
-
-
-def test_the_first_of_several_gaps_that_close_is_aimed_at_by_itself() -> None:
-    """Their least clearance has kinks; each by itself is smooth, and few aims reach its touch."""
-
-    def clearances(at: float) -> np.ndarray:
-        return np.array([0.3 - at - 0.2 * at**2, 0.05 - 0.15 * at + 0.02 * at**3, 1.0 - 1.1 * at])
-
-    closing = ClearanceInterpolation(
-        0.0, 1.0, clearances(0.0), clearances(1.0), lambda field: clearances(field.separation)
-    )
-    clear, hit = 0.0, 1.0
-    wanted = -1e-7
-    for _ in range(4):
-        at = clear + (hit - clear) * closing.next_trial(clear, hit, wanted)
-        least = float(clearances(at).min())
-        closing.record(at, cast(Any, SimpleNamespace(separation=at)))
-        clear, hit = (at, hit) if least > 0 else (clear, at)
-    assert abs(least - wanted) < 1e-8
-    assert int(np.argmin(clearances(hit))) == 0

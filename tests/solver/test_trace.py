@@ -7,7 +7,6 @@ import pytest
 
 from adhesis.solver.model.measured_profile import (
     band_limited,
-    form_shares,
     one_period,
     polynomial_form,
     trace_spectrum,
@@ -35,14 +34,6 @@ def test_a_polynomial_is_all_form_and_its_rest_has_none(degree: int) -> None:
     np.testing.assert_allclose(polynomial_form(rest, degree), 0, atol=1e-18)
     with pytest.raises(ValueError, match="degree is -1"):
         polynomial_form(form, -1)
-
-
-def test_a_bow_stands_out_in_its_degree() -> None:
-    place = 2 * X / LENGTH - 1
-    shares = form_shares(rough() + 2e-6 * place**2)
-    # 2 x² = (4/3) P2 + 2/3; the mean square of P2 over the trace is 1/5.
-    assert shares[2] == pytest.approx((4 / 3 * 1e-6) ** 2 / 5, rel=0.2)
-    assert shares[2] > 8 * shares[3:9].max()
 
 
 def test_a_period_keeps_the_heights_and_has_no_step() -> None:

@@ -142,18 +142,6 @@ def start(
     )
 
 
-def start_python(*words: object) -> subprocess.Popen[str]:
-    """Start this interpreter in an environment in which it can start ranks."""
-    return subprocess.Popen(
-        [sys.executable, *map(str, words)],
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-
-
 def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]:
     """Run this interpreter to its end, in an environment in which it can start ranks."""
     return subprocess.run(
@@ -199,12 +187,12 @@ def hung_launchers() -> list[int]:
     ]
 
 
-def wait_until(condition: Callable[[], bool], seconds: float = 150.0) -> None:
+def wait_until(condition: Callable[[], bool], seconds: float = 150.0, every: float = 0.02) -> None:
     """Wait for a condition; AssertionError if it does not come true."""
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited too long"
-        time.sleep(0.02)
+        time.sleep(every)
 
 
 def done_rows(path: Path) -> int:

@@ -11,10 +11,11 @@ from typing import Any
 
 RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py")
 LONG = (
-    *("ranks", "test_staging.py", "test_every_claim", "test_kinetics.py", "test_report.py"),
-    *("test_notebook.py", "test_docs.py", "test_trace_answer.py", "test_sharp.py", "test_run.py"),
-    *("test_preload.py", "test_opening.py", "test_grid.py", "test_damage.py", "test_store.py"),
-    *("test_sharp_many.py", "test_opened.py", "test_open_work.py", "test_limits.py"),
+    *("ranks", "test_staging.py", "test_every_claim", "test_report.py", "test_kinetics.py"),
+    *("test_docs.py", "test_run.py", "test_grid.py", "test_notebook.py", "test_trace_answer.py"),
+    *("test_sharp_path.py", "test_preload.py", "test_damage.py", "test_sharp.py"),
+    *("test_precision.py", "test_merge.py", "test_opening.py", "test_extremes.py"),
+    *("test_interior.py", "test_limits.py", "test_symmetry.py", "test_store.py"),
 )
 
 

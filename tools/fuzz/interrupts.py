@@ -12,12 +12,13 @@ that a crash is counted too.
 - ``trace``, ``pool``: ``loss_of_trace`` in one process, and with processes of its own
 - ``campaign``: a campaign in one process
 
-    python tools/fuzz/interrupts.py --seed N [--count 100] [--kind strong …] [--seconds S]
+    python tools/fuzz/interrupts.py --seed N [--seconds 60]
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import sys
 import tempfile
@@ -38,7 +39,6 @@ from tools.interrupted import interrupted
 from tools.isolated import Isolated
 
 KINDS = ("strong", "weak", "grid", "first", "trace", "pool", "campaign")
-OF_ONE_PROCESS_EACH = ("first",)
 LOAD_STEPS = 40
 WAVES = 10  # the longest ones in a period
 LIMIT = 300.0  # s of CPU time of one interrupt, its set-up included
@@ -218,24 +218,21 @@ def main() -> int:
     """Return 1 if an interrupt did not arrive as what it was."""
     parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--kind", nargs="+", choices=KINDS, default=KINDS)
-    parser.add_argument("--count", type=int, default=100, help="of each kind")
-    parser.add_argument("--first", type=int, default=0, help="number of the first")
-    parser.add_argument("--seconds", type=float, default=np.inf, help="at most so long, in all")
+    parser.add_argument("--seconds", type=float, default=60.0, help="about so long, in all")
     args = parser.parse_args()
     until = time.monotonic() + args.seconds
     wrong = 0
-    for place, name in enumerate(args.kind):
+    for place, name in enumerate(KINDS):
         started = time.monotonic()
-        end = started + (until - started) / (len(args.kind) - place)
+        end = started + (until - started) / (len(KINDS) - place)
         isolated = Isolated(once, LIMIT)
         count: Counter[str] = Counter()
-        for number in range(args.first, args.first + args.count):
+        for number in itertools.count():
             if count and time.monotonic() > end:
                 break
             how, died = isolated(name, args.seed, number)
             count[how or f"CRASH: {died}"] += 1
-            if name in OF_ONE_PROCESS_EACH and not died:
+            if name == "first" and not died:
                 isolated.end()
         bad = sum(n for how, n in count.items() if how.split()[0] not in ("raised", "done"))
         bad += name == "first" and len({how.split()[-1] for how in count}) > 1
