@@ -15,6 +15,7 @@ import time
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from traceback import walk_stack
 from types import FrameType
 
 from adhesis.ensemble import errors, exit_codes
@@ -103,7 +104,7 @@ def parser_of(name: str) -> Parser:
 def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | None]:
     """Return exit code, the sentence to report, and the error."""
     try:
-        with _termination(enabled=name != _PARALLEL):
+        with _interrupts(name):
             code = _execute(name, words)
             sys.stdout.flush()
         return code, "", None
@@ -152,27 +153,39 @@ def _execute(name: str, words: Sequence[str]) -> int:
 
 
 @contextmanager
-def _termination(*, enabled: bool) -> Iterator[None]:
-    """Raise Terminated at SIGTERM and SIGHUP, so that unfinished files are removed.
+def _interrupts(name: str) -> Iterator[None]:
+    """Raise KeyboardInterrupt at SIGINT, and Terminated at SIGTERM and SIGHUP.
 
-    A signal that is ignored, as SIGHUP under ``nohup``, stays so. What follows the first one is
-    ignored: a terminal that closes sends two.
+    So unfinished files are removed. A signal that is ignored, as SIGHUP under ``nohup``, stays so.
+    After SIGTERM or SIGHUP both are ignored: a terminal that closes sends two. A run has handlers
+    of its own for all but SIGINT.
+
+    What a handler raises while a module is loaded may be lost, or come out as another error; there
+    the signal ends the process.
     """
 
-    def terminate(_: int, __: FrameType | None) -> None:
-        for number in handled:
-            signal.signal(number, signal.SIG_IGN)
+    def handle(number: int, frame: FrameType | None) -> None:
+        if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f, _ in walk_stack(frame)):
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
+        for each in before.keys() - {signal.SIGINT}:
+            signal.signal(each, signal.SIG_IGN)
         raise Terminated
 
-    numbers = (signal.SIGTERM, signal.SIGHUP) if enabled and in_main_thread() else ()
-    handled = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]
-    for number in handled:
-        signal.signal(number, terminate)
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[: 1 if name == _PARALLEL else 3]
+    unhandled = (signal.SIG_DFL, signal.default_int_handler)
+    before = {n: was for n in numbers if (was := signal.getsignal(n)) in unhandled}
+    if not in_main_thread():
+        before.clear()
+    for number in before:
+        signal.signal(number, handle)
     try:
         yield
     finally:
-        for number in handled:
-            signal.signal(number, signal.SIG_DFL)
+        for number, was in before.items():
+            signal.signal(number, was)
 
 
 def _overview() -> Parser:

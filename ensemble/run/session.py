@@ -222,7 +222,17 @@ class _Session:
             lambda: self._estimate(schedule, master.in_flight, len(channel.workers)),
             self.stream,
         )
-        master = Master(channel, schedule, self._groups, collect, self._limits, progress.tick)
+
+        def halted(reason: str) -> None:
+            if master.in_flight and not isinstance(channel, OwnWorker):
+                progress.say(
+                    f"{reason}: tasks in progress have up to {self._limits.grace:g} s to stop"
+                    + ("; Ctrl-C again ends at once" if self.signals.received == "SIGINT" else "")
+                )
+
+        master = Master(
+            channel, schedule, self._groups, collect, self._limits, progress.tick, halted
+        )
         try:
             return master.run()
         finally:

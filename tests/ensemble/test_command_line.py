@@ -241,6 +241,24 @@ def test_what_nohup_ignores_does_not_end_a_command(folder, monkeypatch):
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("module", ["adhesis.ensemble.command.main", "numpy"])
+def test_a_signal_while_modules_are_loaded_ends_the_process_as_itself(module, number):
+    """What a handler raises there may be lost, or come out as an ImportError."""
+    code = (
+        "import os, sys\n"
+        "class Finder:\n"
+        "    def find_spec(name, *_):\n"
+        f"        if name == {module!r}: os.kill(os.getpid(), {int(number)})\n"
+        "from adhesis.__main__ import main\n"
+        "sys.meta_path.insert(0, Finder)\n"
+        "sys.argv[1:] = ['status', 'none.h5']\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, env=environment())
+    assert (done.returncode, done.stderr) == (-number, b"")
+
+
 def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
     def interrupt(seconds):
         raise KeyboardInterrupt

@@ -65,6 +65,7 @@ run c.toml --redo all --work-of-adhesion 40 ->
     --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
 run c.toml --out r.h5 --redo failed --hurst 0.75 ->
     --hurst is 0.75: this campaign has no such task
+run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5
 run c.toml --out r.h5 --redo all --realisation 9 -> only 0, 1
 run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
 status '' -> FILE.h5 is ''
@@ -184,7 +185,7 @@ trace t.txt -> required: --work-of-adhesion, --young, --poisson
 TRACE -> --to is missing: give the directory for the page, or --plan
 TRACE --plan -> states no unit
 TRACE --plan --unit um --columns 3 -> --columns is 3: it must name two of the 2
-TRACE --plan --unit um --columns 2 -> header states no step with its unit: give
+TRACE --plan --unit um --columns 2 -> no step with its unit is found in its header: give
 TRACE --plan --unit um --columns x -> --columns is 'x': it must be two whole
 TRACE --plan --unit um --cut-off 1m -> --cut-off is 1 m
 TRACE --plan --unit um --tip-radius 5 -> --tip-radius is 5, which would be 5 m
