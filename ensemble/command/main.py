@@ -11,6 +11,7 @@ import importlib
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Iterator, Sequence
@@ -58,6 +59,8 @@ _PARALLEL = "run"
 _INDEPENDENT = ("loop", "trace", "doctor")
 # How long a process waits for rank 0 to report the same error, whose end makes mpirun end all.
 _RANK_0_FIRST = 20.0  # s
+# A signal comes again so long after Python has dropped what its handler raised.
+_AGAIN = 0.01  # s
 
 
 class Terminated(KeyboardInterrupt):
@@ -161,10 +164,13 @@ def _interrupts(name: str) -> Iterator[None]:
     of its own for all but SIGINT.
 
     What a handler raises while a module is loaded may be lost, or come out as another error; there
-    the signal ends the process.
+    the signal ends the process. What it raises in a finalizer is dropped; the signal comes again.
     """
+    received = 0
 
     def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal received
+        received = number
         if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f, _ in walk_stack(frame)):
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
@@ -174,6 +180,14 @@ def _interrupts(name: str) -> Iterator[None]:
             signal.signal(each, signal.SIG_IGN)
         raise Terminated
 
+    def dropped(unraisable: sys.UnraisableHookArgs) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            hook(unraisable)
+            return
+        for each in before:
+            signal.signal(each, handle)
+        threading.Timer(_AGAIN, os.kill, (os.getpid(), received)).start()
+
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[: 1 if name == _PARALLEL else 3]
     unhandled = (signal.SIG_DFL, signal.default_int_handler)
     before = {n: was for n in numbers if (was := signal.getsignal(n)) in unhandled}
@@ -181,9 +195,13 @@ def _interrupts(name: str) -> Iterator[None]:
         before.clear()
     for number in before:
         signal.signal(number, handle)
+    hook = sys.unraisablehook
+    if before:
+        sys.unraisablehook = dropped
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for number, was in before.items():
             signal.signal(number, was)
 

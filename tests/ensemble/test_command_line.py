@@ -10,6 +10,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -257,6 +258,24 @@ def test_a_signal_while_modules_are_loaded_ends_the_process_as_itself(module, nu
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, env=environment())
     assert (done.returncode, done.stderr) == (-number, b"")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatch):
+    """Python drops what is raised there; a command waits for ever where the signal is lost."""
+
+    class Finalized:
+        def __del__(self):
+            signal.raise_signal(number)
+
+    def execute(args):
+        Finalized()
+        threading.Event().wait(60)
+        return 0
+
+    monkeypatch.setattr("adhesis.ensemble.command.campaigns.status.execute", execute)
+    assert main(["status", "r.h5"]) == code
+    assert "Traceback" not in capsys.readouterr().err
 
 
 def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
