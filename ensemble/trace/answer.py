@@ -458,10 +458,10 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     checks.instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        strength, open_ = cycle.strength_at(gamma), cycle.open_at(gamma)
         problem = Problem(
-            profile, cycle.half_space, gamma, strength=strength, work_of_adhesion_open=open_,
-            measure=cycle.measure,
+            profile, cycle.half_space, gamma, measure=cycle.measure,
+            strength=math.inf if cycle.strength is None else cycle.strength,
+            adhesion_range=cycle.adhesion_range, work_of_adhesion_open=cycle.open_at(gamma),
         )  # fmt: skip
         if problem.pinning > 0:
             check_pinning(cycle.method, None)

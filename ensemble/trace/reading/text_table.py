@@ -291,7 +291,7 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
         )
     for place, fields in others:
         word = next((field for field in fields if value(field, reader.decimal) is None), None)
-        if word is not None:
+        if word is not None and not re.search(r"[;|\t]", word):
             raise InputError(
                 f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
                 f"{'comma' if reader.decimal == ',' else 'point'}: take columns of words and "
