@@ -130,7 +130,7 @@ LOOP --path=out -> --path is 'out': it holds no turning point
 LOOP --path=0.5,x,out -> --path is '0.5,x,out': it must be numbers with commas
 LOOP --path=0.5,nan -> --path[1] is nan
 LOOP --path=0.5,0.50000001,out -> the path goes from 0.5 to 0.50000001
-{LOOP,TRACE --plan --unit um} --adhesion-range 0.3 -> --adhesion-range is 0.3 m: it must be at most
+{{LOOP,TRACE --plan --unit um}} --adhesion-range 0.3 -> --adhesion-range is 0.3 m: it must be at
 LOOP --path=0.5 --max-penetration 0.5 -> a loop has one of them
 LOOP --path 0,5,0,2,out -> --path is '0,5,0,2,out': numbers have a decimal point, as in
 LOOP --max-penetration 90% -> --max-penetration is '90%': it must be one or more numbers between

@@ -160,6 +160,11 @@ def test_an_open_file_is_named_and_read(tmp_path: Path) -> None:
         assert trace.source == str(path)
 
 
+def test_whole_heights_in_memory_are_no_step_and_no_length() -> None:
+    heights = np.arange(N) * 7 % 11
+    assert read_trace(heights, unit="nm", step=7e-8).points == N
+
+
 def test_missing_heights_in_memory_are_gaps() -> None:
     masked = np.ma.masked_array(1e6 * Z, mask=np.arange(N) == 7)
     table = pd.DataFrame({"z (um)": pd.array([None, *(1e6 * Z[1:])], dtype="Float64")})
@@ -181,6 +186,25 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "a decimal sign": (BOTH, {"decimal": ","}, InputError, "decimal belongs to files"),
     "an empty stream": (io.BytesIO(b""), {}, InputError, "the stream is empty"),
     "a zip": (io.BytesIO(b"\x1f\x8b0"), {}, InputError, "the stream is compressed"),
+    "booleans": (FRAME.assign(**{"z (um)": True}), {"columns": [1, 2]}, InputError, "holds bool"),
+    "complex heights": (FRAME.astype(complex), {"columns": [1, 2]}, InputError, "holds complex128"),
+    "dates": (
+        FRAME.astype("M8[s]"),
+        {"columns": [1, 2]},
+        InputError,
+        r"holds datetime64\[s\]: hei",
+    ),
+    "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
+    "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),
+    "a unit that is none": (BOTH, {"unit": 5}, TypeError, "unit is 5: it must be a text"),
+    "columns as text": (
+        BOTH,
+        {"columns": "1,2"},
+        TypeError,
+        r"columns is '1,2': it must be a list",
+    ),
+    "one column number": (BOTH, {"columns": 1}, TypeError, r"columns is 1: it must be a list"),
+    "a text for a path": ("1,2\n3,4\n", {}, InputError, r"cannot read 1,2\\n3,4\\n: there is no"),
     "neither": (3, {}, TypeError, r"source is 3: .* a path, an open file .* list .* Series"),
 }
 

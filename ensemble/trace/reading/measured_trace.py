@@ -215,6 +215,15 @@ def read_trace(
     with refused_as_input():
         if step is not None:
             step = checks.real(parameter("step"), step, checks.LENGTH)
+        if columns is not None and (isinstance(columns, str) or not hasattr(columns, "__iter__")):
+            raise TypeError(
+                f"{parameter('columns')} is {checks.shown(columns)}: it must be a list, as [1, 2]"
+            )
+        if unit is not None and not isinstance(unit, str):
+            raise TypeError(
+                f"{parameter('unit')} is {checks.shown(unit)}: it must be a text, as 'um' or "
+                "'mm,um'"
+            )
         named = hasattr(source, "iloc") and _are_names(columns)
         if columns is not None and not named:
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
@@ -309,7 +318,10 @@ def load_array(source: Source) -> Array:
 
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
-    array = np.ma.asarray(values)
+    try:
+        array = np.ma.asarray(values)
+    except ValueError as error:
+        raise InputError(f"{name} is no table of numbers: {reason(error)}") from None
     if array.dtype.kind not in "fiu" or array.ndim > 2:
         raise InputError(
             f"{name} holds {array.dtype} of {array.ndim} dimensions: heights are real numbers in "
@@ -335,6 +347,9 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
         source = source[list(names)]
     units = source.attrs.get("units", {})
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
+    for n, kind in source.dtypes.items():
+        if kind.kind in "bcmM":  # which would become numbers of another meaning
+            raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
     try:
         values = source.to_numpy(dtype=float, na_value=np.nan)
     except (TypeError, ValueError) as error:
@@ -418,7 +433,8 @@ def _from_table(
                     f"its header: give {parameter('step')}, as in 0.5um"
                 )
             notes.append(f"step {length_text(step, 6)} (header)")
-        _refuse_length_on_top(name, column, step, lines)
+        if form.startswith("text"):
+            _refuse_length_on_top(name, column, step, lines)
     return _in_metres(Trace(heights, float(step), name, tuple(notes)))
 
 
@@ -483,8 +499,10 @@ def _scan_line(
 ) -> tuple[Array, Array]:
     """Return one scan line, where the positions of a raster begin anew on each line."""
     x = columns[0]
+    if not x.size:
+        return columns, lines
     again = np.flatnonzero((x[1:] == x[0]) & (x[:-1] != x[0])) + 1
-    points = int(again[0]) if again.size and len(columns) == 2 else max(x.size, 1)
+    points = int(again[0]) if again.size and len(columns) == 2 else x.size
     count, rest = divmod(x.size, points)
     is_raster = count > 1 and not rest and np.array_equal(x, np.tile(x[:points], count))
     if row is None and is_raster:

@@ -134,7 +134,7 @@ def find_form(
         raise InputError(f"{parameter('decimal')} is {decimal!r}: it must be '.' or ','")
     if delimiter is None:
         delimiter = find_delimiter(source, sample, decimal)
-    elif len(delimiter) != 1:
+    elif not isinstance(delimiter, str) or len(delimiter) != 1:
         raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one sign")
     if decimal is None:
         rows = [field for line in sample for field in split(line, delimiter)]
