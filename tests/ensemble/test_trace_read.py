@@ -162,7 +162,7 @@ def test_an_open_file_is_named_and_read(tmp_path: Path) -> None:
 
 def test_whole_heights_in_memory_are_no_step_and_no_length() -> None:
     heights = np.arange(N) * 7 % 11
-    assert read_trace(heights, unit="nm", step=7e-8).points == N
+    assert read_trace(heights, unit="nm", step=7e-9).points == N
 
 
 def test_missing_heights_in_memory_are_gaps() -> None:
