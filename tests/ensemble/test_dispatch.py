@@ -477,6 +477,19 @@ def test_a_process_that_is_killed_fails_its_task_and_is_replaced():
     assert [(o.task, o.error) for o in outcomes] == [(0, "its process ended with code -9")]
 
 
+def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
+    """One that is stopped would not see that it is asked to end."""
+    calls = []
+    kill, wait = subprocess.Popen.kill, subprocess.Popen.wait
+    monkeypatch.setattr(subprocess.Popen, "kill", lambda p: calls.append("kill") or kill(p))
+    monkeypatch.setattr(
+        subprocess.Popen, "wait", lambda p, timeout=None: calls.append("wait") or wait(p, timeout)
+    )
+    with Processes(1, never) as channel:
+        os.kill(channel.pids[0], signal.SIGSTOP)
+    assert calls[0] == "kill"
+
+
 def test_processes_end_where_the_system_does_not_grant_all_of_them(monkeypatch):
     """They would wait for tasks as long as a Python session lasts."""
     started = []
