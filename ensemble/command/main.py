@@ -143,6 +143,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
         raise errors.InputError(f"COMMAND is {name!r}: it must be one of {', '.join(COMMANDS)}")
     for variable, count in ONE_THREAD.items():
         os.environ.setdefault(variable, count)  # before numpy is loaded
+    os.environ.pop("MPLBACKEND", None)  # figures go to files, whatever a site has set for windows
     try:
         args = parser_of(name).parse(words[1:])
     except SystemExit:  # --help

@@ -134,7 +134,7 @@ def test_every_option_refuses_what_it_cannot_read(name, capsys):
         if not action.option_strings or action.nargs == 0:
             continue
         option = action.option_strings[-1]
-        assert f"{option}: expected" in refused(capsys, [name, option])
+        assert f"{option}: a value is missing" in refused(capsys, [name, option])
         if action.choices is None:
             assert f"{option} is ''" in refused(capsys, [name, option, ""])
         if action.type in (int, float):
@@ -328,6 +328,13 @@ def test_a_closed_stdout_is_one_sentence():
     done = process("--version", before=">&-")
     assert done.returncode == 74
     assert done.stderr == "adhesis: stdout could not be written: Bad file descriptor\n"
+
+
+def test_a_setting_of_windows_does_not_reach_figures(tmp_path):
+    words = ("loop", "--hurst", "0.8", "--n0", "2", "--ratio", "4", "--load-steps", "2")
+    env = environment() | {"MPLBACKEND": "nosuch"}
+    done = process(*words, "--figure", tmp_path / "a.png", "--quiet", env=env)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_reader_that_leaves_ends_the_command_without_a_word():

@@ -125,6 +125,7 @@ WAVE --strength 1e4 --adhesion-range 1e-9 -> --adhesion-range is 1e-09 and
 WAVE --strength 1e-4 -> --strength is 0.0001 Pa: it must be at least
 WAVE --measure projected -> --measure is 'projected': it must be one of arc, flat
 # the path of a loop
+LOOP --young -1MPa -> --young: a value is missing; one that begins with - follows a =, as in
 LOOP --path=-0.5,out -> it must start with loading
 LOOP --path=out -> --path is 'out': it holds no turning point
 LOOP --path=0.5,x,out -> --path is '0.5,x,out': it must be numbers with commas
