@@ -17,7 +17,7 @@ from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
+from adhesis.ensemble.outputs import Writing, check_outputs, write_json
 from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.trace.options import (
     delimiter_of,
@@ -305,7 +305,6 @@ def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[floa
 
 def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
     from adhesis.ensemble.loop.loop_figure import draw_loops
+    from adhesis.ensemble.report.figures.style import write
 
-    figure = draw_loops(results)
-    with whole_file(path) as stream:
-        figure.savefig(stream, format=path.suffix[1:].lower(), dpi=200)
+    write(draw_loops(results), path, dpi=200)

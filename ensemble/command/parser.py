@@ -44,7 +44,7 @@ class Parser(argparse.ArgumentParser):
             if error.argument_name is None:  # of no single option, as newer Pythons have it
                 self.error(error.message)
             name, message = error.argument_name, error.message
-            if message == "expected one argument":  # also where it looks like an option, as -1MPa
+            if message.startswith("expected "):  # also where it looks like an option, as -1MPa
                 message = f"a value is missing; one that begins with - follows a =, as in {name}=-1"
             link = " " if message.startswith("is ") else ": "
             self.error(f"{name}{link}{message}")
