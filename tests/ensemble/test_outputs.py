@@ -97,7 +97,7 @@ def test_a_failure_in_the_middle_leaves_the_old_file(
 
 
 def test_a_figure_that_cannot_be_written_is_an_error_of_the_system(tmp_path: Path) -> None:
-    """The writer of PDF raises an AttributeError where the disk is full."""
+    """Nothing is left of it, whatever the writer of its format raises."""
     figure = Figure()
     figure.subplots().plot(range(1000))
     before = resource.getrlimit(resource.RLIMIT_FSIZE)

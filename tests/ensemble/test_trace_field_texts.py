@@ -124,6 +124,7 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         f"step: {words}": ([f"{words} 0.5 µm", "Z [µm]", *ZS], {})
         for words in ("Messschrittweite", "Pas d'échantillonnage :", "測定ピッチ,", "측정 간격:")
     },
+    "ruled comments": (["####", "# x", "####", UM, *TWO], {}),
     "a delimiter before": (["\tx (um)\tz (um)", *(f"\t{x}\t{z}" for x, z in PAIRS)], {}),
 }  # fmt: skip
 

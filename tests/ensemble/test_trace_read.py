@@ -236,7 +236,7 @@ def test_a_trace_is_made_of_heights_and_a_step() -> None:
 @pytest.mark.parametrize(
     "gap",
     ["", "NaN", "---", "*****", "BAD", "-9999", "1e38", "-nan(ind)", "1.#QNAN0", "Infinity", "n.a.",
-     "(no data)", "Over range", "#WERT!", "#DIV/0!"],
+     "(no data)", "Over range", "#WERT!", "#DIV/0!", "#N/A"],
 )  # fmt: skip
 def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -> None:
     lines = rows(";", ".")
@@ -245,6 +245,9 @@ def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -
     trace = read(tmp_path, [UM, *lines])
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(trace.heights)), [20, 21, 77])
     assert trace.drop_outs == 3
+    if gap:  # two empty lines end a block
+        column = [line.split(";")[1] for line in lines]
+        assert read(tmp_path, ["z (um)", *column], step=STEP).drop_outs == 3
     good = ~np.isnan(trace.heights)
     np.testing.assert_allclose(trace.heights[good], Z[good], atol=1e-11)
 

@@ -162,8 +162,9 @@ class _Reader:
         return {place: row for place, row in found if row is not None}
 
     def _row(self, line: str) -> _Row | None:
-        begin = line.strip()[:1]
-        if begin and begin in COMMENT and (begin == "#" or not is_missing(line.strip())):
+        plain = line.strip()
+        # "***" may be a missing number, "#N/A" is one, and "###" rules a comment off
+        if plain and plain[0] in COMMENT and not (is_missing(plain) and plain.strip("#")):
             return None
         fields = split(line, self.delimiter) or [""]
         while len(fields) > self.count and not fields[-1]:
