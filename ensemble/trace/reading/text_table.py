@@ -166,7 +166,7 @@ class _Reader:
         # "***" may be a missing number, "#N/A" is one, and "###" rules a comment off
         if plain and plain[0] in COMMENT and not (is_missing(plain) and plain.strip("#")):
             return None
-        fields = split(line, self.delimiter) or [""]
+        fields = [plain] if is_missing(plain) else split(line, self.delimiter)
         while len(fields) > self.count and not fields[-1]:
             fields.pop()
         values = [value(field, self.decimal) for field in fields]
