@@ -345,8 +345,8 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         "the first column of .* has equal steps, as positions do",
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
-    "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one sign"),
-    "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one sign"),
+    "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
+    "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
     "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "decimal is 'x': it must be '.' or ','"),
     "a column of words": ([f"{row},yes" for row in TWO], {}, "line 1 .* 'yes', which is no number"),
     "thousands with a given form": (

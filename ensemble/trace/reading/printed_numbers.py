@@ -134,8 +134,9 @@ def find_form(
         raise InputError(f"{parameter('decimal')} is {decimal!r}: it must be '.' or ','")
     if delimiter is None:
         delimiter = find_delimiter(source, sample, decimal)
-    elif not isinstance(delimiter, str) or len(delimiter) != 1:
-        raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one sign")
+    elif delimiter not in DELIMITERS:
+        signs = ", ".join(map(repr, DELIMITERS))
+        raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one of {signs}")
     if decimal is None:
         rows = [field for line in sample for field in split(line, delimiter)]
         comma, point = (next((f for f in rows if sign in f), None) for sign in ",.")
