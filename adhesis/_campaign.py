@@ -8,7 +8,10 @@ import os
 import re
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
+from decimal import Decimal
 from html import escape
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -218,12 +221,13 @@ def _warn_of_failures(path: Path) -> None:
 
 
 def _toml(source: Mapping[str, Any]) -> str:
-    """Return a dictionary of tables as TOML; what it cannot hold becomes a text that is refused.
+    """Return a dictionary of tables as TOML.
 
     Raises
     ------
     InputError
-        If lists are nested deeper than those of any key, as in a list that contains itself.
+        If a value is none that a key can have, or lists are nested deeper than those of any key, as
+        in a list that contains itself.
     """
     lines: list[str] = []
     for name, table in source.items():
@@ -248,15 +252,16 @@ def _value(where: str, value: Any, depth: int = 0) -> str:
         return str(value).lower()
     if isinstance(value, int):
         return int.__repr__(value)  # a class of a user's own may print anything
-    if isinstance(value, float):
-        return float.__repr__(value)
+    if isinstance(value, Real | Decimal):
+        with suppress(OverflowError, ValueError):  # of a fraction, of a signalling NaN
+            return float.__repr__(float(value))
+    if isinstance(value, str):
+        return json.dumps(str(value), ensure_ascii=False)
+    rule = "a number, a text, true or false, or a list of these"
     if isinstance(value, list | tuple):
-        if depth > _DEEPEST:
-            from adhesis.ensemble.errors import InputError
+        if depth <= _DEEPEST:
+            return f"[{', '.join(_value(where, entry, depth + 1) for entry in value)}]"
+        rule = "a value or a list of values, and no list in which lists are nested so deep"
+    from adhesis.ensemble.errors import InputError
 
-            raise InputError(
-                f"campaign: {where} is {checks.shown(value)}: it must be a value or a list of "
-                "values, and no list in which lists are nested so deep"
-            )
-        return f"[{', '.join(_value(where, entry, depth + 1) for entry in value)}]"
-    return json.dumps(str(value), ensure_ascii=False)
+    raise InputError(f"campaign: {where} is {checks.shown(value)}: it must be {rule}")

@@ -142,7 +142,7 @@ def refused_as_input(options: Container[str] = (), **names: str) -> Iterator[Non
         raise
     except (ValueError, NotImplementedError) as error:
         text = " ".join(str(error).split())
-        found = re.match(r"(\w+)(?= (is|are|holds|has)\b)", text)
+        found = re.match(r"(\w+)(?=(\[\d+\])? (is|are|holds|has)\b)", text)
         name = names.get(found[1], found[1]) if found else ""
         if found and name in options:
             text = f"{parameter(name)}{text[found.end() :]}"

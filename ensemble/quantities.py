@@ -225,18 +225,24 @@ def words_of(option: str, text: str) -> list[str]:
 
 
 def read_words(
-    option: str, words: Sequence[str], read: Callable[[str], float] = float, rule: str = ""
+    option: str,
+    words: Sequence[str],
+    read: Callable[[str], float] = float,
+    rule: str = "",
+    text: str | None = None,
 ) -> tuple[float, ...]:
     """Read the numbers of an option that is a list (InputError).
 
-    ``rule`` says what the list must be, for a ``read`` whose ValueError has no sentence.
+    ``rule`` says what the list must be, for a ``read`` whose ValueError has no sentence; ``text``
+    is the option as it was given, if it holds more than the words.
     """
     try:
         return tuple(read(word) for word in words)
     except InputError as error:
         raise InputError(f"{option} {error}") from None
     except ValueError:
-        raise InputError(f"{option} is {quoted(','.join(words))}: it must be {rule}") from None
+        given = quoted(",".join(words) if text is None else text)
+        raise InputError(f"{option} is {given}: it must be {rule}") from None
 
 
 _NAMES = {

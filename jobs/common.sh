@@ -278,9 +278,9 @@ is_written() { [ -e "$1" ] && "$ADHESIS" status "$1" --json 2>/dev/null | grep '
 # copy FROM TO: whole or not at all
 copy() { copy_beside "$1" "$2" && mv -fT "$2.copy" "$2"; }
 
-# copy_beside FROM TO: to TO.copy, on disk; a link of that name is removed and not followed
+# copy_beside FROM TO: to TO.copy, on disk and equal; a link of that name is removed, not followed
 copy_beside() {
-    if cp --remove-destination "$1" "$2.copy" && sync "$2.copy"; then return 0; fi
+    if cp --remove-destination "$1" "$2.copy" && sync "$2.copy" && cmp -s "$1" "$2.copy"; then return 0; fi
     rm -f "$2.copy"
     return 1
 }

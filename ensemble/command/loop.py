@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
+from adhesis.ensemble.outputs import Writing, check_outputs, write_json
 from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.trace.options import (
     delimiter_of,
@@ -33,7 +34,7 @@ from adhesis.solver.loading.path import PathResult, run_path
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.pattern import stripes_of
-from adhesis.solver.model.problem import Problem, strength_of
+from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile, profile_from_heights, self_affine_profile
 from adhesis.solver.registry import make_method
 
@@ -49,15 +50,21 @@ def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
     taken = _take_defaults(args)
     _check_files(args)
-    options = {"count": "stripes", "amplitude": "stripe_amplitude", "phase": "stripe_phase"}
+    options = {
+        "count": "stripes",
+        "amplitude": "stripe_amplitude",
+        "phase": "stripe_phase",
+        "turning_points": "path",
+    }
     with refused_as_input(vars(args), thickness="layer", **options):
         profile, warnings = _profile(args)
         source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
-        strength = strength_of(args.work_of_adhesion, args.adhesion_range, args.strength)
         problem = Problem(
-            *(profile, half_space, args.work_of_adhesion, cycle.control, strength),
+            *(profile, half_space, args.work_of_adhesion, cycle.control),
+            strength=math.inf if args.strength is None else args.strength,
+            adhesion_range=args.adhesion_range,
             measure=args.measure,
             work_of_adhesion_open=args.work_of_adhesion_open,
             pattern=stripes_of(args.stripes, args.stripe_amplitude, args.stripe_phase),
@@ -298,7 +305,6 @@ def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[floa
 
 def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
     from adhesis.ensemble.loop.loop_figure import draw_loops
+    from adhesis.ensemble.report.figures.style import write
 
-    figure = draw_loops(results)
-    with whole_file(path) as stream:
-        figure.savefig(stream, format=path.suffix[1:].lower(), dpi=200)
+    write(draw_loops(results), path, dpi=200)

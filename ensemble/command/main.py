@@ -11,9 +11,11 @@ import importlib
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from traceback import walk_stack
 from types import FrameType
 
 from adhesis.ensemble import errors, exit_codes
@@ -55,6 +57,8 @@ _PARALLEL = "run"
 _INDEPENDENT = ("loop", "trace", "doctor")
 # How long a process waits for rank 0 to report the same error, whose end makes mpirun end all.
 _RANK_0_FIRST = 20.0  # s
+# A signal comes again so long after Python has dropped what its handler raised.
+_AGAIN = 0.01  # s
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -96,7 +100,7 @@ def parser_of(name: str) -> Parser:
 def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | None]:
     """Return exit code, the sentence to report, and the error."""
     try:
-        with _termination(enabled=name != _PARALLEL):
+        with _interrupts(name):
             code = _execute(name, words)
             sys.stdout.flush()
         return code, "", None
@@ -117,6 +121,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
         raise errors.InputError(f"COMMAND is {name!r}: it must be one of {', '.join(COMMANDS)}")
     for variable, count in ONE_THREAD.items():
         os.environ.setdefault(variable, count)  # before numpy is loaded
+    os.environ.pop("MPLBACKEND", None)  # figures go to files, whatever a site has set for windows
     try:
         args = parser_of(name).parse(words[1:])
     except SystemExit:  # --help
@@ -130,27 +135,54 @@ def _execute(name: str, words: Sequence[str]) -> int:
 
 
 @contextmanager
-def _termination(*, enabled: bool) -> Iterator[None]:
-    """Raise Terminated at SIGTERM and SIGHUP, so that unfinished files are removed.
+def _interrupts(name: str) -> Iterator[None]:
+    """Raise KeyboardInterrupt at SIGINT, and Terminated at SIGTERM and SIGHUP.
 
-    A signal that is ignored, as SIGHUP under ``nohup``, stays so. What follows the first one is
-    ignored: a terminal that closes sends two.
+    So unfinished files are removed. A signal that is ignored, as SIGHUP under ``nohup``, stays so.
+    After SIGTERM or SIGHUP both are ignored: a terminal that closes sends two. A run has handlers
+    of its own for all but SIGINT.
+
+    What a handler raises while a module is loaded may be lost, or come out as another error; there
+    the signal ends the process. What it raises in a finalizer is dropped; the signal comes again.
     """
+    received = 0
 
-    def terminate(_: int, __: FrameType | None) -> None:
-        for number in handled:
-            signal.signal(number, signal.SIG_IGN)
+    def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal received
+        received = number
+        if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f, _ in walk_stack(frame)):
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
+        for each in before.keys() - {signal.SIGINT}:
+            signal.signal(each, signal.SIG_IGN)
         raise errors.Terminated
 
-    numbers = (signal.SIGTERM, signal.SIGHUP) if enabled and in_main_thread() else ()
-    handled = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]
-    for number in handled:
-        signal.signal(number, terminate)
+    def dropped(unraisable: sys.UnraisableHookArgs) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            hook(unraisable)
+            return
+        for each in before:
+            signal.signal(each, handle)
+        threading.Timer(_AGAIN, os.kill, (os.getpid(), received)).start()
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[: 1 if name == _PARALLEL else 3]
+    unhandled = (signal.SIG_DFL, signal.default_int_handler)
+    before = {n: was for n in numbers if (was := signal.getsignal(n)) in unhandled}
+    if not in_main_thread():
+        before.clear()
+    for number in before:
+        signal.signal(number, handle)
+    hook = sys.unraisablehook
+    if before:
+        sys.unraisablehook = dropped
     try:
         yield
     finally:
-        for number in handled:
-            signal.signal(number, signal.SIG_DFL)
+        sys.unraisablehook = hook
+        for number, was in before.items():
+            signal.signal(number, was)
 
 
 def _overview() -> Parser:

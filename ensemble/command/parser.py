@@ -43,8 +43,11 @@ class Parser(argparse.ArgumentParser):
         except argparse.ArgumentError as error:
             if error.argument_name is None:  # of no single option, as newer Pythons have it
                 self.error(error.message)
-            link = " " if error.message.startswith("is ") else ": "
-            self.error(f"{error.argument_name}{link}{error.message}")
+            name, message = error.argument_name, error.message
+            if message.startswith("expected "):  # also where it looks like an option, as -1MPa
+                message = f"a value is missing; one that begins with - follows a =, as in {name}=-1"
+            link = " " if message.startswith("is ") else ": "
+            self.error(f"{name}{link}{message}")
 
     def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
         # "--young=--": some Pythons take the value for the end of the options, and hand on a list

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.quantities import STRESS, read_words, words_of
 from adhesis.ensemble.trace.job import MAX_PENETRATION
 from adhesis.ensemble.trace.options import given
@@ -68,8 +68,9 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
         out = words[-1] == _OUT
         words = words[:-1] if out else words
         if not words:
-            raise InputError("--path holds no turning point")
-        points = read_words("--path", words, rule="numbers with commas between them")
+            raise InputError(f"--path is {quoted(args.path)}: it holds no turning point")
+        rule = "numbers with commas between them, and perhaps 'out' behind the last"
+        points = read_words("--path", words, rule=rule, text=args.path)
         steps = args.load_steps
         return Cycle(points=points, control=control, load_steps=steps, is_path=True, out=out)
     turns = {**vars(turns_of(args, control))}

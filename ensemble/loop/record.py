@@ -110,7 +110,7 @@ def summary_rows(result: LoopResult | PathResult) -> list[tuple[str, str]]:
         ),
     ]
     if isinstance(result, PathResult):
-        way = ", ".join(f"{point:g}" for point in result.turning_points)
+        way = ", ".join(map(str, result.turning_points))
         out = ", out" if result.ends_out else ""
         share = in_works_of_adhesion(result.work, problem.work_of_adhesion)
         stored = f"of which {result.energy_change:.6g} J/m² are stored"

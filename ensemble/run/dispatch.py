@@ -105,6 +105,7 @@ class Master:
     collect: Collect
     limits: Limits
     tick: Callable[[], None] = lambda: None  # called often while nothing arrives (progress)
+    halted: Callable[[str], None] = lambda reason: None  # called when a stop begins
     # clock, sleep: replaced when the run is simulated
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
@@ -183,6 +184,7 @@ class Master:
             self._halted, self._reason = self.clock(), reason
             for rank in self._sent:
                 self.channel.send(rank, ("halt",), urgent=True)
+            self.halted(reason)
 
     def _receive(self, rank: int, message: Message) -> None:
         kind, *content = message

@@ -103,6 +103,11 @@ def prepare(
         )
     if redo is not None:
         redo.check(tasks)
+        if not os.path.exists(path):
+            raise InputError(
+                f"{parameter('redo')} computes again what is in a results file, and {path} does "
+                f"not exist: leave it out, or give the file ({parameter('out')})"
+            )
 
     def check_cells(chosen: Tasks) -> None:
         for task in chosen.of_cells():

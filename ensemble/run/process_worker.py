@@ -56,12 +56,13 @@ class Pipes:
 def main() -> None:
     """Work until dismissed."""
     end_with_parent()
-    incoming, outgoing = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # stdout carries messages alone
-    compute, task_seconds, report_interval = pickle.load(incoming)
-    limits = Limits(task_seconds=task_seconds, report_interval=report_interval)
-    channel = Pipes(int(sys.argv[1]), incoming, outgoing)
-    Worker(channel, compute, lambda outcome: outcome, limits).run()
+    incoming = sys.stdin.buffer
+    with os.fdopen(os.dup(1), "wb") as outgoing:
+        os.dup2(2, 1)  # stdout carries messages alone
+        compute, task_seconds, report_interval = pickle.load(incoming)
+        limits = Limits(task_seconds=task_seconds, report_interval=report_interval)
+        channel = Pipes(int(sys.argv[1]), incoming, outgoing)
+        Worker(channel, compute, lambda outcome: outcome, limits).run()
 
 
 if __name__ == "__main__":

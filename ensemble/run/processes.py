@@ -57,7 +57,7 @@ class Processes:
     def __exit__(self, *_: object) -> None:
         for rank, process in self._processes.items():
             if rank not in self._dismissed:
-                process.terminate()
+                process.kill()  # it holds no file, and may be stopped
             assert process.stdin is not None
             with contextlib.suppress(OSError):
                 process.stdin.close()

@@ -215,8 +215,16 @@ class _Session:
             lambda: schedule.seconds_left(master.in_flight, len(channel.workers)),
             self.stream,
         )
+
+        def halted(reason: str) -> None:
+            if master.in_flight and not isinstance(channel, dispatch.OwnWorker):
+                progress.say(
+                    f"{reason}: tasks in progress have up to {self._limits.grace:g} s to stop"
+                    + ("; Ctrl-C again ends at once" if self.signals.received == "SIGINT" else "")
+                )
+
         master = dispatch.Master(
-            channel, schedule, self._groups, collect, self._limits, progress.tick
+            channel, schedule, self._groups, collect, self._limits, progress.tick, halted
         )
         try:
             return master.run()

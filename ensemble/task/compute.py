@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from adhesis.solver.method import Branch, Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.pattern import stripes_of
-from adhesis.solver.model.problem import Problem, strength_of
+from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.registry import make_method
 
@@ -35,13 +36,13 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
     stiffness = 0.0 if campaign.cycle.under_load else campaign.cycle.stiffness
     control = Control() if stiffness is None else Control(stiffness)
     material = campaign.material
-    strength = strength_of(task.work_of_adhesion, material.adhesion_range, material.strength)
     return Problem(
         profile,
         half_space,
         task.work_of_adhesion,
         control,
-        strength,
+        math.inf if material.strength is None else material.strength,
+        adhesion_range=material.adhesion_range,
         work_of_adhesion_open=material.work_of_adhesion_open,
         measure=material.measure,
         pattern=stripes_of(material.stripes, material.stripe_amplitude, material.stripe_phase),

@@ -134,7 +134,7 @@ class PathResult(EquilibriumPath):
 
     def __repr__(self) -> str:
         """Return two lines with the path and its work."""
-        points = ", ".join(f"{point:g}" for point in self.turning_points[:_SHOWN])
+        points = ", ".join(map(str, self.turning_points[:_SHOWN]))
         points += ", …" if len(self.turning_points) > _SHOWN else ""
         return (
             f"PathResult({points}{', out' if self.ends_out else ''}; {self.load_steps} load steps, "
@@ -203,19 +203,19 @@ def check_path(
         raise ValueError("a path needs at least one turning point")
     if points[0] <= 0:
         raise ValueError(
-            f"the path starts with {points[0]:g}: it must start with loading, to a turning point "
+            f"the path starts with {points[0]}: it must start with loading, to a turning point "
             "above 0"
         )
     for i in range(1, len(points)):
         falls = points[i] < points[i - 1]
         if falls != (i % 2 == 1) or points[i] == points[i - 1]:
             raise ValueError(
-                f"the path goes from {points[i - 1]:g} to {points[i]:g}: after "
+                f"the path goes from {points[i - 1]} to {points[i]}: after "
                 f"{'loading it must unload' if i % 2 else 'unloading it must load'}"
             )
     if out and len(points) % 2 == 0:
         raise ValueError(
-            f"the path ends with unloading to {points[-1]:g} and goes out: omit that turning point"
+            f"the path ends with unloading to {points[-1]} and goes out: omit that turning point"
         )
     check_cycle(max(points), load_steps, problem.control)
     return points

@@ -10,6 +10,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -134,7 +135,7 @@ def test_every_option_refuses_what_it_cannot_read(name, capsys):
         if not action.option_strings or action.nargs == 0:
             continue
         option = action.option_strings[-1]
-        assert f"{option}: expected" in refused(capsys, [name, option])
+        assert f"{option}: a value is missing" in refused(capsys, [name, option])
         if action.choices is None:
             assert f"{option} is ''" in refused(capsys, [name, option, ""])
         if isinstance(getattr(action.type, "__self__", None), Quantity):
@@ -247,6 +248,42 @@ def test_what_nohup_ignores_does_not_end_a_command(folder, monkeypatch):
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("module", ["adhesis.ensemble.command.main", "numpy"])
+def test_a_signal_while_modules_are_loaded_ends_the_process_as_itself(module, number):
+    """What a handler raises there may be lost, or come out as an ImportError."""
+    code = (
+        "import os, sys\n"
+        "class Finder:\n"
+        "    def find_spec(name, *_):\n"
+        f"        if name == {module!r}: os.kill(os.getpid(), {int(number)})\n"
+        "from adhesis.__main__ import main\n"
+        "sys.meta_path.insert(0, Finder)\n"
+        "sys.argv[1:] = ['status', 'none.h5']\n"
+        "sys.exit(main())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, env=environment())
+    assert (done.returncode, done.stderr) == (-number, b"")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatch):
+    """Python drops what is raised there; a command waits for ever where the signal is lost."""
+
+    class Finalized:
+        def __del__(self):
+            signal.raise_signal(number)
+
+    def execute(args):
+        Finalized()
+        threading.Event().wait(60)
+        return 0
+
+    monkeypatch.setattr("adhesis.ensemble.command.campaigns.status.execute", execute)
+    assert main(["status", "r.h5"]) == code
+    assert "Traceback" not in capsys.readouterr().err
+
+
 def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
     def interrupt(seconds):
         raise KeyboardInterrupt
@@ -297,6 +334,13 @@ def test_a_closed_stdout_is_one_sentence():
     done = process("--version", before=">&-")
     assert done.returncode == 74
     assert done.stderr == "adhesis: stdout could not be written: Bad file descriptor\n"
+
+
+def test_a_setting_of_windows_does_not_reach_figures(tmp_path):
+    words = ("loop", "--hurst", "0.8", "--n0", "2", "--ratio", "4", "--load-steps", "2")
+    env = environment() | {"MPLBACKEND": "nosuch"}
+    done = process(*words, "--figure", tmp_path / "a.png", "--quiet", env=env)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_reader_that_leaves_ends_the_command_without_a_word():

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import heapq
+import os
 import random
 import signal
+import subprocess
 import time
 
 import numpy as np
@@ -351,6 +353,24 @@ def test_processes_are_workers_like_any_other():
     found = {outcome.task: outcome.error or outcome.result for outcome in outcomes}
     assert found == {k: "ValueError: three" if k == 3 else k / 2 for k in range(20)}
     assert {outcome.rank for outcome in outcomes} <= {1, 2}
+
+
+def never(task, check):
+    """Compute in a process until told to stop."""
+    return half(100, check)
+
+
+def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
+    """One that is stopped would not see that it is asked to end."""
+    calls = []
+    kill, wait = subprocess.Popen.kill, subprocess.Popen.wait
+    monkeypatch.setattr(subprocess.Popen, "kill", lambda p: calls.append("kill") or kill(p))
+    monkeypatch.setattr(
+        subprocess.Popen, "wait", lambda p, timeout=None: calls.append("wait") or wait(p, timeout)
+    )
+    with Processes(1, never) as channel:
+        os.kill(channel.pids[0], signal.SIGSTOP)
+    assert calls[0] == "kill"
 
 
 # ---------------------------------------------------------------- one process, one task

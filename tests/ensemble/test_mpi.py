@@ -105,6 +105,7 @@ def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number, ranks):
     assert process.returncode == 75, errors
     name = "Ctrl-C (SIGINT)" if number == signal.SIGINT else number.name
     assert f"stopped early: {name} received" in errors
+    assert f"{name} received: tasks in progress have up to 30 s to stop" in errors
 
 
 def test_ranks_end_when_the_results_file_is_moved(tmp_path):

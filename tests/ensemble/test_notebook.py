@@ -13,6 +13,8 @@ import pickle
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -41,7 +43,7 @@ from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
-from adhesis.solver import views
+from adhesis.solver import checks, views
 from adhesis.solver.loading import loop_result
 from adhesis.solver.references.exact_wave import ExactWave
 
@@ -343,8 +345,16 @@ def test_a_value_that_no_key_has_is_refused_in_one_sentence(values):
     assert len(str(error.value)) < 400
 
 
-def test_a_number_of_a_class_of_ones_own_is_a_number():
-    half_space = {"young": 1e6, "poisson": _Printed(0.5)}
+@pytest.mark.parametrize("value", [None, 1j, Fraction(10**400), {0.5}])
+def test_a_value_that_no_file_has_is_quoted_as_what_it_is(value):
+    with pytest.raises(InputError, match="poisson is ") as error:
+        adhesis.Campaign({**TABLES, "material": {"young": 1e6, "poisson": value}})
+    assert f"poisson is {checks.shown(value)}: it must be a number, " in str(error.value)
+
+
+@pytest.mark.parametrize("poisson", [_Printed(0.5), Decimal("0.5"), Fraction(1, 2)])
+def test_a_number_of_another_class_is_a_number(poisson):
+    half_space = {"young": 1e6, "poisson": poisson}
     assert adhesis.Campaign({**TABLES, "material": half_space}).tables.material.poisson == 0.5
 
 

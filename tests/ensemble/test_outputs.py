@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 import os
 import re
+import resource
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json
+from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
@@ -89,6 +92,20 @@ def test_a_failure_in_the_middle_leaves_the_old_file(ask, monkeypatch, tmp_path)
     assert "\nloss  " in out
     assert Path("o.json").read_text() == "old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["o.json", "wave.csv"]
+
+
+def test_a_figure_that_cannot_be_written_is_an_error_of_the_system(tmp_path: Path) -> None:
+    """Nothing is left of it, whatever the writer of its format raises."""
+    figure = Figure()
+    figure.subplots().plot(range(1000))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            style.write(figure, tmp_path / "a.pdf")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_links_stay_and_what_they_point_to_is_replaced(ask: Ask) -> None:

@@ -64,6 +64,7 @@ run c.toml --redo all --work-of-adhesion 40 ->
     --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
 run c.toml --out r.h5 --redo failed --hurst 0.75 ->
     --hurst is 0.75: this campaign has no such task
+run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5
 run c.toml --out r.h5 --redo all --realisation 9 -> only 0, 1
 run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
 status '' -> FILE.h5 is ''
@@ -108,8 +109,13 @@ WAVE --seed 4 -> --seed belongs to --hurst
 WAVE --delimiter : -> --delimiter is ':': it must be one of
 WAVE --measure projected -> --measure is 'projected': it must be one of arc, flat
 # the path of a loop
-LOOP --path=out -> holds no turning point
-LOOP --path=0.5,x -> must be numbers with commas
+LOOP --young -1MPa -> --young: a value is missing; one that begins with - follows a =, as in
+LOOP --path=-0.5,out -> it must start with loading
+LOOP --path=out -> --path is 'out': it holds no turning point
+LOOP --path=0.5,x,out -> --path is '0.5,x,out': it must be numbers with commas
+LOOP --path=0.5,nan -> --path[1] is nan
+LOOP --path=0.5,0.50000001,out -> the path goes from 0.5 to 0.50000001
+{{LOOP,TRACE --plan --unit um}} --adhesion-range 0.3 -> --adhesion-range is 0.3 m: it must be at
 LOOP --path=0.5 --max-penetration 0.5 -> a loop has one of them
 LOOP --path 0,5,0,2,out -> --path is '0,5,0,2,out': numbers have a decimal point, as in
 LOOP --max-penetration 90% -> --max-penetration is '90%': it must be one or more numbers between
@@ -164,7 +170,7 @@ trace t.txt -> required: --work-of-adhesion, --young, --poisson
 TRACE -> --to is missing: give the directory for the page, or --plan
 TRACE --plan -> states no unit
 TRACE --plan --unit um --columns 3 -> --columns is 3: it must name two of the 2
-TRACE --plan --unit um --columns 2 -> header states no step with its unit: give
+TRACE --plan --unit um --columns 2 -> no step with its unit is found in its header: give
 TRACE --plan --unit um --columns x -> --columns is 'x': it must be two whole
 TRACE --plan --unit um --tip-radius 5 -> --tip-radius is 5, which would be 5 m
 TRACE --plan --unit um --tip-radius 5m -> trusted from 50 µm on (what a tip of

@@ -454,12 +454,12 @@ def test_densities_are_drawn_as_they_are(data):
         np.testing.assert_array_equal(gaps[:, 0], GAP_BINS[1:-1])
 
 
-def test_every_figure_is_legible_at_column_width_in_colour_and_grey(data, monkeypatch):
-    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)  # laid out, but not written
+def test_every_figure_is_legible_at_column_width_in_colour_and_grey(data, monkeypatch, tmp_path):
+    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)  # laid out, but not drawn
     for item in (*LOOPS, *LOSSES, *MECHANISMS, *FIELDS):
         with style():
             figure = item.draw(data)
-        save(figure, Path(item.name))
+        save(figure, tmp_path / item.name)
         width = figure.get_size_inches()[0] * 25.4
         assert width == pytest.approx(85) or width == pytest.approx(175)
         texts = [t for t in figure.findobj(mpl.text.Text) if t.get_text() and t.get_visible()]

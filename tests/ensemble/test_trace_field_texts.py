@@ -90,6 +90,12 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["dx: 500 nm", "Z (nm)", *(f"{1e3 * float(z):.3f}".replace(".", ",") for z in ZS)],
         {},
     ),
+    **{
+        f"step: {words}": ([f"{words} 0.5 µm", "Z [µm]", *ZS], {})
+        for words in ("Messschrittweite", "Pas d'échantillonnage :", "測定ピッチ,", "측정 간격:")
+    },
+    "ruled comments": (["####", "# x", "####", UM, *TWO], {}),
+    "a delimiter before": (["\tx (um)\tz (um)", *(f"\t{x}\t{z}" for x, z in PAIRS)], {}),
 }  # fmt: skip
 
 
@@ -181,16 +187,16 @@ BLOCK = ["Roughness profile (um)", *ZS]
 Z_UM: Options = {"unit": "um", "step": STEP}
 REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "two steps": (["Step: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}, "9 nm and 500 nm: give"),
-    "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "states no step with"),
+    "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "no step with its unit"),
     "names of two tables": ([UM, "Lc (mm),Ls (um)", *TWO], {}, "unit of the heights alone"),
     "another unit": (["Stylus travel in mm", "Data", *ZS], {"step": STEP}, "states no unit"),
-    "a speed": (["Step: 0.5 mm/s", "Z (um)", *ZS], {}, "states no step with its unit"),
-    "a count on top": (["400", *ZS], Z_UM, "line 1 of .* is '400', at the end of a column"),
-    "a step on top": (["0.500", *ZS], Z_UM, r"line 1 of .* is '0\.500', at the end of a column"),
+    "a speed": (["Step: 0.5 mm/s", "Z (um)", *ZS], {}, "no step with its unit"),
+    "a count on top": (["400", *ZS], Z_UM, "line 1 of .* has '400', at the end of a column"),
+    "a step on top": (["0.500", *ZS], Z_UM, r"line 1 of .* has '0\.500', at the end of a column"),
     "a step on top, printed alike": (["0.500000", *ZS], Z_UM, "line 1 .* the step or the length"),
     "a length on top, in mm": (["0.199500", *ZS], Z_UM, "line 1 .* the step or the length"),
-    "a length and a count on top": (["199.5", "400", *ZS], Z_UM, r"line 1 of .* is '199\.5'"),
-    "a checksum below": ([*ZS, "34582"], Z_UM, "line 401 of .* is '34582'"),
+    "a length and a count on top": (["199.5", "400", *ZS], Z_UM, r"line 1 of .* has '199\.5'"),
+    "a checksum below": ([*ZS, "34582"], Z_UM, "line 401 of .* has '34582'"),
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
     "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402, .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
@@ -231,7 +237,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "UTF-16 without a mark": (
         "\n".join([UM, *TWO]).encode("utf-16-le"),
         {"columns": [1, 2]},
-        "columns belongs to texts: .* UTF-16 without a mark is to be saved as UTF-8",
+        "columns belongs to texts: .* UTF-16 without a mark, is to be saved as UTF-8",
     ),
     "numbers within apostrophes": (
         [UM, *(f"'{x}','{z}'" for x, z in PAIRS)],
@@ -270,6 +276,52 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         "would have steps of 1 µm, and its header states 500 nm: give step",
     ),
+    "a named count from ten on": (
+        ["Nr.;Höhe (um)", *(f"{k};{z}" for k, z in enumerate(ZS, 10))],
+        {"step": STEP},
+        r"does not count 1, 2, 3 .*: give columns Z, that of the heights, and step",
+    ),
+    "a count of unknown name": (
+        ["番号,高さ(um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
+        {},
+        "heights alone: give unit X,Z, .*, or step if the first column counts the points",
+    ),
+    "figures below heights": (["z (um)", *ZS, "", *ZS[:2]], Z_UM, "line 402 .* at most 3 rows"),
+    "blocks divided by dashes": (["z (um)", *ZS, "-----", *ZS], Z_UM, "line 402 .* and divides"),
+    "a count below two columns": ([UM, *TWO, "400"], {}, "line 402 .* has '400', at the end"),
+    "a last height cut off": ([UM, *TWO[:-1], TWO[-1][:-4]], {}, "line 401 .* or was cut off"),
+    "a last exponent cut off": (
+        ["x [m] z [m]", *(f"{5e-7 * k:.3e} {z:.9e}" for k, z in enumerate(Z)), "2.000e-04 5.1e-0"],
+        {},
+        r"line 402 .* has '5\.1e-0', .* or was cut off",
+    ),
+    "positions and heights back and forth": (
+        [UM, *TWO, *TWO[::-1]],
+        {},
+        "positions stand still at line 402",
+    ),
+    "a map with positions": (
+        [",".join(["", *XS]), *(",".join([str(k), *ZS]) for k in range(3))],
+        {"row": 1, "step": STEP, "unit": "um"},
+        "the first row of .* has equal steps, as positions do",
+    ),
+    "a map with a column of positions": (
+        [",".join([str(k), *ZS[k:], *ZS[:k]]) for k in range(9)],
+        {"row": 1, "step": STEP, "unit": "um"},
+        "the first column of .* has equal steps, as positions do",
+    ),
+    "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
+    "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
+    "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
+    "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "decimal is 'x': it must be '.' or ','"),
+    "a column of words": ([f"{row},yes" for row in TWO], {}, "line 1 .* 'yes', which is no number"),
+    "thousands with a given form": (
+        [f"{500 * k:,};{z}" for k, z in enumerate(ZS)],
+        {"decimal": ".", "delimiter": ";"},
+        "line 3 .* has '1,000', which is no number with a decimal point",
+    ),
+    "quoted rows": ([f'"{row}"' for row in TWO], {}, "such as '0.000,.*quotes about whole rows"),
+    "SDF cut off": (["aISO-1.0", *SDF[:40]], {}, "begins as an instrument's file, .* cut off"),
     "positions rounded beyond use": (
         [f"{0.137 * k:.0f},{z}" for k, z in enumerate(ZS[:40])],
         {"unit": "um"},
@@ -301,9 +353,7 @@ def test_the_shorter_one_of_two_traces_ends_where_it_does(gap: str, tmp_path: Pa
 
 @pytest.mark.parametrize("first", [["400"], ["0.500"], ["199.5", "400"]])
 def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_path):
-    with pytest.raises(
-        InputError, match=r"line 1 of .*, at the end of a column of heights: remove it"
-    ):
+    with pytest.raises(InputError, match=r"line 1 of .*, at the end of a column: remove it"):
         read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
     assert read_heights(put(tmp_path / "h.csv", ["0", *ZS]), unit="um").size == N + 1
 

@@ -39,10 +39,16 @@ def test_every_format_gives_the_same_heights(name: str, tmp_path: Path) -> None:
     assert again == trace
 
 
-@pytest.mark.parametrize("name", ["mahr.qep", "row.x3p", "row.sdf", "row.sur"])
-def test_points_not_measured_are_drop_outs(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [
+        *((name, np.nan) for name in ("mahr.qep", "row.x3p", "row.sdf", "row.sur")),
+        ("row.sdf", 1e38),
+    ],
+)
+def test_points_not_measured_are_drop_outs(name: str, missing: float, tmp_path: Path) -> None:
     heights = Z.copy()
-    heights[[40, 41]] = np.nan
+    heights[[40, 41]] = missing
     instrument_files.WRITERS[name](tmp_path / name, STEP, heights)
     trace = read_trace(tmp_path / name)
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41]

@@ -160,6 +160,11 @@ def test_an_open_file_is_named_and_read(tmp_path: Path) -> None:
         assert trace.source == str(path)
 
 
+def test_whole_heights_in_memory_are_no_step_and_no_length() -> None:
+    heights = np.arange(N) * 7 % 11
+    assert read_trace(heights, unit="nm", step=7e-9).points == N
+
+
 def test_missing_heights_in_memory_are_gaps() -> None:
     masked = np.ma.masked_array(1e6 * Z, mask=np.arange(N) == 7)
     table = pd.DataFrame({"z (um)": pd.array([None, *(1e6 * Z[1:])], dtype="Float64")})
@@ -181,6 +186,25 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "a decimal sign": (BOTH, {"decimal": ","}, InputError, "decimal belongs to files"),
     "an empty stream": (io.BytesIO(b""), {}, InputError, "the stream is empty"),
     "a zip": (io.BytesIO(b"\x1f\x8b0"), {}, InputError, "the stream is compressed"),
+    "booleans": (FRAME.assign(**{"z (um)": True}), {"columns": [1, 2]}, InputError, "holds bool"),
+    "complex heights": (FRAME.astype(complex), {"columns": [1, 2]}, InputError, "holds complex128"),
+    "dates": (
+        FRAME.astype("M8[s]"),
+        {"columns": [1, 2]},
+        InputError,
+        r"holds datetime64\[s\]: hei",
+    ),
+    "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
+    "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),
+    "a unit that is none": (BOTH, {"unit": 5}, TypeError, "unit is 5: it must be a text"),
+    "columns as text": (
+        BOTH,
+        {"columns": "1,2"},
+        TypeError,
+        r"columns is '1,2': it must be a list",
+    ),
+    "one column number": (BOTH, {"columns": 1}, TypeError, r"columns is 1: it must be a list"),
+    "a text for a path": ("1,2\n3,4\n", {}, InputError, r"cannot read 1,2\\n3,4\\n: there is no"),
     "neither": (3, {}, TypeError, r"source is 3: .* a path, an open file .* list .* Series"),
 }
 
@@ -209,7 +233,11 @@ def test_a_trace_is_made_of_heights_and_a_step() -> None:
             dataclasses.replace(trace, **change)
 
 
-@pytest.mark.parametrize("gap", ["", "NaN", "---", "*****", "BAD", "-9999", "1e38"])
+@pytest.mark.parametrize(
+    "gap",
+    ["", "NaN", "---", "*****", "BAD", "-9999", "1e38", "-nan(ind)", "1.#QNAN0", "Infinity", "n.a.",
+     "(no data)", "Over range", "#WERT!", "#DIV/0!", "#N/A"],
+)  # fmt: skip
 def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -> None:
     lines = rows(";", ".")
     for k in (20, 21, 77):
@@ -217,6 +245,9 @@ def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -
     trace = read(tmp_path, [UM, *lines])
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(trace.heights)), [20, 21, 77])
     assert trace.drop_outs == 3
+    if gap:  # two empty lines end a block
+        column = [line.split(";")[1] for line in lines]
+        assert read(tmp_path, ["z (um)", *column], step=STEP).drop_outs == 3
     good = ~np.isnan(trace.heights)
     np.testing.assert_allclose(trace.heights[good], Z[good], atol=1e-11)
 
@@ -240,7 +271,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "states no unit"),
     "a unit of one column": (["x (mm),z", *rows(",", ".")], {}, "of the positions alone"),
     "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit is mm for the pos"),
-    "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* no map and no channels"),
+    "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* is no map, as"),
     "two rows": ([UM, "1;2", "2;3"], {}, "holds 2 rows of numbers"),
     "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
     "kilometres": ([UM.replace("µm", "m"), *rows(";", ".")], {}, "m long: is its unit right"),
@@ -265,7 +296,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "points of thousands": (
         [f"1.{k:03d},5;0,1" for k in range(99)],
         {"unit": "um"},
-        "commas and po",
+        "fields such as",
     ),
     "one number or two": (
         [f"{k % 7},{k % 3}" for k in range(99)],

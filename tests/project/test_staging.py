@@ -245,6 +245,49 @@ def test_no_interleaving_of_jobs_loses_a_row(tmp_path: Path, first: int) -> None
             done.result()
 
 
+SHORT_COPY = 'cp() { head -c 3 "$2" >"$3"; }'
+
+
+@pytest.mark.parametrize(
+    ("before", "within", "words"),
+    [
+        ("", "echo other >>s.h5", "changed by somebody else"),
+        # as long ago and in the same place as what was copied, and of another length alone
+        ("", "touch -r s.h5 t; echo other >>s.h5; touch -r t s.h5", "changed by somebody else"),
+        ("", "touch written", "being written by another run"),
+        ("", SHORT_COPY, "could not be copied back"),
+        (SHORT_COPY, "", "could not be copied to"),
+    ],
+    ids=["changed", "changed in length alone", "written", "copied back in part", "copied in part"],
+)
+def test_results_that_are_not_copied_back_whole_stay(
+    before: str, within: str, words: str, tmp_path: Path
+) -> None:
+    """``written`` makes the stand-in of status report a run."""
+    (tmp_path / "s.h5").write_text("earlier\n")
+    done = subprocess.run(
+        ["bash", "-c", f"""
+            status() {{ if [ -e written ]; then echo ' "run": {{'; fi; }}
+            . {JOBS}/common.sh
+            STAGING=disk ADHESIS=status file=s.h5 code=0
+            {before}
+            stage_in
+            echo mine >>"$results"
+            {within}
+            stage_out
+            exit "$code"
+        """],
+        cwd=tmp_path, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 74, done
+    assert words in done.stdout + done.stderr
+    assert (tmp_path / "s.h5").read_text().startswith("earlier\n")
+    if not before:
+        kept = next(tmp_path.glob("disk/*/s.h5"))
+        assert kept.read_text() == "earlier\nmine\n"
+        assert "mine" not in (tmp_path / "s.h5").read_text()
+
+
 # ------------------------------------------------------------------------------- the real run
 
 

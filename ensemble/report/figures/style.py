@@ -27,6 +27,7 @@ from matplotlib.text import Annotation
 from matplotlib.ticker import NullFormatter
 
 from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.outputs import whole_file
 from adhesis.ensemble.quantities import gamma_text
 from adhesis.solver.checks import counted, shown
 
@@ -284,6 +285,17 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
         if engine is not None:
             engine.execute(figure)
             figure.set_layout_engine(None)
-        figure.savefig(png, metadata={"Software": None})
-        figure.savefig(pdf, metadata={"CreationDate": None, "Producer": None, "Creator": None})
+        write(figure, png, metadata={"Software": None})
+        write(figure, pdf, metadata={"CreationDate": None, "Producer": None, "Creator": None})
     return png, pdf
+
+
+def write(figure: Figure, path: Path, **options: Any) -> None:
+    """Write a figure to a file, whole or not at all (OSError).
+
+    It is drawn in memory: where the writer of a format meets a full disk, it raises what it likes.
+    """
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=path.suffix[1:].lower(), **options)
+    with whole_file(path) as stream:
+        stream.write(drawn.getvalue())

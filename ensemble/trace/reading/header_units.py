@@ -51,11 +51,16 @@ _STEP = frozenset(
     ("step", "stepsize", "spacing", "increment", "pitch", "interval", "dx", "δx", "deltax",
      "xstep", "xspacing", "xpitch", "xincrement", "xscale", "pixelsize", "schrittweite",
      "punktabstand", "messpunktabstand", "samplinginterval", "sampleinterval", "pointinterval",
-     "datainterval", "samplespacing", "sampledistance", "samplingdistance", "pointdistance")
+     "datainterval", "samplespacing", "sampledistance", "samplingdistance", "pointdistance",
+     "messschrittweite", "messschritt", "abtastschritt", "abtastschrittweite", "abtastintervall",
+     "pas", "paso", "passo", "шаг", "ピッチ", "測定ピッチ", "サンプリングピッチ", "測定間隔",
+     "サンプリング間隔", "データ間隔", "간격", "측정간격", "피치", "측정피치",
+     "步长", "采样间隔", "采样步长")
 )  # fmt: skip
 _BESIDE_STEP = frozenset(
     ("x", "in", "of", "the", "size", "sampling", "measuring", "measurement",
-     "lateral", "horizontal", "point", "points", "data", "between", "scan", "axis", "direction")
+     "lateral", "horizontal", "point", "points", "data", "between", "scan", "axis", "direction",
+     "de", "d", "mesure", "échantillonnage", "muestreo", "campionamento")
 )  # fmt: skip
 _FIRST_NUMBER = re.compile(_NUMBER, re.IGNORECASE)
 _LENGTH = re.compile(r"[\s,;:=()\[\]<>{}/]*([^\W\d]*)[\s)\]>},;.]*")

@@ -161,10 +161,15 @@ def _unknown(source: Source, error: Exception) -> str:
 
 
 def _neither(source: Source) -> str:
+    if not source.holds_zero_bytes():
+        return (
+            f"{source} begins as an instrument's file, and no reader of them can read it: it is "
+            "damaged, cut off, or of another version, so export the trace as text"
+        )
     return (
         f"{source} is neither text nor an instrument format that can be read: it holds zero bytes "
-        "(UTF-16 without a mark is to be saved as UTF-8), and no reader of instruments' files "
-        "knows it"
+        "(a padded text, or one in UTF-16 without a mark, is to be saved anew as UTF-8), and no "
+        "reader of instruments' files knows it"
     )
 
 

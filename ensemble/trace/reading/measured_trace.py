@@ -38,6 +38,8 @@ _LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES = 0.02, 2e-5
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
 # Numbers that differ by less than this share of them are one, but for the last bits.
 _SAME = 1e-9
+# So many equal steps of a row or column of a map are none of heights.
+_NO_CHANCE = 4
 # Names of a column that counts the points.
 _COUNTS = re.compile(
     r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*"
@@ -213,6 +215,15 @@ def read_trace(
     with refused_as_input():
         if step is not None:
             step = checks.real(parameter("step"), step, checks.LENGTH)
+        if columns is not None and (isinstance(columns, str) or not hasattr(columns, "__iter__")):
+            raise TypeError(
+                f"{parameter('columns')} is {checks.shown(columns)}: it must be a list, as [1, 2]"
+            )
+        if unit is not None and not isinstance(unit, str):
+            raise TypeError(
+                f"{parameter('unit')} is {checks.shown(unit)}: it must be a text, as 'um' or "
+                "'mm,um'"
+            )
         named = hasattr(source, "iloc") and _are_names(columns)
         if columns is not None and not named:
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
@@ -227,7 +238,10 @@ def read_trace(
     source = source_of(source)
     is_text = holds_numbers(source)
     if is_text and channel is not None:
-        raise InputError(_no_map("channel", channel, source.name))
+        raise InputError(
+            f"{parameter('channel')} is {channel}: {source} holds columns of numbers, and no "
+            f"channels ({parameter('columns')} chooses columns)"
+        )
     if is_text and source.is_npy:
         table = _columns_of(source.name, load_array(source))
         return _from_table(source.name, table, unit, step, columns, row, "npy")
@@ -235,42 +249,36 @@ def read_trace(
         table = read_table(source, delimiter, decimal)
         return _from_table(source.name, table, unit, step, columns, row, f"text, {table.form}")
     _refuse_options(
-        "texts: an instrument's file states its own lengths (a text in UTF-16 without a mark is "
-        "to be saved as UTF-8)",
+        "texts: an instrument's file states its own lengths (a text that holds zero bytes, as in "
+        "UTF-16 without a mark, is to be saved as UTF-8)",
         unit=unit, step=step, columns=columns,
     )  # fmt: skip
     if not available():
         # Without the extra it is not known whether this is a file of an instrument.
         raise InputError(
             source.container()
-            or f"{source} is no text (UTF-16 without a mark is to be saved as UTF-8): export the "
-            "trace as text, or, if it is an instrument's file, install the optional package "
-            f"SurfaceTopography, {HINT}"
+            or f"{source} is no plain text (one that holds zero bytes, as in UTF-16 without a "
+            "mark, is to be saved as UTF-8): export the trace as text, or, if it is an "
+            f"instrument's file, install the optional package SurfaceTopography, {HINT}"
         )
     try:
         scan = read_scan(source, row, channel)
     except UnknownFormatError as error:
         raise InputError(source.container() or str(error)) from None
-    heights, step, notes = equal_steps(source.name, scan.positions, 1.0, scan.heights, None)
+    heights, gaps = without_codes(scan.heights)
+    heights, step, notes = equal_steps(source.name, scan.positions, 1.0, heights, None)
     length, slope = (heights.size - 1) * step, _slope(heights, step)
     if not _SHORTEST <= length <= _LONGEST or slope > _STEEPEST:
         raise InputError(
             f"{source} would be {length_text(length)} long, and rise by {slope:.3g} times its step "
             "from point to point: its lengths are wrong or damaged, so export it as text with units"
         )
-    notes = [scan.description, *notes]
+    notes = [scan.description, *filter(None, [gaps]), *notes]
     return Trace(heights, step, source.name, tuple(notes), scan.tip_radius)
 
 
 def _are_names(columns: Sequence[int | str] | None) -> bool:
     return columns is not None and all(isinstance(name, str) for name in columns)
-
-
-def _no_map(option: str, number: int, name: str) -> str:
-    return (
-        f"{parameter(option)} is {number}: {name} holds columns of numbers, no map and no channels "
-        f"({parameter('columns')} chooses columns)"
-    )
 
 
 def _refuse_options(to_what: str, **options: object) -> None:
@@ -310,7 +318,10 @@ def load_array(source: Source) -> Array:
 
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
-    array = np.ma.asarray(values)
+    try:
+        array = np.ma.asarray(values)
+    except ValueError as error:
+        raise InputError(f"{name} is no table of numbers: {reason(error)}") from None
     if array.dtype.kind not in "fiu" or array.ndim > 2:
         raise InputError(
             f"{name} holds {array.dtype} of {array.ndim} dimensions: heights are real numbers in "
@@ -336,6 +347,9 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
         source = source[list(names)]
     units = source.attrs.get("units", {})
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
+    for n, kind in source.dtypes.items():
+        if kind.kind in "bcmM":  # which would become numbers of another meaning
+            raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
     try:
         values = source.to_numpy(dtype=float, na_value=np.nan)
     except (TypeError, ValueError) as error:
@@ -384,9 +398,10 @@ def _from_table(
     heights, gaps = without_codes(columns[-1])
     columns = np.vstack([columns[:-1], heights])
     found = units_of_header(table.header, fields)
-    if len(columns) == 2 and found[0] is None and _counts_points(columns[0]):
-        first = [row[0] for row in fields]
-        step = _step_beside_count(name, table, first, unit, step)
+    first = [row[0] for row in fields if re.search(r"[\w#]", row[0])]
+    is_named = any(map(_COUNTS.fullmatch, first))
+    if len(columns) == 2 and found[0] is None and (is_named or _counts_points(columns[0])):
+        step = _step_beside_count(name, table, is_named, columns[0], unit, step)
         if step is not None:
             columns = columns[1:]
             notes.append("the first column counts the points")
@@ -414,11 +429,12 @@ def _from_table(
             step = step_of_header(name, table.header, table.decimal)
             if step is None:
                 raise InputError(
-                    f"{name} has heights without positions, and its header states no step with its "
-                    f"unit: give {parameter('step')}, as in 0.5um"
+                    f"{name} has heights without positions, and no step with its unit is found in "
+                    f"its header: give {parameter('step')}, as in 0.5um"
                 )
             notes.append(f"step {length_text(step, 6)} (header)")
-        _refuse_length_on_top(name, column, step, lines)
+        if form.startswith("text"):
+            _refuse_length_on_top(name, column, step, lines)
     return _in_metres(Trace(heights, float(step), name, tuple(notes)))
 
 
@@ -432,7 +448,8 @@ def _chosen(
     picked = list(table.filled)
     if wanted is not None:
         count = len(table.columns)
-        if len(wanted) not in (1, 2) or not all(1 <= w <= count for w in wanted):
+        is_known = all(1 <= w <= count for w in wanted)
+        if len(wanted) not in (1, 2) or len(set(wanted)) < len(wanted) or not is_known:
             raise InputError(
                 f"{parameter('columns')} is {','.join(map(str, wanted))}: it must name two of the "
                 f"{counted(count, 'column')} of {name}, those of positions and heights, as in 1,2, "
@@ -464,6 +481,13 @@ def _chosen(
 def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     """Return a row of a text whose rows are those of a map."""
     rows = table.columns.shape[1]
+    for what, line in (("row", table.columns[:, 0]), ("column", table.columns[table.filled[0]])):
+        # Beside positions that head the columns, those of the rows have a name or number of theirs.
+        if any(map(_has_equal_steps, (line, line[1:]))):
+            raise InputError(
+                f"the first {what} of {name} has equal steps, as positions do: remove it, and give "
+                f"{parameter('step')}"
+            )
     if not 0 <= row < rows:
         raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {rows - 1}")
     notes.append(f"row {row} of {rows}, of {len(table.filled)} heights each")
@@ -475,10 +499,12 @@ def _scan_line(
 ) -> tuple[Array, Array]:
     """Return one scan line, where the positions of a raster begin anew on each line."""
     x = columns[0]
+    if not x.size:
+        return columns, lines
     again = np.flatnonzero((x[1:] == x[0]) & (x[:-1] != x[0])) + 1
     points = int(again[0]) if again.size and len(columns) == 2 else x.size
-    count = -(-x.size // points) if points else 1
-    is_raster = count > 1 and np.array_equal(x, np.tile(x[:points], count)[: x.size])
+    count, rest = divmod(x.size, points)
+    is_raster = count > 1 and not rest and np.array_equal(x, np.tile(x[:points], count))
     if row is None and is_raster:
         raise InputError(
             f"the positions of {name} begin anew on line {lines[points]}: it is a raster of "
@@ -488,12 +514,23 @@ def _scan_line(
     if row is None:
         return columns, lines
     if not is_raster:
-        raise InputError(_no_map("row", row, name))
+        raise InputError(
+            f"{parameter('row')} is {row}: {name} is no map, as its positions do not begin anew on "
+            f"each line ({parameter('columns')} chooses columns)"
+        )
     if not 0 <= row < count:
         raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {count - 1}")
     notes.append(f"row {row} of {count}, of {points} points each")
     part = slice(row * points, (row + 1) * points)
     return columns[:, part], lines[part]
+
+
+def _has_equal_steps(line: Array) -> bool:
+    """Return whether numbers rise or fall in equal steps, and are so many that it is no chance."""
+    steps = np.diff(line)
+    return bool(
+        steps.size >= _NO_CHANCE and steps[0] != 0 and np.ptp(steps) <= 1e-6 * np.abs(steps[0])
+    )
 
 
 def _counts_points(x: Array) -> bool:
@@ -502,16 +539,21 @@ def _counts_points(x: Array) -> bool:
 
 
 def _step_beside_count(
-    name: str, table: Table, names: Sequence[str], unit: str | None, step: float | None
+    name: str, table: Table, is_named: bool, column: Array, unit: str | None, step: float | None
 ) -> float | None:
     """Return the step of heights beside a column that may count the points; None if it does not.
 
     It does if it is named so, or a step is given by the option or the header.
     """
+    if not _counts_points(column):
+        raise InputError(
+            f"the first column of {name} is named as one that counts the points, and does not "
+            f"count 1, 2, 3 …: give {parameter('columns')} Z, that of the heights, and "
+            f"{parameter('step')}, if no point is left out"
+        )
     if step is not None:
         return step
     stated = step_of_header(name, table.header, table.decimal)
-    is_named = any(field and _COUNTS.fullmatch(field) for field in names)
     if stated is None and is_named:
         raise InputError(
             f"the first column of {name} counts the points: give {parameter('step')}, as in 0.5um"
@@ -568,9 +610,10 @@ def _units(
         return (found[0], found[1]), "header"
     if found[0] is not None or found[1] is not None:
         known = "positions" if found[0] else "heights"
+        count = f", or {parameter('step')} if the first column counts the points"
         raise InputError(
             f"the header of {name} states the unit of the {known} alone: give {parameter('unit')} "
-            "X,Z, as in mm,um"
+            f"X,Z, as in mm,um{count if _counts_points(columns[0]) else ''}"
         )
     if _sure_to_be_metres(columns, step):
         return ("m", "m"), "numbers"

@@ -15,12 +15,13 @@ DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|"
 COMMENT = "#%!*"
 _SHOWN = 60  # signs of a line that a message quotes
 _MISSING = frozenset(
-    ("", "nan", "-nan", "nan(ind)", "-1.#ind", "1.#qnan", "inf", "-inf", "+inf",
-     "bad", "n/a", "na", "#n/a", "null", "none", "nil", "invalid",
-     "missing", "nd", "over", "under", "overflow", "underflow", "error", "x", "?")
+    ("", "nan", "nanind", "inf", "infinity", "bad", "n/a", "na", "#n/a", "null",
+     "none", "nil", "invalid", "missing", "masked", "void", "nd", "nodata", "nosignal", "over",
+     "overrange", "ovr", "under", "overflow", "underflow", "outofrange", "error", "x", "?")
 )  # fmt: skip
-_STARS = re.compile(r"[-*]+|#{2,}")  # as wide as the number that is missing
-_FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-'’]*")  # of a line: perhaps several, with commas
+_SIGNS = re.compile(r"[-+*.()\s]")  # about such a word, or as wide as the number that is missing
+_PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE)  # #NAME?, 1.#INF
+_FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 _QUOTED = re.compile(r'"[^"]*"')
 _GROUPED = re.compile(r"[+\-]?\d{1,3}([ '’_]\d{3})+([.,]\d*)?")
@@ -38,8 +39,8 @@ def looks_like_numbers(line: str) -> bool:
     begin = line.strip()
     if not begin or begin[0] in COMMENT:
         return False
-    first = re.split(r"[;\t |]", begin.lstrip("; \t|"), maxsplit=1)[0]
-    return bool(_FIRST.fullmatch(first.lstrip(",").replace('"', "")))
+    first = re.split(r"[;\t |,]", begin.lstrip("; \t|,"), maxsplit=1)[0]
+    return bool(_FIRST.fullmatch(first.replace('"', "")))
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -60,7 +61,7 @@ def split(line: str, delimiter: str) -> list[str]:
 
 def is_missing(field: str) -> bool:
     """Return whether a field stands for a missing number."""
-    return field.lower() in _MISSING or bool(_STARS.fullmatch(field))
+    return _SIGNS.sub("", field.lower()) in _MISSING or bool(_PROGRAM_ERROR.fullmatch(field))
 
 
 def value(field: str, decimal: str) -> float | None:
@@ -75,10 +76,11 @@ def value(field: str, decimal: str) -> float | None:
     return float(plain.replace(",", ".").replace("D", "e").replace("d", "e"))
 
 
-def printed_form(field: str) -> tuple[int, bool]:
-    """Return the number of decimals of a printed number, and whether it has an exponent."""
-    digits, exponent = re.split(r"[eEdD]", field, maxsplit=1)[0], re.search(r"[eEdD]", field)
-    return len(re.split(r"[.,]", digits)[1]) if re.search(r"[.,]", digits) else 0, bool(exponent)
+def printed_form(field: str) -> tuple[int, int]:
+    """Return the number of decimals of a printed number, and of digits of its exponent."""
+    mantissa, _, exponent = re.sub("[eEdD]", "e", field).partition("e")
+    decimals = re.split(r"[.,]", mantissa)[1:]
+    return len(decimals[0]) if decimals else 0, len(exponent.lstrip("+-"))
 
 
 def is_grouped(field: str) -> bool:
@@ -128,15 +130,22 @@ def find_form(
     source: Source, sample: Sequence[str], delimiter: str | None, decimal: str | None
 ) -> tuple[str, str]:
     """Return delimiter and decimal sign of lines of numbers; InputError if two fit."""
+    if decimal not in (None, ",", "."):
+        raise InputError(f"{parameter('decimal')} is {decimal!r}: it must be '.' or ','")
     if delimiter is None:
         delimiter = find_delimiter(source, sample, decimal)
+    elif delimiter not in DELIMITERS:
+        signs = ", ".join(map(repr, DELIMITERS))
+        raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one of {signs}")
     if decimal is None:
         rows = [field for line in sample for field in split(line, delimiter)]
-        comma, point = any("," in f for f in rows), any("." in f for f in rows)
+        comma, point = (next((f for f in rows if sign in f), None) for sign in ",.")
         if comma and point:
+            both = " and ".join(dict.fromkeys(map(repr, (comma, point))))
             raise InputError(
-                f"{source} has commas and points within its numbers: give {parameter('decimal')} "
-                f"and {parameter('delimiter')}, and take signs of thousands out"
+                f"{source} has fields such as {both}: give {parameter('decimal')} and "
+                f"{parameter('delimiter')}, and take signs of thousands, or quotes about whole "
+                "rows, out"
             )
         decimal = "," if comma else "."
     return delimiter, decimal

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from adhesis.ensemble.errors import InputError, reason
+from adhesis.ensemble.escape import printable
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
 
@@ -60,7 +61,7 @@ class Source:
     content: bytes | None = None  # of a stream; None for a file, whose name is its path
 
     def __str__(self) -> str:
-        return self.name
+        return printable(self.name).replace("\n", r"\n")
 
     @property
     def suffix(self) -> str:

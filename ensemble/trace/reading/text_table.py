@@ -162,10 +162,11 @@ class _Reader:
         return {place: row for place, row in found if row is not None}
 
     def _row(self, line: str) -> _Row | None:
-        begin = line.strip()[:1]
-        if begin and begin in COMMENT and (begin == "#" or not is_missing(line.strip())):
+        plain = line.strip()
+        # "***" may be a missing number, "#N/A" is one, and "###" rules a comment off
+        if plain and plain[0] in COMMENT and not (is_missing(plain) and plain.strip("#")):
             return None
-        fields = split(line, self.delimiter) or [""]
+        fields = [plain] if is_missing(plain) else split(line, self.delimiter)
         while len(fields) > self.count and not fields[-1]:
             fields.pop()
         values = [value(field, self.decimal) for field in fields]
@@ -226,13 +227,16 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
                 f"{source} has numbers such as {example!r} beside whole ones below 1000: take the "
                 f"signs of thousands out, or give {parameter('decimal')}"
             )
+        numbers = [row.values[k] for row in rows]
+        _refuse_odd_ends(source, column, numbers, places, is_lone=len(filled) == 1)
         if len(filled) == 1:
-            numbers = [row.values[k] for row in rows]
-            _refuse_odd_ends(source, column, numbers, places)
             _refuse_parts(reader, numbers, places)
-    header = [line[:_LONGEST_HEADER_LINE].strip().lstrip(COMMENT).strip() for line in lines[:start]]
+    header = [line[:_LONGEST_HEADER_LINE].strip(" \r\n").lstrip(COMMENT) for line in lines[:start]]
     # Of one column, a line of the header is a name as a whole.
-    names = [(line,) if count == 1 else _names(line, delimiter, count, filled) for line in header]
+    names = [
+        (line.strip(),) if count == 1 else _names(line, delimiter, count, filled) for line in header
+    ]
+    header = [line.strip() for line in header]
     return Table(
         columns=np.array([row.values for row in rows]).T.reshape(count, -1),
         filled=filled,
@@ -272,9 +276,13 @@ def _first_row(reader: _Reader) -> int | None:
 
 def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
     source = reader.source
-    for place, line in enumerate(reader.lines):
-        fields = split(line, reader.delimiter)
-        flaw = flaw_of(fields) if looks_like_numbers(line) and place not in reader.rows else None
+    others = [
+        (place, split(line, reader.delimiter))
+        for place, line in enumerate(reader.lines)
+        if looks_like_numbers(line) and place not in reader.rows
+    ]
+    for place, fields in others:
+        flaw = flaw_of(fields)
         if flaw is not None:
             raise InputError(f"line {place + 1} of {source} has {flaw}")
     if numbers < _ROWS_TO_BEGIN:
@@ -282,6 +290,14 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
             f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
             "needed"
         )
+    for place, fields in others:
+        word = next((field for field in fields if value(field, reader.decimal) is None), None)
+        if word is not None and not re.search(r"[;|\t]", word):
+            raise InputError(
+                f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
+                f"{'comma' if reader.decimal == ',' else 'point'}: take columns of words and "
+                f"remarks out, or give {parameter('decimal')} and {parameter('delimiter')}"
+            )
     example = next(place for place, line in enumerate(reader.lines) if looks_like_numbers(line))
     raise InputError(
         f"{source} holds no rows of numbers of one length: line {example + 1} is "
@@ -358,11 +374,16 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
 
 
 def _refuse_odd_ends(
-    source: Source, column: Sequence[str], numbers: Sequence[float], places: Sequence[int]
+    source: Source,
+    column: Sequence[str],
+    numbers: Sequence[float],
+    places: Sequence[int],
+    is_lone: bool,
 ) -> None:
-    """Refuse counts, steps and checksums at the ends of a column of heights.
+    """Refuse counts, steps and checksums at the ends of a lone column, and a number cut off.
 
-    They are printed otherwise than all heights between, or the first one counts the others.
+    They are printed otherwise than all numbers between, or the first one counts the others. Of
+    several columns only the last row is judged, in which the file may end too early.
     """
 
     def judged(k: int) -> bool:  # noughts and codes of missing heights are written as they please
@@ -370,48 +391,58 @@ def _refuse_odd_ends(
 
     n = len(column)
     forms = [printed_form(column[k]) for k in range(_ENDS, n - _ENDS) if judged(k)]
-    usual, times = Counter(forms).most_common(1)[0] if forms else ((0, False), 0)
-    has_one_form = times >= _ONE_FORM * len(forms)
-    fewest = min((decimals for decimals, _ in forms), default=0)
-    for k in (*range(min(_ENDS, n)), *range(max(_ENDS, n - _ENDS), n)):
-        if len(forms) < _TO_JUDGE or not judged(k):
-            continue
+    if len(forms) < _TO_JUDGE:
+        return
+    usual, times = Counter(forms).most_common(1)[0]
+    has_one_form = is_lone and times >= _ONE_FORM * len(forms)
+    fewest, shortest = (min(counts) for counts in zip(*forms, strict=True))
+    ends = (*range(min(_ENDS, n)), *range(max(_ENDS, n - _ENDS), n)) if is_lone else (n - 1,)
+    for k in filter(judged, ends):
         form = printed_form(column[k])
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
-        is_odd = form != usual if has_one_form else form[0] <= fewest - 2 and not form[1]
-        if is_odd or (k < _ENDS and numbers[k] == n - k - 1):
+        is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
+        is_odd = form != usual if has_one_form else is_cut
+        if is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
             raise InputError(
-                f"line {places[k] + 1} of {source} is {column[k]!r}, at the end of a column of "
-                "heights: remove it if it is a count, a length, a step or a checksum; a height has "
-                "as many decimals as the others"
+                f"line {places[k] + 1} of {source} has {column[k]!r}, at the end of a column: "
+                "remove it if it is a count, a length, a step or a checksum, or was cut off; the "
+                "numbers of a column have as many decimals"
             )
 
 
 def _refuse_parts(reader: _Reader, numbers: Sequence[float], places: Sequence[int]) -> None:
-    """Refuse a column that an empty line divides into several profiles.
+    """Refuse a column that lines without letters and digits divide into several profiles.
 
-    One empty line is a missing height. It is none if all parts have one length, or if the heights
-    leap there as they do nowhere else.
+    One empty line, or one of dashes, is a missing height. It is none if all parts have one length,
+    if the heights leap there as they do nowhere else, or near the ends, where figures of the whole
+    profile stand.
     """
-    empty = [k for k, place in enumerate(places) if not reader.lines[place].strip()]
+    lines = [reader.lines[place].strip() for place in places]
+    empty = [k for k, line in enumerate(lines) if not any(map(str.isalnum, line))]
     bounds = [-1, *empty, len(numbers)]
     lengths = {end - start - 1 for start, end in itertools.pairwise(bounds)}
     if not empty or max(lengths) < _LONG_ROW:
         return
+    if len(empty) > 1:  # several dashes are a code
+        empty = [k for k in empty if not lines[k]]
     heights = np.array([nan if may_be_code(number) else number for number in numbers])
     leaps = np.abs(heights[2:] - heights[:-2])
     over = [k - 1 for k in empty]
     usual = np.fmax.reduce(np.delete(leaps, over), initial=0.0)
     leap = next((k for k in empty if leaps[k - 1] > usual), None)
+    end = next((k for k in empty if k <= _ENDS or k >= len(numbers) - _ENDS - 1), None)
     if len(lengths) == 1:
-        place, reason = empty[0], f"divides the column into parts of {lengths.pop()} rows each"
+        place, reason = bounds[1], f"divides the column into parts of {lengths.pop()} rows each"
     elif leap is not None:
         place, reason = leap, "the heights beside it differ as no others two rows apart do"
+    elif end is not None:
+        place, reason = end, f"at most {_ENDS} rows stand between it and the end of the column"
     else:
         return
+    line = shown_line(lines[place]) if lines[place] else "empty"
     raise InputError(
-        f"line {places[place] + 1} of {reader.source} is empty, and {reason}: write NaN on it if "
-        "one height is missing, or keep one profile in a file"
+        f"line {places[place] + 1} of {reader.source} is {line}, and {reason}: write NaN on it if "
+        "one height is missing, or keep one profile in a file, without other numbers"
     )
 
 
