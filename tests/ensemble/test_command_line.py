@@ -279,7 +279,7 @@ def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatc
         threading.Event().wait(60)
         return 0
 
-    monkeypatch.setattr("adhesis.ensemble.command.campaigns.status.execute", execute)
+    monkeypatch.setattr("adhesis.ensemble.command.status.execute", execute)
     assert main(["status", "r.h5"]) == code
     assert "Traceback" not in capsys.readouterr().err
 
