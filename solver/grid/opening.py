@@ -36,7 +36,7 @@ class Openings:
 
     Attributes
     ----------
-    healed : list of Crack
+    healed : list of (position, tension)
         Cracks that closed again: nothing opens there unless the tension is larger.
     """
 
@@ -45,7 +45,7 @@ class Openings:
         self._strength = problem.strength
         self._wave = problem.profile.shortest_wavelength
         self._modulus, self._gamma = problem.half_space.modulus, problem.work_of_adhesion
-        self.healed: list[Crack] = []
+        self.healed: list[tuple[float, float]] = []
 
     @property
     def is_possible(self) -> bool:
@@ -61,7 +61,11 @@ class Openings:
         nodes = highest_peaks(tension, MOST_MAXIMA, NEAR_STRENGTH * self._strength)
         cracks = [self._crack_at(contact, tension, node) for node in nodes]
         near, period = HEALED_PLACE * self._wave, self._lattice.elastic.period
-        cracks = [c for c in cracks if not has_healed(c, self.healed, near, period)]
+        cracks = [
+            crack
+            for crack in cracks
+            if not has_healed(crack.position, crack.tension, self.healed, near, period)
+        ]
         return min((crack.value for crack in cracks), default=far), cracks
 
     def insert_seeds(self, contact: Contact, cracks: list[Crack]) -> Contact:
@@ -75,6 +79,10 @@ class Openings:
         """Sum the barriers of the cracks that open first, in J/m² of nominal area."""
         total = sum(crack.barrier for crack in largest_excess(cracks))
         return self._gamma * total / self._lattice.elastic.period
+
+    def heal(self, cracks: list[Crack]) -> None:
+        """Record that the cracks that open first closed again."""
+        self.healed += [(crack.position, crack.tension) for crack in largest_excess(cracks)]
 
     def _crack_at(self, contact: Contact, tension: Array, node: int) -> Crack:
         """Judge the maximum of tension at a node; a parabola through its neighbours refines it."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver.crack import MOST_OPENINGS, largest_excess
+from adhesis.solver.crack import MOST_OPENINGS
 from adhesis.solver.grid.contact import Contact, Mask
 from adhesis.solver.grid.opening import Openings
 from adhesis.solver.grid.patches import patch_ranges
@@ -193,7 +193,7 @@ class Steps:
             relaxed = self.relaxation.relax(opened)
             assert relaxed is not None
             if (relaxed.mask == contact.mask).all():
-                self.openings.healed += largest_excess(cracks)
+                self.openings.heal(cracks)
                 continue
             before = state_of(self.lattice, contact)
             self.states.append(before)

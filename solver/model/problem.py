@@ -259,6 +259,16 @@ class Problem(ByValue):
         return griffith_length(self.strength, self.half_space.modulus, self.work_of_adhesion)
 
     @property
+    def attraction_range(self) -> float:
+        """Range of adhesion γ/σ_th in m; 0 where the strength is infinite."""
+        return self.work_of_adhesion / self.strength
+
+    @property
+    def first_touch(self) -> float:
+        """Separation in m at which a solid that approaches is attracted: h_max and the range."""
+        return self.profile.h_max + self.attraction_range
+
+    @property
     def stress_scale(self) -> float:
         """E* q0 h_max / 2 in Pa: the mean stress is the paper's σ~ times this."""
         return float(stress_scale(self.half_space, self.profile.period, self.profile.h_max))

@@ -279,7 +279,7 @@ class SharpMethod(Method):
         while point is not None and at != target.at:
             at, point = self.follower.run(history, point, target)
         if point is None and at != target.at and not control.is_load:
-            if self.edges.critical > 0 and self.states.overlaps_when_detached(min(at, target.at)):
+            if self.edges.critical > 0 and self.states.attracts_when_detached(min(at, target.at)):
                 raise NoState("contact is lost where surfaces overlap", at)
             history.states.append(self.detached(target.prescribed))
         return history

@@ -218,21 +218,37 @@ class Jumps:
         adhesive = self.edges.critical > 0
         for _ in range(ENDLESS):
             if point is None:
-                if not (adhesive and self.states.overlaps_when_detached(at)):
+                touch, touches = self.nucleation.first_touch()
+                if not (adhesive and self.states.attracts_when_detached(at, touch)):
                     return None
-                _, touches = self.nucleation.first_touch()
                 point = descend(np.empty((0, 2)), touches)
+                if point is None and not self.states.attracts_when_detached(at):
+                    return None
                 continue
             least, minima = self.nucleation.minimum(point.field)
             if least > 0:
                 return point.with_clearance(least)
-            grown = descend(point.field.gaps, self.nucleation.choose_seeds(minima))
-            if grown is not None and self.is_same(grown.field.gaps, point.field.gaps):
+            seeds = self.nucleation.choose_seeds(minima)
+            grown = descend(point.field.gaps, seeds)
+            if self.has_gained(point, grown):
+                point = grown
+            elif not self.nucleation.heal(seeds):
                 if adhesive and least < -self.nucleation.tolerance:
                     break
                 return point
-            point = grown
         raise NoState("surfaces overlap, and no patch comes to rest there", at)
+
+    def has_gained(self, before: Point, after: Point | None) -> bool:
+        """Return whether a touch led to another state, with less energy where that is needed.
+
+        Contact that nucleates at a finite range may come to rest with more, which no jump has.
+        """
+        if after is None:
+            return True
+        if self.nucleation.range > 0:
+            both = (self.states.of_point(point).potential for point in (before, after))
+            return not next(both) <= next(both)
+        return not self.is_same(after.field.gaps, before.field.gaps)
 
     def _is_same_minimum(self, one: Point | None, other: Point | None) -> bool:
         """Whether two descents led to one minimum."""
