@@ -44,8 +44,9 @@ class Scene:
     """One hostile loop; γ is ``g`` times E* h_rms² q0 n0.
 
     ``strength`` in Pa. ``weakness`` places it between the largest tension inside patches of the
-    loop without openings (0) and the least strength that is allowed (1); :func:`weakened` makes it
-    of that. Patches stay closed at -1.
+    loop without openings (0) and the least strength that is allowed (1), and above 1 it is 1 and
+    the range of adhesion over ``edge_range``; :func:`weakened` makes it of that. Patches stay
+    closed at -1.
     """
 
     hurst: float
@@ -90,6 +91,8 @@ def draw(seed: int, number: int, strength: bool = False, many: bool = False) -> 
     ratio = max(2, min(scene.ratio, most // scene.n0))  # a single wave has no tension inside
     depth = max(scene.max_penetration, float(rng.uniform(0.6, 0.99)))
     weakness = float(rng.uniform(-0.1, 1))
+    if rng.integers(2):
+        weakness, g = 1 + float(10 ** rng.uniform(-2.5, 0)), scene.g
     return replace(scene, g=float(g), ratio=ratio, max_penetration=depth, weakness=weakness)
 
 
@@ -101,14 +104,17 @@ def weakened(scene: Scene) -> Scene:
     if scene.weakness == -1:
         return scene
     problem = scene.problem()
-    inside = run_loop(
+    loop = run_loop(
         SharpMethod(problem, accuracy=1e-2),
         max_penetration=scene.max_penetration,
         load_steps=scene.load_steps,
-    ).largest_interior_tension
+    )
+    inside = loop.largest_interior_tension
     longest = LONGEST_GRIFFITH_CRACK * problem.profile.shortest_wavelength * (1 - 1e-9)
     modulus, gamma = problem.half_space.modulus, problem.work_of_adhesion
     least = max(float(np.sqrt(4 * modulus * gamma / (np.pi * longest))), _DECADES * inside)
+    if scene.weakness > 1:
+        return replace(scene, strength=max(least, gamma / (loop.edge_range * (scene.weakness - 1))))
     if inside <= least:
         return replace(scene, strength=least)
     return replace(scene, strength=inside * (least / inside) ** scene.weakness)

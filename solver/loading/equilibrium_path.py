@@ -198,8 +198,11 @@ class EquilibriumPath(ByValue, ResultViews):
     def touch_range(self) -> float:
         """Range of adhesion in m that changes the loss by a hundredth by earlier touches.
 
-        Infinite if no jump is a touch (docs/zero-range.md).
+        Infinite if no jump is a touch, and at a finite range, in which touches come earlier
+        (docs/zero-range.md).
         """
+        if math.isfinite(self.problem.strength):
+            return math.inf
         stress = touch_stress(
             self.jumps, self.states_before_jumps(), self.separation, self.mean_stress,
             self.patches, self.problem.control,

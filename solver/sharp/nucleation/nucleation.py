@@ -91,11 +91,12 @@ class Nucleation:
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
         self._first: tuple[float, list[Touch]] | None = None
+        self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
             closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=edges.surface,
-            narrowest=float(3 * edges.smallest),
+            narrowest=self._narrowest,
             widest=float(edges.longest_step),
             range=self.range,
         )
@@ -187,7 +188,7 @@ class Nucleation:
         longest = 2 * min(LONGEST_TRIAL_HALF_LENGTH * self.edges.wave, IN_PATCH * apart)
 
         def release(width: float) -> float:
-            if not self._lengths.narrowest <= width <= longest:
+            if not self._narrowest <= width <= longest:
                 return np.inf
             seeded = with_patches(gaps, theta, np.full(len(theta), width))
             return float(self.edges.release(seeded, prescribed, first, 0.5 * width).max())
