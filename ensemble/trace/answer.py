@@ -26,7 +26,7 @@ from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Measure, Problem
-from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
+from adhesis.solver.registry import METHOD_NAMES, MethodName, check_law
 from adhesis.solver.values import ByValue, finite
 
 FIGURES = {
@@ -463,8 +463,8 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
             profile, cycle.half_space, gamma, strength=strength, work_of_adhesion_open=open_,
             measure=cycle.measure,
         )  # fmt: skip
-        if problem.pinning > 0:
-            check_pinning(cycle.method, None)
+        has_range = math.isfinite(problem.strength)
+        check_law(cycle.method, None, pins=problem.pinning > 0, has_range=has_range)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:

@@ -121,8 +121,8 @@ class Nucleation:
         theta = crests.position[chosen] * profile.q0
         widths = self._lengths.seed_widths(curvature)
         clearance = float(self._lengths.clearances(np.zeros_like(curvature), curvature).max())
-        opening, low, high = -clearance, -clearance, self.range
-        trial = high
+        low = opening = -clearance
+        high = trial = max(low, self.range) if self.range > 0 else low
         while high - low > self.tolerance:
             at = 0.0 if self.edges.is_load else profile.h_max * profile.q0 + trial
             none = np.empty((0, 2))
