@@ -385,7 +385,7 @@ def main() -> int:
     found, number = 0, args.first
     worst = 0.0
     print("number  waves  patches  jumps  contact  ", end="")
-    print("valid  edge  touch  turn (nm)  range (nm)  loss (J/m²)  off by  at zero range by  doubts")
+    print("valid  edge  touch  turn  range (nm)  loss (J/m²)  off by  at zero range  doubts")
     while found < args.loops:
         own = np.random.default_rng([args.seed, number])
         coefficients, gamma, depth = draw(one_after_another if is_even else own, args.lowest)

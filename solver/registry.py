@@ -80,9 +80,7 @@ def _load(name: Literal["grid", "sharp"]) -> None:
     import_module(f"adhesis.solver.{name}.method")
 
 
-def check_law(
-    name: MethodName, nodes_per_wave: int | None, *, pins: bool, has_range: bool
-) -> None:
+def check_law(name: MethodName, nodes_per_wave: int | None, *, pins: bool, has_range: bool) -> None:
     """Refuse the method ``grid`` for two works of adhesion, and for a range of adhesion.
 
     Raises
@@ -97,9 +95,7 @@ def check_law(
     reason = "has edges that recede at another one"
     if has_range:
         beside, reason = "a range or strength of adhesion", "has adhesion that acts over a range"
-    raise ValueError(
-        f"{given} beside {beside}: leave it out, as only the method 'sharp' {reason}"
-    )
+    raise ValueError(f"{given} beside {beside}: leave it out, as only the method 'sharp' {reason}")
 
 
 def check_nodes(nodes_per_wave: int, waves: int) -> None:

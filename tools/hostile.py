@@ -332,8 +332,11 @@ def judge(scene: Scene, number: int) -> dict[str, Any]:
         if compared_tightly(scene, number):
             found["kind"] = "tight"
             _compare(found, loop, follow(scene, min(1e-5, 1e-2 * scene.accuracy))[0])
-        elif number % GRID == 1 and scene.n0 * scene.ratio <= 40 and scene.g > 0.03 and (
-            math.isinf(scene.strength)  # ``grid`` knows no range
+        elif (
+            number % GRID == 1
+            and scene.n0 * scene.ratio <= 40
+            and scene.g > 0.03
+            and math.isinf(scene.strength)  # ``grid`` knows no range
         ):
             found["kind"] = "grid"
             _compare(found, loop, follow(scene, max(scene.accuracy, 1e-3), "grid")[0])

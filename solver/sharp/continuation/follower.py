@@ -277,7 +277,8 @@ class Follower:
     ) -> ComputedJump | None:
         """Compute the jump from the point of a branch at which surfaces touch inside a gap.
 
-        None if the patches do not hold. A fold that may as well come first has come ``beyond`` that d.
+        None if the patches do not hold. A fold that may as well come first has come ``beyond`` that
+        d.
         """
         point = touched.point
         before = self.states.of_point(point)

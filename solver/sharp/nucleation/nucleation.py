@@ -121,18 +121,16 @@ class Nucleation:
         theta = crests.position[chosen] * profile.q0
         widths = self._lengths.seed_widths(curvature)
         clearance = float(self._lengths.clearances(np.zeros_like(curvature), curvature).max())
-        low = opening = -clearance
-        high = trial = max(low, self.range) if self.range > 0 else low
-        while high - low > self.tolerance:
+        opening = -clearance
+        high = trial = self.range if self.range > 0 else opening
+        while high - opening > self.tolerance:
             at = 0.0 if self.edges.is_load else profile.h_max * profile.q0 + trial
-            none = np.empty((0, 2))
-            left, width = self._judge(none, at, theta, trial, float(widths[0]))
+            left, width = self._judge(np.empty((0, 2)), at, theta, trial, float(widths[0]))
             if left > 0:
                 high = trial
             else:
-                opening = low = trial
-                widths = np.full(len(theta), width)
-            trial = 0.5 * (low + high)
+                opening, widths = trial, np.full(len(theta), width)
+            trial = 0.5 * (opening + high)
         touches = [Touch(float(a), opening, float(w)) for a, w in zip(theta, widths, strict=True)]
         return profile.h_max * profile.q0 + opening, touches
 
@@ -167,7 +165,11 @@ class Nucleation:
         self.edges.count.openings += count
         theta, opening, curvature, rim, clearance = found
         widths = self._lengths.seed_widths(curvature)
-        for i in np.flatnonzero((0 < opening) & (clearance <= 0) & (self.range < rim)):
+        near = HEALED_PLACE * self.edges.wave
+        for i in np.flatnonzero((opening > 0) & (clearance <= 0) & (rim > self.range)):
+            if has_healed(theta[i], 1 / opening[i], self.healed, near, 2 * np.pi):
+                clearance[i] = opening[i]
+                continue
             at = field.gaps, field.prescribed, theta[i : i + 1]
             clearance[i], widths[i] = self._judge(*at, float(opening[i]), float(widths[i]))
         least = min(least, float(clearance.min(initial=np.inf)))
@@ -181,9 +183,6 @@ class Nucleation:
         The opening has to close by the clearance, at least, before a patch grows.
         """
         first = float(theta[0])
-        near = HEALED_PLACE * self.edges.wave
-        if has_healed(first, 1 / opening, self.healed, near, 2 * np.pi):
-            return opening, width
         apart = np.abs((gaps.ravel() - first + np.pi) % (2 * np.pi) - np.pi).min(initial=np.inf)
         longest = 2 * min(LONGEST_TRIAL_HALF_LENGTH * self.edges.wave, IN_PATCH * apart)
 
