@@ -252,7 +252,7 @@ class SharpMethod(Method):
         at = self.states.prescribed_of(state)
         point = self.follower.recall_point(state.internal)
         if not state.patches:
-            touch, highest = self.nucleation.first_touch()
+            touch, highest = self.jumps.first_touch()
             first = 0.0 if control.is_load else touch
             if target.branch == "unloading" or target.at > first:
                 apart = self.problem.detached_separation(state, target.prescribed)

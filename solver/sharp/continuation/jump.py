@@ -109,6 +109,38 @@ class Jumps:
         self.mirror = MirrorCheck(edges, problem.profile.q0 * problem.mirror_axes)
         # Under a load edges help each other: in which order they run decides nothing.
         self._may_race = edges.critical > 0 and not edges.is_load
+        self._first: tuple[float, list[Touch]] | None = None
+
+    def first_touch(self) -> tuple[float, list[Touch]]:
+        """Find the separation q0 s at which a solid that approaches touches, and the touches.
+
+        The highest crest is then as far away as adhesion reaches; or nearer, where no patch grows
+        there or the one that does comes to rest with more energy than no contact has.
+        """
+        if self._first is None:
+            nucleation = self.nucleation
+            self._first = nucleation.first_touch()
+            low, high = 0.0, nucleation.range
+            trial = high
+            while high - low > nucleation.tolerance:
+                touch = nucleation.first_touch(trial)
+                if self._holds(*touch):
+                    low, self._first = trial, touch
+                else:
+                    high = trial
+                trial = 0.5 * (low + high)
+        return self._first
+
+    def _holds(self, separation: float, touches: list[Touch]) -> bool:
+        """Return whether the patches at first touches come to rest with less energy than none."""
+        if not touches:
+            return False
+        at = 0.0 if self.edges.is_load else separation
+        try:
+            point, _ = self._relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), at)
+        except FullContact:
+            return True
+        return point is not None and self.states.of_point(point).potential < 0
 
     def compute(
         self,
@@ -218,7 +250,7 @@ class Jumps:
         adhesive = self.edges.critical > 0
         for _ in range(ENDLESS):
             if point is None:
-                touch, touches = self.nucleation.first_touch()
+                touch, touches = self.first_touch()
                 if not (adhesive and self.states.attracts_when_detached(at, touch)):
                     return None
                 point = descend(np.empty((0, 2)), touches)

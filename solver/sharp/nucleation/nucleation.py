@@ -90,7 +90,6 @@ class Nucleation:
         self.searched = SearchedGaps()
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
-        self._first: tuple[float, list[Touch]] | None = None
         self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
@@ -103,36 +102,28 @@ class Nucleation:
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
         self.tolerance = OVERLAP * problem.profile.h_max * problem.profile.q0
 
-    def first_touch(self) -> tuple[float, list[Touch]]:
+    def first_touch(self, opening: float = 0.0) -> tuple[float, list[Touch]]:
         """Return the separation q0 s at which the first seeds are put, and the touches.
 
-        These are at the highest crest (:meth:`Profile.first_of_equal`).
+        These are at the highest crest (:meth:`Profile.first_of_equal`), in units of 1/q0 at an
+        ``opening`` within the range; there are none where no patch grows there.
         """
-        if self._first is None:
-            self._first = self._find_first_touch()
-        return self._first
-
-    def _find_first_touch(self) -> tuple[float, list[Touch]]:
-        """Search the largest opening within the range from which on a patch grows."""
         profile = self.problem.profile
         crests = profile.crests()
         chosen = self._choose(crests.position)
         curvature = crests.curvature[chosen] / profile.q0
         theta = crests.position[chosen] * profile.q0
         widths = self._lengths.seed_widths(curvature)
-        clearance = float(self._lengths.clearances(np.zeros_like(curvature), curvature).max())
-        opening = -clearance
-        high = trial = self.range if self.range > 0 else opening
-        while high - opening > self.tolerance:
-            at = 0.0 if self.edges.is_load else profile.h_max * profile.q0 + trial
-            left, width = self._judge(np.empty((0, 2)), at, theta, trial, float(widths[0]))
+        clearance = self._lengths.clearances(np.full(len(theta), self.range), curvature)
+        separation = profile.h_max * profile.q0 - float(clearance.max()) + opening
+        if opening > 0:
+            at = 0.0 if self.edges.is_load else separation
+            left, width = self._judge(np.empty((0, 2)), at, theta, opening, float(widths[0]))
             if left > 0:
-                high = trial
-            else:
-                opening, widths = trial, np.full(len(theta), width)
-            trial = 0.5 * (opening + high)
+                return separation, []
+            widths = np.full(len(theta), width)
         touches = [Touch(float(a), opening, float(w)) for a, w in zip(theta, widths, strict=True)]
-        return profile.h_max * profile.q0 + opening, touches
+        return separation, touches
 
     def choose_seeds(self, minima: Minima) -> list[Touch]:
         """Choose the touch of the largest overlap; of equal ones, one and its copies."""
