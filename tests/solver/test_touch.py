@@ -14,7 +14,7 @@ from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation
-from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation, Touch
+from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation
 from tests.support.scenes import HALF_SPACE
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3
@@ -28,8 +28,8 @@ def nucleation(gamma: float) -> Nucleation:
 def places(of: Nucleation, overlaps: list[float]) -> list[float]:
     """Places that get a patch, of minima at θ = 0, 1, … with openings in units of h_max."""
     opening = np.array(overlaps) * AMPLITUDE * 2 * np.pi / PERIOD
-    theta, curvature = np.arange(len(overlaps), dtype=float), np.full(len(overlaps), 1e-3)
-    return [touch.theta for touch in of.choose_seeds(Minima(theta, opening, curvature))]
+    theta, width = np.arange(len(overlaps), dtype=float), np.full(len(overlaps), 1e-3)
+    return [touch.theta for touch in of.choose_seeds(Minima(theta, opening, width, opening))]
 
 
 def test_the_deepest_place_gets_a_patch_and_of_equal_ones_the_first_from_the_crest_on() -> None:
@@ -70,7 +70,8 @@ def test_seeds_that_meet_are_one_patch() -> None:
 def test_a_seed_is_narrower_than_the_first_equilibrium_that_it_grows_to(gamma: float) -> None:
     wave = SingleWave(AMPLITUDE, PERIOD, HALF_SPACE.modulus, gamma)
     q0 = 2 * np.pi / PERIOD
-    gaps = nucleation(gamma).insert_seeds(np.empty((0, 2)), [Touch(0.0, 0.0, AMPLITUDE * q0)])
+    found = nucleation(gamma)
+    gaps = found.insert_seeds(np.empty((0, 2)), found.first_touch()[1])
     width = (2 * np.pi - (gaps[0, 1] - gaps[0, 0])) / q0
     assert 0.2 < width / (2 * wave.half_width(AMPLITUDE)) < 0.6
 

@@ -197,7 +197,7 @@ class Nucleation:
 
         Within the range a value may fall at once, where surfaces part beside a minimum.
         """
-        return value > -0.5 * self.tolerance or (near and self.range > 0)
+        return value > -0.5 * self.tolerance or (near and value > -self.range)
 
     def validate_location(self, value: float, at: float) -> None:
         """Raise if surfaces overlap at the touch that was located."""
