@@ -83,7 +83,7 @@ def strength_of(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Problem(ByValue):
-    """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
+    """A rigid periodic profile pressed into an elastic half-space with adhesion.
 
     Immutable; two problems are equal if all parts are.
 
@@ -97,10 +97,11 @@ class Problem(ByValue):
     control : Control
         Prescribed quantity; the separation by default.
     strength : float
-        σ_th in Pa: where the tension inside a patch reaches it, the patch opens from inside.
-        Infinite by default, that of adhesion of zero range (docs/zero-range.md).
+        σ_th in Pa: where the tension inside a patch reaches it, the patch opens from inside, and
+        surfaces touch at a gap of δ = γ/σ_th. Infinite by default, that of adhesion of zero range
+        (docs/zero-range.md).
     adhesion_range : float, optional
-        Instead of the strength, the range δ of adhesion in m: σ_th = γ/δ.
+        Instead of the strength, the range δ of adhesion in m.
     work_of_adhesion_open : float, optional
         Work of adhesion in J/m² where an edge recedes, at least γ, which then holds where it
         advances; between both it is pinned. None stands for γ.
