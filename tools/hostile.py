@@ -18,6 +18,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
+from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.loading.zero_range import DOUBTFUL_EXCESS
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.problem import LONGEST_GRIFFITH_CRACK
@@ -36,6 +37,7 @@ _MOST_BY_WIDTH = 3000  # waves over the root of the narrowest length, for indepe
 _MOST_NODES = 20_000  # of these
 _OVERLAP = 1e-6
 _TENSION = 1e-3  # of the strength
+_MISSED = 1e-3  # of the range of adhesion
 _DECADES = 1e-4  # least strength that is drawn, of the largest tension without openings
 
 
@@ -179,6 +181,9 @@ def follow(
         wrong += _of_states(method, states)
         if math.isfinite(problem.strength):
             excess, late = tension_of(method, loop, states)
+            missed = missed_by(method, states)
+            if missed > _MISSED * method.nucleation.range + method.nucleation.tolerance:
+                wrong.append(f"a touch is missed by {missed / method.nucleation.range:.1e} ranges")
             found |= {"excess": excess, "late": late, "healed": method.follower.openings.heals}
             if late > _TENSION:
                 wrong.append(f"a patch is late to open by {late:.1e} of the strength")
@@ -207,6 +212,20 @@ def tension_of(
         largest = max([largest, *(crack.tension for crack in found)])
         late = max(late, -least)
     return largest, late
+
+
+def missed_by(method: SharpMethod, states: list[ContactState]) -> float:
+    """Return how far a gap has closed, at most, beyond where surfaces touch; lengths in 1/q0.
+
+    Nothing is known of the states before. Touches that were tried and did not hold count, too.
+    """
+    missed = 0.0
+    for state in states:
+        if state.patches:
+            method.nucleation.searched, method.nucleation.healed = SearchedGaps(), []
+            field = method.edges.field(state.internal.gaps, method.states.prescribed_of(state))
+            missed = max(missed, -method.nucleation.minimum(field)[0])
+    return missed
 
 
 def _staying(loop: LoopResult, states: list[ContactState]) -> list[ContactState]:

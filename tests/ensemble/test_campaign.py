@@ -450,11 +450,16 @@ def test_fields_under_a_load_are_kept_at_parts_of_it():
 
 
 def test_the_strength_of_the_interface_is_a_key_of_the_material_and_may_be_an_axis():
-    text = campaign_text(poisson="0.5\nadhesion_range = [1e-8, 2e-8]")
-    campaign = parse_campaign(text)
+    def sharp(poisson: str) -> str:
+        text = campaign_text(poisson=poisson)
+        return text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
+
+    campaign = parse_campaign(sharp("0.5\nadhesion_range = [1e-8, 2e-8]"))
     assert campaign.material.opens
     assert not parse_campaign(campaign_text()).material.opens
     found = {make_problem(campaign, task).strength for task in campaign.tasks()}
     assert found == {0.01 / 1e-8, 0.04 / 1e-8, 0.01 / 2e-8, 0.04 / 2e-8}
-    given = parse_campaign(campaign_text(poisson="0.5\nstrength = 3e6"))
+    given = parse_campaign(sharp("0.5\nstrength = 3e6"))
     assert {make_problem(given, task).strength for task in given.tasks()} == {3e6}
+    with pytest.raises(InputError, match=r"\[solver\] method is 'grid' beside a range or strength"):
+        parse_campaign(campaign_text(poisson="0.5\nstrength = 3e6"))

@@ -41,7 +41,7 @@ def test_without_stripes_there_is_no_pattern():
         ("stripe_phase = 1.0", "the number of stripes of the work of adhesion is missing"),
         (
             "stripes = 2\nstripe_amplitude = 0.1\nstrength = 1e8",
-            "a pattern of the work of adhesion is given beside a strength",
+            "method is .grid. beside a range or strength of adhesion",
         ),
     ],
 )

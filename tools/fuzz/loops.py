@@ -13,10 +13,11 @@ refused (PathError) is counted.
 
 With ``--tight`` only the scenes are followed that are compared with a far more accurate run, with
 ``--waves`` only those of at most so many waves: they are cheap. With ``--many`` they have 20 to 80
-patches, and all are compared: half a minute each. With ``--strength`` patches open
-from inside, at ranges of adhesion up to four decades above that which keeps them closed; then no
-state may have a place at the strength where a crack grows, and none may have a tension inside a
-patch that exceeds the strength by more than a hundredth, unless the loop's warnings state it.
+patches, and all are compared: half a minute each. With ``--strength`` adhesion has a range: half of
+them up to four decades above that which keeps patches closed inside, the others up to
+``edge_range``. Then no state may have a gap that should have touched, or a place at the strength
+where a crack grows, and none may have a tension inside a patch that exceeds the strength by more
+than a hundredth, unless the loop's warnings state it.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def main() -> int:
     parser.add_argument("--number", type=int, help="this scene alone")
     parser.add_argument("--tight", action="store_true", help="only scenes that are compared so")
     parser.add_argument("--waves", type=float, default=np.inf, help="highest wave number over q0")
-    parser.add_argument("--strength", action="store_true", help="patches open from inside")
+    parser.add_argument("--strength", action="store_true", help="adhesion of a finite range")
     parser.add_argument("--many", action="store_true", help="20 to 80 patches, all compared")
     parser.add_argument("--log", type=Path, help="a line of JSON for each scene")
     args = parser.parse_args()
