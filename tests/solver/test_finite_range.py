@@ -22,6 +22,8 @@ from adhesis import (
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.equilibrium.branch_point import Point
 from benchmarks.finite_range import GridLoop
 from tests.support.explicit_solution import explicit_openings
 
@@ -198,6 +200,24 @@ def test_energy_falls_in_every_jump_at_a_range():
     assert all(jump.energy_drop > -jump.barrier for jump in loop.jumps)
     assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
     assert loop.loss < rough_loop(None).loss
+
+
+def test_a_touch_that_does_not_hold_is_tried_again_from_nearer_by(monkeypatch):
+    reference, refused, has_gained = rough_loop(2e-8), [], Jumps.has_gained
+
+    def hold(self: Jumps, before: Point, after: Point | None) -> bool:
+        if not refused:
+            refused.append(before)
+            return False
+        return has_gained(self, before, after)
+
+    monkeypatch.setattr(Jumps, "has_gained", hold)
+    loop = rough_loop.__wrapped__(2e-8)
+    assert [jump.kind for jump in loop.jumps] == [jump.kind for jump in reference.jumps]
+    later = [a.separation - b.separation for a, b in zip(reference.jumps, loop.jumps, strict=True)]
+    assert 0.003 < max(later) / 2e-8 < 0.02
+    assert sum(abs(way) > 1e-4 * 2e-8 for way in later) == 1
+    assert abs(loop.loss - reference.loss) < 1e-3 * reference.loss
 
 
 @pytest.mark.parametrize("change", ["mirror", "shift"])

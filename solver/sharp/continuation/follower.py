@@ -267,9 +267,7 @@ class Follower:
         """Raise where patches open and close without end."""
         last = history.jumps[-MOST_OPENINGS:]
         here = jump.jump.separation
-        if len(last) == MOST_OPENINGS and all(
-            one.kind == "opening" and one.separation == here for one in last
-        ):
+        if len(last) == MOST_OPENINGS and all(one.separation == here for one in last):
             raise NoState("patches open and close in turn", jump.at)
 
     def _touch_jump(
