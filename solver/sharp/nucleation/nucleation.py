@@ -83,6 +83,8 @@ class Nucleation:
         Of adhesion, in units of 1/q0.
     healed : list of (position, 1/opening)
         Touches whose patches did not hold: none is tried there unless the opening is smaller.
+    heals : int
+        Number of touches that did not hold, so far.
     """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
@@ -90,6 +92,7 @@ class Nucleation:
         self.searched = SearchedGaps()
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
+        self.heals = 0
         self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
@@ -235,6 +238,9 @@ class Nucleation:
 
         Surfaces that overlap touch in any case.
         """
-        healed = [(touch.theta, 1 / touch.opening) for touch in touches if touch.opening > 0]
-        self.healed += healed
-        return bool(healed) and self.range > 0
+        if self.range > 0:
+            healed = [(touch.theta, 1 / touch.opening) for touch in touches if touch.opening > 0]
+            self.healed += healed
+            self.heals += len(healed)
+            return bool(healed)
+        return False
