@@ -206,12 +206,10 @@ class Follower:
         trail.restart(0.0)
         fold, beyond = branch.fold_ahead
         for _ in range(MOST_OPENINGS):
-            touched, least = locate(
-                self.nucleation, self._between, points, self.resolution.jump, clearance
-            )
+            finest = self.resolution.finest
+            touched, least = locate(self.nucleation, self._between, points, finest, clearance)
             opened = None
             if self.openings.is_possible:
-                finest = self.resolution.finest
                 opened, _ = locate(self.openings, self._between, points, finest, 0.0)
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
