@@ -547,9 +547,8 @@ void bind_nucleation(nb::module_& m) {
   m.def(
       "least_clearances",
       [](const Field& field, const Integers& gaps, const SearchLengths& lengths) {
-        const Vector least =
-            least_clearances(find_minima(field, gaps, lengths.range), field.nodes.gap_count(),
-                             lengths);
+        const Vector least = least_clearances(find_minima(field, gaps, lengths.range),
+                                              field.nodes.gap_count(), lengths);
         Vector out;
         for (int k : gaps) out.push_back(least[k]);
         return out;

@@ -93,8 +93,7 @@ double clearance_of(const Minimum& minimum, const SearchLengths& lengths) {
     return std::min(minimum.opening, lengths.range - minimum.rim);
   // Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which the
   // surface follows it, 10 to 20 here.
-  const double overlap =
-      width <= lengths.narrowest ? 4 * minimum.curvature * width * width : 0;
+  const double overlap = width <= lengths.narrowest ? 4 * minimum.curvature * width * width : 0;
   return minimum.opening - lengths.range + overlap;
 }
 

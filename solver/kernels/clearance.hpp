@@ -9,6 +9,10 @@
 // A gap is searched again when a good part of its clearance can be gone, or of its opening at any
 // node: a minimum may appear there, whatever others there are. Beside the ends of a gap openings
 // are small in any case; there it is searched again when one is negative.
+//
+// Where surfaces attract each other from a range on, a clearance is the opening less the range. A
+// gap with a minimum within the range is always searched again: whether a patch grows there
+// depends on more than its opening.
 #pragma once
 
 #include <memory>

@@ -160,11 +160,11 @@ std::vector<Minimum> find_minima(const Field& field, const Integers& gaps, doubl
     const FineOpening fine = open_gap(field, k, *circle_of(count + 1));
     const auto begin = fine.opening.begin(), end = fine.opening.end();
     for (Candidate minimum : local_minima(fine.theta, fine.opening)) {
-      if (minimum.opening < range + MINIMUM_DOUBT * minimum.error)
-        refine(gap, fine.modes, minimum);
-      const auto place = std::lower_bound(fine.theta.begin(), fine.theta.end(), minimum.theta,
-                                          std::greater<>());
-      const auto split = begin + std::clamp<std::ptrdiff_t>(place - fine.theta.begin(), 1, count - 1);
+      if (minimum.opening < range + MINIMUM_DOUBT * minimum.error) refine(gap, fine.modes, minimum);
+      const auto place =
+          std::lower_bound(fine.theta.begin(), fine.theta.end(), minimum.theta, std::greater<>());
+      const auto split =
+          begin + std::clamp<std::ptrdiff_t>(place - fine.theta.begin(), 1, count - 1);
       const double rim = std::min(*std::max_element(begin, split), *std::max_element(split, end));
       out.push_back({minimum.theta, minimum.opening, 2 * minimum.half, rim, k});
     }
