@@ -24,6 +24,7 @@ from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.nucleation.nucleation import Touch
 from benchmarks.finite_range import GridLoop
 from tests.support.explicit_solution import explicit_openings
 
@@ -205,11 +206,11 @@ def test_energy_falls_in_every_jump_at_a_range():
 def test_a_touch_that_does_not_hold_is_tried_again_from_nearer_by(monkeypatch):
     reference, refused, has_gained = rough_loop(2e-8), [], Jumps.has_gained
 
-    def hold(self: Jumps, before: Point, after: Point | None) -> bool:
+    def hold(self: Jumps, before: Point, after: Point | None, touches: list[Touch]) -> bool:
         if not refused:
             refused.append(before)
             return False
-        return has_gained(self, before, after)
+        return has_gained(self, before, after, touches)
 
     monkeypatch.setattr(Jumps, "has_gained", hold)
     loop = rough_loop.__wrapped__(2e-8)

@@ -282,7 +282,7 @@ class Follower:
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,
             orders=None if beyond is None else Orders(beyond, (point.field.gaps,)),
         )  # fmt: skip
-        gained = self.nucleation.range == 0 or self.jumps.has_gained(point, jump.point)
+        gained = self.jumps.has_gained(point, jump.point, touched.seeds)
         if not gained and self.nucleation.heal(touched.seeds):
             return None
         late = self.states.work(before, jump.states[-1], touched.late)

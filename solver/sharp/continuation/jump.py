@@ -262,7 +262,7 @@ class Jumps:
                 return point.with_clearance(least)
             seeds = self.nucleation.choose_seeds(minima)
             grown = descend(point.field.gaps, seeds)
-            if self.has_gained(point, grown):
+            if self.has_gained(point, grown, seeds):
                 point = grown
             elif not self.nucleation.heal(seeds):
                 if adhesive and least < -self.nucleation.tolerance:
@@ -270,14 +270,14 @@ class Jumps:
                 return point
         raise NoState("surfaces overlap, and no patch comes to rest there", at)
 
-    def has_gained(self, before: Point, after: Point | None) -> bool:
-        """Return whether a touch led to another state, with less energy where that is needed.
+    def has_gained(self, before: Point, after: Point | None, touches: list[Touch]) -> bool:
+        """Return whether touches led to another state, with less energy where that is needed.
 
-        Contact that nucleates at a finite range may come to rest with more, which no jump has.
+        Contact that nucleates in an open gap may come to rest with more, which no jump has.
         """
         if after is None:
             return True
-        if self.nucleation.range > 0:
+        if self.nucleation.range > 0 and touches[0].opening > 0:
             both = (self.states.of_point(point).potential for point in (before, after))
             return not next(both) <= next(both)
         return not self.is_same(after.field.gaps, before.field.gaps)
