@@ -138,10 +138,15 @@ def largest_excess(cracks: list[Crack]) -> list[Crack]:
     return [crack for crack in cracks if crack.value <= min(least + EQUAL_TENSIONS, 0.0)]
 
 
-def has_healed(crack: Crack, healed: list[Crack], near: float, period: float) -> bool:
-    """Return whether a crack closed again within ``near`` of this one, at about its tension."""
-    for other in healed:
-        distance = (crack.position - other.position + period / 2) % period - period / 2
-        if abs(distance) < near and crack.tension < HEALED_TENSION * other.tension:
+def has_healed(
+    position: float, drive: float, healed: list[tuple[float, float]], near: float, period: float
+) -> bool:
+    """Return whether what nucleated within ``near`` of a place went back, at about this drive.
+
+    The drive, and those of the positions that ``healed`` lists, are tensions, or what else grows.
+    """
+    for place, before in healed:
+        distance = (position - place + period / 2) % period - period / 2
+        if abs(distance) < near and drive < HEALED_TENSION * before:
             return True
     return False

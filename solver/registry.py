@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from typing import Literal, get_args
 
@@ -46,8 +47,8 @@ def make_method(
     choice("method", name, METHOD_NAMES)
     instance("problem", problem, Problem, "Problem(profile, half_space, work_of_adhesion)")
     accuracy = real("accuracy", accuracy, ACCURACY)
-    if problem.pinning > 0:
-        check_pinning(name, nodes_per_wave)
+    has_range = math.isfinite(problem.strength)
+    check_law(name, nodes_per_wave, pins=problem.pinning > 0, has_range=has_range)
     if nodes_per_wave is not None:
         nodes_per_wave = whole("nodes_per_wave", nodes_per_wave, NODES_PER_WAVE)
         check_nodes(nodes_per_wave, problem.highest_harmonic)
@@ -79,20 +80,22 @@ def _load(name: Literal["grid", "sharp"]) -> None:
     import_module(f"adhesis.solver.{name}.method")
 
 
-def check_pinning(name: MethodName, nodes_per_wave: int | None) -> None:
-    """Refuse the method ``grid``, whose edges advance and recede at one work of adhesion.
+def check_law(name: MethodName, nodes_per_wave: int | None, *, pins: bool, has_range: bool) -> None:
+    """Refuse the method ``grid`` for two works of adhesion, and for a range of adhesion.
 
     Raises
     ------
     ValueError
         If it is named, or meant by a number of nodes.
     """
-    if name == "grid" or nodes_per_wave is not None:
-        given = "method is 'grid'" if name == "grid" else f"nodes_per_wave is {nodes_per_wave}"
-        raise ValueError(
-            f"{given} beside a work_of_adhesion_open above the work of adhesion: leave it out, as "
-            "only the method 'sharp' has edges that recede at another one"
-        )
+    if (name != "grid" and nodes_per_wave is None) or not (pins or has_range):
+        return
+    given = "method is 'grid'" if name == "grid" else f"nodes_per_wave is {nodes_per_wave}"
+    beside = "a work_of_adhesion_open above the work of adhesion"
+    reason = "has edges that recede at another one"
+    if has_range:
+        beside, reason = "a range or strength of adhesion", "has adhesion that acts over a range"
+    raise ValueError(f"{given} beside {beside}: leave it out, as only the method 'sharp' {reason}")
 
 
 def check_nodes(nodes_per_wave: int, waves: int) -> None:

@@ -18,6 +18,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
+from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.loading.zero_range import DOUBTFUL_EXCESS
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.problem import LONGEST_GRIFFITH_CRACK
@@ -36,6 +37,7 @@ _MOST_BY_WIDTH = 3000  # waves over the root of the narrowest length, for indepe
 _MOST_NODES = 20_000  # of these
 _OVERLAP = 1e-6
 _TENSION = 1e-3  # of the strength
+_MISSED = 1e-3  # of the range of adhesion
 _DECADES = 1e-4  # least strength that is drawn, of the largest tension without openings
 
 
@@ -44,8 +46,9 @@ class Scene:
     """One hostile loop; γ is ``g`` times E* h_rms² q0 n0.
 
     ``strength`` in Pa. ``weakness`` places it between the largest tension inside patches of the
-    loop without openings (0) and the least strength that is allowed (1); :func:`weakened` makes it
-    of that. Patches stay closed at -1.
+    loop without openings (0) and the least strength that is allowed (1), and above 1 it is 1 and
+    the range of adhesion over ``edge_range``; :func:`weakened` makes it of that. Patches stay
+    closed at -1.
     """
 
     hurst: float
@@ -90,6 +93,8 @@ def draw(seed: int, number: int, strength: bool = False, many: bool = False) -> 
     ratio = max(2, min(scene.ratio, most // scene.n0))  # a single wave has no tension inside
     depth = max(scene.max_penetration, float(rng.uniform(0.6, 0.99)))
     weakness = float(rng.uniform(-0.1, 1))
+    if rng.integers(2):
+        weakness, g = 1 + float(10 ** rng.uniform(-2.5, 0)), scene.g
     return replace(scene, g=float(g), ratio=ratio, max_penetration=depth, weakness=weakness)
 
 
@@ -101,14 +106,17 @@ def weakened(scene: Scene) -> Scene:
     if scene.weakness == -1:
         return scene
     problem = scene.problem()
-    inside = run_loop(
+    loop = run_loop(
         SharpMethod(problem, accuracy=1e-2),
         max_penetration=scene.max_penetration,
         load_steps=scene.load_steps,
-    ).largest_interior_tension
+    )
+    inside = loop.largest_interior_tension
     longest = LONGEST_GRIFFITH_CRACK * problem.profile.shortest_wavelength * (1 - 1e-9)
     modulus, gamma = problem.half_space.modulus, problem.work_of_adhesion
     least = max(float(np.sqrt(4 * modulus * gamma / (np.pi * longest))), _DECADES * inside)
+    if scene.weakness > 1:
+        return replace(scene, strength=max(least, gamma / (loop.edge_range * (scene.weakness - 1))))
     if inside <= least:
         return replace(scene, strength=least)
     return replace(scene, strength=inside * (least / inside) ** scene.weakness)
@@ -173,6 +181,10 @@ def follow(
         wrong += _of_states(method, states)
         if math.isfinite(problem.strength):
             excess, late = tension_of(method, loop, states)
+            found["not held"] = method.nucleation.heals
+            missed = 0.0 if found["not held"] else missed_by(method, states)
+            if missed > _MISSED * method.nucleation.range + method.nucleation.tolerance:
+                wrong.append(f"a touch is missed by {missed / method.nucleation.range:.1e} ranges")
             found |= {"excess": excess, "late": late, "healed": method.follower.openings.heals}
             if late > _TENSION:
                 wrong.append(f"a patch is late to open by {late:.1e} of the strength")
@@ -201,6 +213,20 @@ def tension_of(
         largest = max([largest, *(crack.tension for crack in found)])
         late = max(late, -least)
     return largest, late
+
+
+def missed_by(method: SharpMethod, states: list[ContactState]) -> float:
+    """Return how far a gap has closed, at most, beyond where surfaces touch; lengths in 1/q0.
+
+    Nothing is known of the states before, nor of touches that were tried and did not hold.
+    """
+    missed = 0.0
+    for state in states:
+        if state.patches:
+            method.nucleation.searched, method.nucleation.healed = SearchedGaps(), []
+            field = method.edges.field(state.internal.gaps, method.states.prescribed_of(state))
+            missed = max(missed, -method.nucleation.minimum(field)[0])
+    return missed
 
 
 def _staying(loop: LoopResult, states: list[ContactState]) -> list[ContactState]:
@@ -317,7 +343,12 @@ def judge(scene: Scene, number: int) -> dict[str, Any]:
         if many or number % (TIGHT if scene.g > _WEAK else 4 * TIGHT) == 0:
             found["kind"] = "tight"
             _compare(found, loop, follow(scene, min(1e-5, 1e-2 * scene.accuracy))[0])
-        elif number % GRID == 1 and scene.n0 * scene.ratio <= 40 and scene.g > 0.03:
+        elif (
+            number % GRID == 1
+            and scene.n0 * scene.ratio <= 40
+            and scene.g > 0.03
+            and math.isinf(scene.strength)  # ``grid`` knows no range
+        ):
             found["kind"] = "grid"
             _compare(found, loop, follow(scene, max(scene.accuracy, 1e-3), "grid")[0])
     except PathError as error:

@@ -1,7 +1,7 @@
-"""Draws opening.png: the loss against E of zero range, and where patches open from inside.
+"""Draws opening.png: the loss against E of zero range, and of a range that is given.
 
 Run it as ``.venv/bin/python docs/figures/opening.py [FILE [PROFILES]]``; it prints the table of
-docs/zero-range.md. The range of adhesion is 0.3 nm, and ten profiles are taken by default.
+docs/zero-range.md. The range of adhesion is 0.3 nm, and three profiles are taken by default.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def row_of(young: float, seeds: range, gamma: float) -> tuple[float, ...]:
 def main() -> None:
     """Compute the loops, print the table and draw."""
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("opening.png")
-    seeds = range(int(sys.argv[2]) if len(sys.argv) > 2 else 10)
+    seeds = range(int(sys.argv[2]) if len(sys.argv) > 2 else 3)
     rows = []
     head = ("E (Pa)", "γ (J/m²)", "zero range", "range 0.3 nm", "openings", "barriers over loss")
     print(f"| {' | '.join((*head, 'profiles'))} |\n|{'---|' * (len(head) + 1)}")

@@ -24,7 +24,7 @@ from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
-from adhesis.solver.registry import check_nodes, check_pinning
+from adhesis.solver.registry import check_law, check_nodes
 
 # HDF5 keeps an attribute of at most 64 KiB, and the text is one.
 _LONGEST_TEXT = 60_000
@@ -249,7 +249,11 @@ def _check_together(campaign: Campaign) -> None:
             "[material] gives adhesion_range and strength: at most one of them can be "
             "given, strength = work_of_adhesion/adhesion_range"
         )
-    _check_open(campaign)
+    pins, solver = _check_open(campaign), campaign.solver
+    try:
+        check_law(solver.method, solver.nodes_per_wave, pins=pins, has_range=material.opens)
+    except ValueError as error:
+        raise InputError(f"[solver] {error}") from None
     n0, ratio = (_largest(campaign, name, getattr(profile, name)) for name in ("n0", "ratio"))
     if n0 * ratio > MOST_WAVES:
         raise InputError(
@@ -302,11 +306,14 @@ def _check_together(campaign: Campaign) -> None:
         )
 
 
-def _check_open(campaign: Campaign) -> None:
-    """Check the work of adhesion of receding edges against that of advancing ones, in each cell."""
-    material, solver = campaign.material, campaign.solver
+def _check_open(campaign: Campaign) -> bool:
+    """Check the work of adhesion of receding edges against that of advancing ones, in each cell.
+
+    Returns whether they differ.
+    """
+    material = campaign.material
     if material.work_of_adhesion_open is None:
-        return
+        return False
     names = [axis.name for axis in campaign.axes]
     given = {"work_of_adhesion_open": material.work_of_adhesion_open}
     cells = (given | dict(zip(names, cell, strict=True)) for cell in campaign.cells)
@@ -319,16 +326,13 @@ def _check_open(campaign: Campaign) -> None:
                 "every cell of the sweep (zip joins lists whose values belong together)"
             )
     if all(found == gamma for gamma, found in works):
-        return
+        return False
     if material.opens:
         raise InputError(
             "[material] gives work_of_adhesion_open and a range or strength: at most "
             "one of them can be given, as edges of two works of adhesion have no range"
         )
-    try:
-        check_pinning(solver.method, solver.nodes_per_wave)
-    except ValueError as error:
-        raise InputError(f"[solver] {error}") from None
+    return True
 
 
 def _check_slopes(campaign: Campaign) -> None:

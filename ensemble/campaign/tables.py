@@ -104,7 +104,8 @@ class MaterialTable:
     poisson: float = _key(number_in(checks.POISSON), "Poisson's ratio ν", axis="1")
     adhesion_range: float | None = _key(
         number_in(checks.ADHESION_RANGE),
-        "range δ of adhesion in m: patches open from inside at the strength γ/δ; by default zero, "
+        "range δ of adhesion in m: surfaces touch at a gap of δ, and patches open from inside at "
+        "the strength γ/δ (method sharp alone); by default zero, "
         "so that they never do",
         None,
         axis="m",

@@ -26,7 +26,7 @@ from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Measure
-from adhesis.solver.registry import METHOD_NAMES, MethodName, check_pinning
+from adhesis.solver.registry import METHOD_NAMES, MethodName, check_law
 from adhesis.solver.values import ByValue
 
 FIGURES = {
@@ -453,8 +453,9 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     checks.instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        if cycle.problem(profile, gamma).pinning > 0:
-            check_pinning(cycle.method, None)
+        problem = cycle.problem(profile, gamma)
+        has_range = math.isfinite(problem.strength)
+        check_law(cycle.method, None, pins=problem.pinning > 0, has_range=has_range)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:

@@ -65,8 +65,8 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         "--adhesion-range",
         type=LENGTH.option,
         metavar="D",
-        help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
-        "(default: zero range, they never do)",
+        help="range of adhesion, 0.3nm; surfaces touch at a gap of D, and patches open from inside "
+        "at the strength G/D (default: zero range; method sharp alone)",
     )
     group.add_argument(
         "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"

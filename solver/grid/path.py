@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver.crack import MOST_OPENINGS, largest_excess
 from adhesis.solver.grid.contact import Contact, Mask
-from adhesis.solver.grid.opening import Openings
 from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import state_of
@@ -26,7 +24,6 @@ _OVERLAP = 1e-6  # of h_max: a smaller overlap counts as touch
 _NEAREST = 1e-8  # of the range: resolution of the location of first touch
 _LEAST_DISPLACEMENT = 0.1  # shortest waves between edges of different minima
 _FEWEST_NODES_APART = 2
-_STRENGTH_EXCEEDED = 1e-3  # of the strength: by so much a tension may exceed it when it opens
 _LONGEST = 0.05  # of the range: jumps hide in longer steps, where D is smooth by chance
 
 
@@ -83,7 +80,6 @@ class Steps:
         self.problem = problem
         self.scale = problem.prescribed_range
         self.adhesion_scale = problem.work_of_adhesion * self.period
-        self.openings = Openings(problem, relaxation)
         # Relative error of a drop, and size in J/m² of the drop in which a patch appears.
         self.coarse = self.least_drop = 0.0
         if self.adhesion_scale:
@@ -127,7 +123,6 @@ class Steps:
         step = prescribed - contact.prescribed
         # In shorter steps a jump is relaxed to its end, which shows how precisely it is located.
         self.least = self.accuracy * self.scale
-        left, contact = self._open(contact)
         longest = _LONGEST * self.scale if self.adhesion_scale else np.inf
         while contact.prescribed != prescribed:
             remaining = prescribed - contact.prescribed
@@ -143,16 +138,11 @@ class Steps:
                 self.count.bisections += 1
                 step *= self.share
                 continue
-            excess, _ = self.openings.minimum(after)
-            if not located and self._is_late(excess, abs(step)):
-                self.count.bisections += 1
-                step *= min(max(left / (left - excess), 0.02), 0.98) if left > 0 else 0.5
-                continue
             self.count.substeps += 1
             if not located:
                 self.error += self._unseen_drops(contact, after)
                 self._append(after)
-            left, contact = self._open(after)
+            contact = after
             if not control.is_fixed and np.count_nonzero(~contact.mask) <= 1:
                 raise PathError(self.problem.full_contact(target))
             if control.is_load and not contact.mask.any():
@@ -160,10 +150,6 @@ class Steps:
             step *= 2
         if not self.states or self.reached != prescribed:
             self._append(contact)
-
-    def _is_late(self, excess: float, stride: float) -> bool:
-        """Return whether a step passed an opening, and a shorter one would locate it better."""
-        return excess < -_STRENGTH_EXCEEDED and stride > 0.05 * self.accuracy * self.scale
 
     def _unseen_drops(self, before: Contact, after: Contact) -> float:
         """Estimate the drops, in J/m², in which patches came or went without a jump.
@@ -173,36 +159,6 @@ class Steps:
         """
         one, other = (patch_ranges(contact.mask)[0].size for contact in (before, after))
         return self.least_drop * abs(one - other)
-
-    def _open(self, contact: Contact) -> tuple[float, Contact]:
-        """Open patches inside where the tension has reached the strength, one after the other.
-
-        Returns the least value of all remaining maxima of tension, and the contact.
-
-        Raises
-        ------
-        PathError
-            If patches open and close without end.
-        """
-        for _ in range(MOST_OPENINGS):
-            least, cracks = self.openings.minimum(contact)
-            if least > 0:
-                return least, contact
-            opened = self.openings.insert_seeds(contact, cracks)
-            self.solver.solve(opened, self.relaxation.tight)
-            relaxed = self.relaxation.relax(opened)
-            assert relaxed is not None
-            if (relaxed.mask == contact.mask).all():
-                self.openings.healed += largest_excess(cracks)
-                continue
-            before = state_of(self.lattice, contact)
-            self.states.append(before)
-            self._jump(before, opened, relaxed, self.openings.barrier(cracks))
-            contact = relaxed
-        raise PathError(
-            f"method 'grid' finds no state at a mean gap of {contact.separation:.6g} m: patches "
-            "open and close in turn; the method 'sharp', or other nodes, may"
-        )
 
     def _substep(
         self, contact: Contact, target: float, divisible: bool
@@ -328,13 +284,8 @@ class Steps:
         self.reached = contact.prescribed
         return state
 
-    def _jump(
-        self, before: ContactState, start: Contact, after: Contact, barrier: float = 0.0
-    ) -> None:
-        """Append the jump to ``after``, the minimum reached by descent from ``start``.
-
-        ``barrier`` in J/m² is that of an opening.
-        """
+    def _jump(self, before: ContactState, start: Contact, after: Contact) -> None:
+        """Append the jump to ``after``, the minimum reached by descent from ``start``."""
         other = self._alternative(start, after)
         lost = self.lattice.control.is_load and not after.mask.any()
         if lost:
@@ -345,7 +296,7 @@ class Steps:
             at_stake = abs(self.energy(other) - self.energy(after)) / self.period
         jump = Jump.between(
             before, end, self.branch, self.period, raced=other is not None, at_stake=at_stake,
-            barrier=barrier, falls_off=lost,
+            falls_off=lost,
         )  # fmt: skip
         self.error += self.coarse * abs(jump.energy_drop)
         self.jumps.append(jump)

@@ -498,8 +498,8 @@ void bind_response(nb::module_& m) {
 
 void bind_nucleation(nb::module_& m) {
   nb::class_<SearchLengths>(m, "SearchLengths", "Lengths of a search for touches, in 1/q0.")
-      .def(nb::init<double, double, double, double, double>(), nb::kw_only(), "wave"_a,
-           "closing_per_motion"_a, "surface"_a, "narrowest"_a, "widest"_a)
+      .def(nb::init<double, double, double, double, double, double>(), nb::kw_only(), "wave"_a,
+           "closing_per_motion"_a, "surface"_a, "narrowest"_a, "widest"_a, "range"_a)
       .def(
           "seed_widths",
           [](const SearchLengths& lengths, Vector curvature) {
@@ -511,11 +511,11 @@ void bind_nucleation(nb::module_& m) {
           "clearances",
           [](const SearchLengths& lengths, Vector opening, const Vector& curvature) {
             for (size_t i = 0; i < opening.size(); ++i)
-              opening[i] = clearance_of(opening[i], curvature[i], lengths);
+              opening[i] = clearance_of({0, opening[i], curvature[i], infinity, 0}, lengths);
             return opening;
           },
           "opening"_a, "curvature"_a,
-          "Compute the opening left at minima before a seed is put; not positive at a touch.");
+          "Compute the clearances of minima that lie far from all edges.");
   nb::class_<Searched>(m, "SearchedGaps",
                        "Gaps as they were when they were last searched; a copy has none.")
       .def(nb::init<>())
@@ -525,16 +525,19 @@ void bind_nucleation(nb::module_& m) {
       "search",
       [](const Field& field, const Searched& searched, const SearchLengths& lengths) {
         Search found = search(field, searched.gaps, lengths);
+        Vector clearance;
+        for (const Minimum& one : found.minima) clearance.push_back(clearance_of(one, lengths));
         return std::tuple(
             found.least, found.count,
             std::tuple(each(found.minima, &Minimum::theta), each(found.minima, &Minimum::opening),
-                       each(found.minima, &Minimum::curvature)),
+                       each(found.minima, &Minimum::curvature), each(found.minima, &Minimum::rim),
+                       std::move(clearance)),
             Searched{std::move(found.searched)});
       },
       "field"_a, "searched"_a, "lengths"_a, Unlocked(),
-      "Find the least clearance of a field, searching only gaps that may have closed.\n\n"
-      "Also returns the number of these gaps, their minima (positions, openings and curvatures), "
-      "and the updated searched gaps.");
+      "Find the minima of the gaps of a field that may have closed.\n\n"
+      "Returns the least clearance of the other gaps, the number of these, their minima "
+      "(positions, openings, curvatures, rims and clearances), and the updated searched gaps.");
   m.def(
       "clearance_left",
       [](const Field& field, const Searched& searched, const SearchLengths& lengths) {
@@ -544,8 +547,8 @@ void bind_nucleation(nb::module_& m) {
   m.def(
       "least_clearances",
       [](const Field& field, const Integers& gaps, const SearchLengths& lengths) {
-        const Vector least =
-            least_clearances(find_minima(field, gaps), field.nodes.gap_count(), lengths);
+        const Vector least = least_clearances(find_minima(field, gaps, lengths.range),
+                                              field.nodes.gap_count(), lengths);
         Vector out;
         for (int k : gaps) out.push_back(least[k]);
         return out;

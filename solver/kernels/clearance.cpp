@@ -43,8 +43,9 @@ double clearance_since(const Field& field, int k, const SearchedGap& was,
     // a minimum may appear at any node, but hardly beside the ends
     if (std::min(here - gap.end[0], gap.end[1] - here) > within) {
       none_inside = false;
-      const double rest = expected - std::max(closing, 0.0) - by_edges;
-      if (!(rest > CLEARANCE_LEFT * expected)) return -1;
+      const double room = expected > lengths.range ? expected - lengths.range : expected;
+      const double rest = room - std::max(closing, 0.0) - by_edges;
+      if (!(rest > CLEARANCE_LEFT * room)) return -1;
     } else if (opening[i] < 0 && 0 <= expected) {
       return -1;
     }
@@ -86,19 +87,21 @@ double seed_width(double curvature, const SearchLengths& lengths) {
   return std::min(std::max(0.5 * first, lengths.narrowest), lengths.widest);
 }
 
-double clearance_of(double opening, double curvature, const SearchLengths& lengths) {
-  const double width = seed_width(curvature, lengths);
+double clearance_of(const Minimum& minimum, const SearchLengths& lengths) {
+  const double width = seed_width(minimum.curvature, lengths);
+  if (lengths.range > 0 && minimum.opening < lengths.range && minimum.rim <= lengths.range)
+    return std::min(minimum.opening, lengths.range - minimum.rim);
   // Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which the
   // surface follows it, 10 to 20 here.
-  return width <= lengths.narrowest ? opening + 4 * curvature * width * width : opening;
+  const double overlap = width <= lengths.narrowest ? 4 * minimum.curvature * width * width : 0;
+  return minimum.opening - lengths.range + overlap;
 }
 
 Vector least_clearances(const std::vector<Minimum>& minima, int gaps,
                         const SearchLengths& lengths) {
   Vector out(gaps, infinity);
   for (const Minimum& minimum : minima)
-    out[minimum.gap] =
-        std::min(out[minimum.gap], clearance_of(minimum.opening, minimum.curvature, lengths));
+    out[minimum.gap] = std::min(out[minimum.gap], clearance_of(minimum, lengths));
   return out;
 }
 
@@ -108,10 +111,14 @@ Search search(const Field& field, const SearchedGaps& searched, const SearchLeng
   RemainingClearance left = clearance_left(field, searched, lengths);
   Search out;
   out.count = int(left.to_search.size());
-  out.minima = find_minima(field, left.to_search);
-  const Vector found = least_clearances(out.minima, count, lengths);
-  for (int k : left.to_search) left.clearance[k] = found[k];
-  out.least = *std::min_element(left.clearance.begin(), left.clearance.end());
+  out.minima = find_minima(field, left.to_search, lengths.range);
+  Vector found = least_clearances(out.minima, count, lengths);
+  out.least = infinity;
+  for (int k = 0; k < count; ++k)
+    if (left.before[k] >= 0) out.least = std::min(out.least, left.clearance[k]);
+  // where surfaces attract each other already, more than the closing of a gap decides
+  for (const Minimum& minimum : out.minima)
+    if (minimum.opening < lengths.range) found[minimum.gap] = std::min(found[minimum.gap], 0.0);
   for (int k = 0; k < count; ++k) {
     if (left.before[k] >= 0) {
       out.searched.push_back(searched[left.before[k]]);
@@ -121,7 +128,7 @@ Search search(const Field& field, const SearchedGaps& searched, const SearchLeng
     const auto first = nodes.theta.begin() + nodes.offset[k];
     out.searched.push_back(std::make_shared<SearchedGap>(
         SearchedGap{nodes.gaps[k].end, nodes.orders[k], Vector(first, first + rule.count),
-                    low_openings(field, k, rule), left.clearance[k]}));
+                    low_openings(field, k, rule), found[k]}));
   }
   return out;
 }

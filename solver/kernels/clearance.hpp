@@ -9,6 +9,10 @@
 // A gap is searched again when a good part of its clearance can be gone, or of its opening at any
 // node: a minimum may appear there, whatever others there are. Beside the ends of a gap openings
 // are small in any case; there it is searched again when one is negative.
+//
+// Where surfaces attract each other from a range on, a clearance is the opening less the range. A
+// gap with a minimum within the range is always searched again: whether a patch grows there
+// depends on more than its opening.
 #pragma once
 
 #include <memory>
@@ -23,6 +27,7 @@ struct SearchLengths {
   double closing_per_motion;  // closing beside an edge over the motion of the edge
   double surface;             // Γ
   double narrowest, widest;   // of a seed
+  double range;               // gap from which on surfaces attract each other
 };
 
 // A gap as it was when it was last searched; its clearance is infinite where there is no minimum.
@@ -44,20 +49,21 @@ struct RemainingClearance {
 RemainingClearance clearance_left(const Field& field, const SearchedGaps& searched,
                                   const SearchLengths& lengths);
 
-// Opening left at a minimum before a seed is put; not positive at a touch.
-double clearance_of(double opening, double curvature, const SearchLengths& lengths);
+// Opening left at a minimum before a seed is put; not positive at a touch. A minimum in the range
+// of an edge touches at zero, or from where the surfaces between it and the edge part on.
+double clearance_of(const Minimum& minimum, const SearchLengths& lengths);
 
 // Width of the seed at a touch with this curvature, of surfaces with energy Γ.
 double seed_width(double curvature, const SearchLengths& lengths);
 
 struct Search {
-  double least;  // clearance of the field
+  double least;  // clearance left in the gaps that were not searched
   int count;     // of gaps that were searched
   std::vector<Minimum> minima;
   SearchedGaps searched;
 };
 
-// Find the least clearance of a field, searching only gaps that may have closed.
+// Find the minima of a field, searching only gaps that may have closed.
 Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths);
 
 // Find the least clearance at these minima in each of so many gaps, infinite where there is none.

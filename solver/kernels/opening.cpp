@@ -152,16 +152,22 @@ double work_of_gaps(const Field& field) {
          dot(field.equations.load.data(), field.scaled_opening.data(), nodes.size());
 }
 
-std::vector<Minimum> find_minima(const Field& field, const Integers& gaps) {
+std::vector<Minimum> find_minima(const Field& field, const Integers& gaps, double range) {
   const int top = field.model.panels->top;
   std::vector<Minimum> out;
   for (int k : gaps) {
     const Gap& gap = field.nodes.gaps[k];
     const int count = count_sine_nodes(gap, field.nodes.size_of(k), top, SHAPE_NODES);
     const FineOpening fine = open_gap(field, k, *circle_of(count + 1));
+    const auto begin = fine.opening.begin(), end = fine.opening.end();
     for (Candidate minimum : local_minima(fine.theta, fine.opening)) {
-      if (minimum.opening < MINIMUM_DOUBT * minimum.error) refine(gap, fine.modes, minimum);
-      out.push_back({minimum.theta, minimum.opening, 2 * minimum.half, k});
+      if (minimum.opening < range + MINIMUM_DOUBT * minimum.error) refine(gap, fine.modes, minimum);
+      const auto place =
+          std::lower_bound(fine.theta.begin(), fine.theta.end(), minimum.theta, std::greater<>());
+      const auto split =
+          begin + std::clamp<std::ptrdiff_t>(place - fine.theta.begin(), 1, count - 1);
+      const double rim = std::min(*std::max_element(begin, split), *std::max_element(split, end));
+      out.push_back({minimum.theta, minimum.opening, 2 * minimum.half, rim, k});
     }
   }
   return out;

@@ -46,12 +46,14 @@ struct Candidate {
 // through a fourth node on either side.
 std::vector<Candidate> local_minima(const Vector& x, const Vector& y);
 
+// `rim` is the opening up to which the surfaces part at least on the way to either end of the gap.
 struct Minimum {
-  double theta, opening, curvature;
+  double theta, opening, curvature, rim;
   int gap;
 };
 
-// Find the minima of some gaps.
-std::vector<Minimum> find_minima(const Field& field, const Integers& gaps);
+// Find the minima of some gaps; the lower ones of surfaces that attract each other from a `range`
+// on are located more finely.
+std::vector<Minimum> find_minima(const Field& field, const Integers& gaps, double range);
 
 }  // namespace adhesis

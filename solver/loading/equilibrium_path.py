@@ -198,8 +198,11 @@ class EquilibriumPath(ByValue, ResultViews):
     def touch_range(self) -> float:
         """Range of adhesion in m that changes the loss by a hundredth by earlier touches.
 
-        Infinite if no jump is a touch (docs/zero-range.md).
+        Infinite if no jump is a touch, and at a finite range, in which touches come earlier
+        (docs/zero-range.md).
         """
+        if math.isfinite(self.problem.strength):
+            return math.inf
         stress = touch_stress(
             self.jumps, self.states_before_jumps(), self.separation, self.mean_stress,
             self.patches, self.problem.control,
@@ -311,17 +314,18 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""
         interior = self.interior
         strength = self.problem.strength
-        outside = (
-            f"at edges: {1e9 * self.edge_range:.3g} nm; at touches: {1e9 * self.touch_range:.3g} nm"
-        )
+        outside = f"at edges: {1e9 * self.edge_range:.3g} nm"
+        if math.isfinite(self.touch_range):
+            outside += f"; at touches: {1e9 * self.touch_range:.3g} nm"
         if math.isfinite(self.turn_range):
             outside += f"; beyond the turn: {1e9 * self.turn_range:.3g} nm"
         if math.isfinite(strength):
             range_ = self.problem.work_of_adhesion / strength
             largest = 0.0 if interior is None else interior.tension
             return (
-                f"adhesion of a range of {range_:.3g} m: patches open from inside at "
-                f"{strength:.3g} Pa, {counted(self.openings, 'opening')} with barriers of "
+                f"adhesion of a range of {range_:.3g} m: surfaces jump together from there on, and "
+                f"patches open from inside at {strength:.3g} Pa, "
+                f"{counted(self.openings, 'opening')} with barriers of "
                 f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; "
                 f"{outside}"
             )

@@ -156,7 +156,7 @@ class Record:
         self.jumps: list[Jump] = []
         self.error = 0.0
         self.leg, self.drive = -1, 0.0
-        self.state = method.detached(method.problem.profile.h_max)
+        self.state = method.detached(method.problem.first_touch)
 
     def begin(self, branch: Branch) -> None:
         """Begin a leg: the state at the turning point belongs to both."""

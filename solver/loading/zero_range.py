@@ -24,6 +24,8 @@ the loss in all at
 
 the sum over the jumps in which a patch appears or a gap closes.
 
+A loop of a finite range has earlier touches in it, and its ``touch_range`` is infinite.
+
 So does a jump of loading that lies just beyond the turning point: it comes before it, and the loop
 is that of a deeper one. Within
 
@@ -386,8 +388,9 @@ def range_warnings(
 ) -> list[str]:
     """Return warnings if a loss is that of the zero-range limit alone.
 
-    At a finite strength patches open from inside; doubtful is then a tension that exceeds it where
-    no crack grows, and a range of adhesion that edges, touches or turns do not allow. ``range_`` is
+    At a finite strength patches open from inside, and touches come earlier; doubtful is then a
+    tension that exceeds it where no crack grows, and a range of adhesion that edges or turns do not
+    allow. ``range_`` is
     ``valid_range``.
     """
     out: list[str] = []

@@ -83,7 +83,7 @@ def strength_of(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Problem(ByValue):
-    """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
+    """A rigid periodic profile pressed into an elastic half-space with adhesion.
 
     Immutable; two problems are equal if all parts are.
 
@@ -97,10 +97,11 @@ class Problem(ByValue):
     control : Control
         Prescribed quantity; the separation by default.
     strength : float
-        σ_th in Pa: where the tension inside a patch reaches it, the patch opens from inside.
-        Infinite by default, that of adhesion of zero range (docs/zero-range.md).
+        σ_th in Pa: where the tension inside a patch reaches it, the patch opens from inside, and
+        surfaces touch at a gap of δ = γ/σ_th. Infinite by default, that of adhesion of zero range
+        (docs/zero-range.md).
     adhesion_range : float, optional
-        Instead of the strength, the range δ of adhesion in m: σ_th = γ/δ.
+        Instead of the strength, the range δ of adhesion in m.
     work_of_adhesion_open : float, optional
         Work of adhesion in J/m² where an edge recedes, at least γ, which then holds where it
         advances; between both it is pinned. None stands for γ.
@@ -257,6 +258,16 @@ class Problem(ByValue):
         Under a uniform tension σ_th a longer gap inside a patch grows, a shorter one closes.
         """
         return griffith_length(self.strength, self.half_space.modulus, self.work_of_adhesion)
+
+    @property
+    def attraction_range(self) -> float:
+        """Range of adhesion γ/σ_th in m; 0 where the strength is infinite."""
+        return self.work_of_adhesion / self.strength
+
+    @property
+    def first_touch(self) -> float:
+        """Separation in m at which a solid that approaches is attracted: h_max and the range."""
+        return self.profile.h_max + self.attraction_range
 
     @property
     def stress_scale(self) -> float:

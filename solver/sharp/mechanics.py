@@ -78,6 +78,15 @@ class EdgeMechanics(EdgeProblem):
             lambda: self.solution(gaps, prescribed), nearly,
         )  # fmt: skip
 
+    def release(self, gaps: Array, prescribed: float, theta: float, half: float) -> Array:
+        """Compute G/γ at the two edges next to θ ± ``half``, all edges being held."""
+        ends = gaps.ravel()
+        apart = (ends - theta - half * np.array([[-1.0], [1.0]]) + np.pi) % (2 * np.pi) - np.pi
+        nearest = np.abs(apart).argmin(axis=1)
+        opening = self.field(gaps, prescribed).opening.ravel()[nearest]
+        work = np.array([self.adhesion.work(end, False)[0] for end in ends[nearest]])
+        return np.asarray(np.maximum(opening, 0.0) ** 2 / (self.critical**2 * work))
+
     def response_before_fold(self, point: Point) -> FixedEdgeResponse:
         """Return the response at a point next to a fold, the edges held."""
         return respond_at_fixed_edges(self._solve_finer(point))

@@ -249,7 +249,7 @@ class SharpMethod(Method):
         at = self.states.prescribed_of(state)
         point = self.follower.recall_point(state.internal)
         if not state.patches:
-            touch, highest = self.nucleation.first_touch()
+            touch, highest = self.jumps.first_touch()
             first = 0.0 if control.is_load else touch
             if target.branch == "unloading" or target.at > first:
                 apart = self.problem.detached_separation(state, target.prescribed)
@@ -276,7 +276,7 @@ class SharpMethod(Method):
         while point is not None and at != target.at:
             at, point = self.follower.run(history, point, target)
         if point is None and at != target.at and not control.is_load:
-            if self.edges.critical > 0 and self.states.overlaps_when_detached(min(at, target.at)):
+            if self.edges.critical > 0 and self.states.attracts_when_detached(min(at, target.at)):
                 raise NoState("contact is lost where surfaces overlap", at)
             history.states.append(self.detached(target.prescribed))
         return history

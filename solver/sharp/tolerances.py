@@ -55,6 +55,8 @@ CLOSING_BY_MOTION = 4.0
 """The motion of one gap's edges counts so many times where it may close others, of many gaps."""
 OVERLAP = 1e-6
 """h_max. Smaller overlaps may remain in a state."""
+TRIAL_WIDTHS = 1.25
+"""Ratio of the widths of seeds that are tried one after the other, where surfaces attract."""
 BISECTION_AFTER = 3
 """Trials that find no overlap, one after the other, or of all where many gaps are interpolated, one
 by one: then one is a bisection."""

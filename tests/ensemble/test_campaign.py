@@ -453,7 +453,7 @@ INTERFACES: list[tuple[str, str, list[object]]] = [
 @pytest.mark.parametrize(("keys", "name", "found"), INTERFACES)
 def test_keys_of_the_interface_reach_every_task_and_may_be_axes(keys, name, found):
     text = campaign_text(work_of_adhesion="[0.04]", hurst="[0.8]", realisations="1")
-    if found != [None] and name == "work_of_adhesion_open":  # which the grid refuses
+    if found not in ([None], [math.inf]) and name != "pattern":  # which the grid refuses
         text = text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
     campaign = parse_campaign(text.replace("poisson = 0.5", f"poisson = 0.5\n{keys}"))
     assert [getattr(make_problem(campaign, task), name) for task in campaign.tasks()] == found
@@ -472,8 +472,14 @@ def test_keys_of_the_interface_reach_every_task_and_may_be_axes(keys, name, foun
 )
 def test_stripes_that_cannot_be_are_refused_by_file_and_command(keys, message, capsys):
     text = campaign_text(work_of_adhesion="[0.04]", poisson=f"0.5\n{keys}")
+    text = text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
     with pytest.raises(InputError, match=message):
         check_task(campaign := parse_campaign(text), campaign.tasks()[0])
     words = [f"--{key}".replace(" = ", "=").replace("_", "-") for key in keys.splitlines()]
     assert main(["loop", "--hurst", "0.8", "--n0", "2", "--ratio", "4", *words]) == 2
     assert re.search(message, capsys.readouterr().err)
+
+
+def test_a_range_of_adhesion_beside_the_method_grid_is_refused():
+    with pytest.raises(InputError, match=r"\[solver\] method is 'grid' beside a range or strength"):
+        parse_campaign(campaign_text(poisson="0.5\nstrength = 3e6"))

@@ -1,13 +1,32 @@
-"""The judge of benchmarks/finite_range.py, beside exact loops of one wave under Dugdale's law."""
+"""Adhesion of a finite range: loops of ``sharp``, and the judge of benchmarks/finite_range.py."""
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
+from scipy.optimize import brentq, minimize_scalar
 
+from adhesis import (
+    Control,
+    HalfSpace,
+    LoopResult,
+    Problem,
+    make_method,
+    run_loop,
+    run_path,
+    self_affine_profile,
+    single_wave,
+)
+from adhesis.solver.model.profile import Array
 from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.nucleation.nucleation import Touch
 from benchmarks.finite_range import GridLoop
+from tests.support.explicit_solution import explicit_openings
 
 WAVE = SingleWave(1.0, 2 * np.pi, 1.0, 0.09 * np.pi / 4)  # α = 0.3; lengths in 1/q0, E* = 1
 
@@ -25,3 +44,195 @@ def test_the_loss_of_a_wave_is_that_of_dugdales_law():
     exact = DugdaleWave(WAVE, 0.03).loss
     assert loss_on_grid(0.03, 4.0) == pytest.approx(exact, rel=0.015)
     assert WAVE.loop.loss > 1.05 * exact
+
+
+# ---------------------------------------------------------------------- loops of sharp at a range
+
+A, PERIOD, SOLID = 1e-6, 1e-3, HalfSpace(1e6, 0.0)
+GAMMA = 0.04
+
+
+def wave_of(alpha: float) -> SingleWave:
+    gamma = 0.5 * (alpha * np.pi * A / PERIOD) ** 2 * SOLID.modulus * PERIOD
+    return SingleWave(A, PERIOD, SOLID.modulus, gamma)
+
+
+def loop_at(
+    alpha: float, share: float, control: Control | None = None, turn: float = 0.7
+) -> LoopResult:
+    """Loop of a wave at a range of this share of its amplitude, or at zero range."""
+    control = control or Control()
+    problem = Problem(
+        single_wave(A, PERIOD), SOLID, wave_of(alpha).work_of_adhesion, control,
+        adhesion_range=share * A or None, measure="flat",
+    )  # fmt: skip
+    turning = {"max_stress": 500.0} if control.is_load else {"max_penetration": turn}
+    return run_loop(make_method("sharp", problem, accuracy=1e-5), load_steps=10, **turning)
+
+
+@cache
+def rough_loop(range_: float | None, change: str = "none") -> LoopResult:
+    profile = self_affine_profile(0.7, period=2e-3, n0=3, ratio=5, seed=1, h_rms=1e-6)
+    profile = {
+        "none": profile, "mirror": profile.mirrored(), "shift": profile.shifted(0.3e-3),
+    }[change]  # fmt: skip
+    problem = Problem(profile, HalfSpace(1e8, 0.5), GAMMA, adhesion_range=range_)
+    method = make_method("sharp", problem, accuracy=1e-4)
+    return run_loop(method, max_penetration=0.6, load_steps=10)
+
+
+def touching_at(wave: SingleWave, range_: float, stiffness: float = np.inf) -> float:
+    """Loss if surfaces jump together at a gap of ``range_``, edges being those of zero range."""
+
+    def prescribed(a: float) -> float:
+        return float(wave.separation(a)) - float(wave.mean_stress(a)) / stiffness
+
+    most = 0.49 * wave.period if np.isinf(stiffness) else wave.stable_range(stiffness)[1]
+    fold = minimize_scalar(
+        lambda a: -prescribed(a), bounds=(1e-4 * most, most), method="bounded",
+        options={"xatol": 1e-10 * most},
+    )  # fmt: skip
+    touched = brentq(lambda a: prescribed(a) - wave.amplitude - range_, fold.x, most)
+    widths = np.linspace(fold.x, touched, 4001)
+    return float(np.trapezoid(wave.mean_stress(widths), [prescribed(a) for a in widths]))
+
+
+def minima(theta: Array, opening: Array) -> list[float]:
+    """Local minima by parabolas through three nodes."""
+    inner = np.flatnonzero((opening[1:-1] < opening[:-2]) & (opening[1:-1] < opening[2:])) + 1
+    out = []
+    for k in inner:
+        near = slice(k - 1, k + 2)
+        c, b, a = np.polynomial.Polynomial.fit(theta[near], opening[near], 2).convert().coef
+        out.append(float(c - b * b / (4 * a)))
+    return out
+
+
+# Shares of edge_range, which is 0.042, 0.160 and 0.292 A: at half of it the smeared edges make
+# half a hundredth of the loss of zero range, at a quarter less than a thousandth.
+@pytest.mark.parametrize(
+    ("alpha", "share", "off"),
+    [
+        (0.1, 0.01, 3e-4),
+        (0.1, 0.02, 5e-3),
+        (0.3, 0.01, 1e-5),
+        (0.3, 0.05, 6e-4),
+        (0.3, 0.1, 8e-3),
+        (0.5, 0.01, 1e-5),
+        (0.5, 0.05, 1e-4),
+        (0.5, 0.1, 7e-4),
+        (0.5, 0.2, 1e-2),
+    ],
+)
+def test_a_wave_loses_what_dugdales_law_has_it_lose(alpha, share, off):
+    wave, loop = wave_of(alpha), loop_at(alpha, share)
+    exact = DugdaleWave(wave, share * A).loss
+    assert abs(loop.loss - exact) < off * wave.loop.loss
+    assert loop.loss == pytest.approx(touching_at(wave, share * A), rel=1e-5)
+    assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
+    assert loop.jumps[0].separation == pytest.approx((1 + share) * A, rel=1e-12)
+    assert loop.touch_range == np.inf
+
+
+@pytest.mark.parametrize("stiffness", [3e9, 5e8])
+def test_a_machine_pulls_surfaces_together_at_the_range_too(stiffness):
+    loop = loop_at(0.3, 0.1, Control(stiffness))
+    assert loop.loss == pytest.approx(touching_at(wave_of(0.3), 0.1 * A, stiffness), rel=2e-5)
+    assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
+
+
+def test_a_weight_loses_what_it_loses_without_a_range():
+    """It falls together from any distance at once, and no work is done on the way."""
+    ranged, without = (loop_at(0.3, share, Control(0.0)) for share in (0.1, 0.0))
+    assert ranged.jumps[0].separation == pytest.approx(1.1 * A, rel=1e-12)
+    assert abs(ranged.loss - without.loss) < ranged.loss_error + without.loss_error
+
+
+def test_surfaces_that_would_part_again_touch_from_nearer_by():
+    """The wave has contact up to s = 1.117 A, which has less energy than none up to 1.085 A."""
+    loop = loop_at(0.1, 0.098, turn=0.3)
+    wave = wave_of(0.1)
+    touch, *_ = loop.jumps
+    assert touch.separation < 1.09 * A
+    assert 0 <= touch.energy_drop < 1e-4 * wave.loop.loss
+    assert abs(float(wave.energy(wave.half_width(touch.separation)))) < 1e-9 * PERIOD
+    assert any("edge_range" in warning for warning in loop.warnings)
+
+
+def test_the_loss_falls_with_the_range_as_stress_changes_at_touches():
+    zero = rough_loop(None)
+    range_ = 0.05 * zero.touch_range
+    ranged = rough_loop(range_)
+    assert [jump.kind for jump in ranged.jumps] == [jump.kind for jump in zero.jumps]
+    touches = [k for k, jump in enumerate(zero.jumps) if jump.kind == "snap-in"]
+    assert len(touches) >= 3
+    change = np.diff(zero.mean_stress)[zero.states_before_jumps()]
+    sooner = [ranged.jumps[k].separation - zero.jumps[k].separation for k in touches]
+    assert min(sooner) > 0.5 * range_
+    expected = -float(np.dot(sooner, change[touches]))
+    assert zero.loss - ranged.loss == pytest.approx(expected, rel=0.02)
+
+
+def test_a_gap_is_as_wide_as_the_range_where_it_touches():
+    """By another solution of the field, in the state before each jump to a new patch."""
+    range_ = 2e-8
+    loop = rough_loop(range_)
+    profile = loop.problem.profile
+    touches = 0
+    for jump, k in zip(loop.jumps, loop.states_before_jumps(), strict=True):
+        state = loop.contact_states[k]
+        if jump.kind == "snap-in" and state.patches:
+            edges = state.edges * profile.q0
+            gaps = np.stack([edges[:, 1], np.append(edges[1:, 0], edges[0, 0] + 2 * np.pi)], axis=1)
+            both = explicit_openings(profile, gaps, state.separation * profile.q0, 600)
+            least = [minimum for gap in zip(*both, strict=True) for minimum in minima(*gap)]
+            assert min(abs(m / profile.q0 - range_) for m in least) < 1e-3 * range_
+            touches += 1
+    assert touches >= 2
+
+
+def test_energy_falls_in_every_jump_at_a_range():
+    loop = rough_loop(2e-8)
+    assert all(jump.energy_drop > -jump.barrier for jump in loop.jumps)
+    assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
+    assert loop.loss < rough_loop(None).loss
+
+
+def test_a_touch_that_does_not_hold_is_tried_again_from_nearer_by(monkeypatch):
+    reference, refused, has_gained = rough_loop(2e-8), [], Jumps.has_gained
+
+    def hold(self: Jumps, before: Point, after: Point | None, touches: list[Touch]) -> bool:
+        if not refused:
+            refused.append(before)
+            return False
+        return has_gained(self, before, after, touches)
+
+    monkeypatch.setattr(Jumps, "has_gained", hold)
+    loop = rough_loop.__wrapped__(2e-8)
+    assert [jump.kind for jump in loop.jumps] == [jump.kind for jump in reference.jumps]
+    later = [a.separation - b.separation for a, b in zip(reference.jumps, loop.jumps, strict=True)]
+    assert 0.003 < max(later) / 2e-8 < 0.02
+    assert sum(abs(way) > 1e-4 * 2e-8 for way in later) == 1
+    assert abs(loop.loss - reference.loss) < 1e-3 * reference.loss
+
+
+@pytest.mark.parametrize("change", ["mirror", "shift"])
+def test_touches_at_a_range_keep_the_symmetries_of_the_problem(change):
+    loop, reference = rough_loop(2e-8, change), rough_loop(2e-8)
+    assert [jump.kind for jump in loop.jumps] == [jump.kind for jump in reference.jumps]
+    assert abs(loop.loss - reference.loss) < loop.loss_error + reference.loss_error
+
+
+def test_a_minor_loop_inside_the_range_closes():
+    problem = loop_at(0.3, 0.05).problem
+    path = run_path(make_method("sharp", problem), [0.7, 0.1, 0.5], load_steps=10)
+    assert [loop.closes for loop in path.minor_loops] == [True]
+    assert path.work == pytest.approx(loop_at(0.3, 0.05).loss, rel=1e-4)
+
+
+def test_the_method_grid_refuses_a_range():
+    problem = loop_at(0.3, 0.05).problem
+    with pytest.raises(ValueError, match="method is 'grid' beside a range or strength"):
+        make_method("grid", problem)
+    with pytest.raises(ValueError, match="nodes_per_wave is 64 beside a range or strength"):
+        make_method("auto", problem, nodes_per_wave=64)

@@ -46,19 +46,17 @@ def rough(seed: int = 0, ratio: int = 8) -> Profile:
 
 
 @cache
-def rough_loop(
-    strength: float, name: str = "sharp", seed: int = 0
-) -> tuple[LoopResult, tuple[ContactState, ...]]:
-    return loop_of(rough(seed), strength, 0.04, name)
+def rough_loop(strength: float, seed: int = 0) -> tuple[LoopResult, tuple[ContactState, ...]]:
+    return loop_of(rough(seed), strength, 0.04)
 
 
 def loop_of(
-    profile: Profile, strength: float, gamma: float, name: str = "sharp", nodes: int = 64
+    profile: Profile, strength: float, gamma: float
 ) -> tuple[LoopResult, tuple[ContactState, ...]]:
     problem = Problem(profile, HalfSpace(1e9, 0.5), gamma, strength=strength)
     states: list[ContactState] = []
     loop = run_loop(
-        make_method(name, problem, nodes_per_wave=nodes if name == "grid" else None),
+        make_method("sharp", problem),
         max_penetration=0.9,
         load_steps=20,
         on_state=lambda branch, state: states.append(state),
@@ -74,17 +72,6 @@ def test_the_largest_excess_opens_first_with_what_equals_it():
     cracks = [Crack(float(i), 1 - value, value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
     assert [crack.position for crack in largest_excess(cracks)] == [1.0, 3.0]
     assert largest_excess(cracks[:1]) == []
-
-
-def test_grid_opens_a_closed_trough_there_too():
-    method = make_method("grid", troughs_problem())
-    loop = run_loop(method, max_penetration=0.99, load_steps=5)
-    exact = LastGap(TROUGHS, SOLID.modulus, GAMMA)
-    b = exact.half_length_at(STRENGTH, TROUGHS.period / 2, 5e-5, 2e-4)
-    first = next(jump for jump in loop.jumps if jump.kind == "opening")
-    assert first.separation == pytest.approx(exact.separation(b), rel=5e-3)
-    length = griffith_length(STRENGTH, SOLID.modulus, GAMMA)
-    assert first.barrier * TROUGHS.period == pytest.approx(GAMMA * length / 2, rel=0.1)
 
 
 def test_the_last_gap_between_flat_surfaces_is_koiters_crack():
@@ -106,16 +93,6 @@ def test_griffiths_crack_in_a_closed_trough_is_balanced():
         field = method.edges.field(gaps, exact.separation(b) * q0)
         found = imbalance(field.solution.opening, field.gaps, method.edges.law)
         assert np.sign(found[:2]).tolist() == [sign, sign]
-
-
-def test_a_strength_that_is_never_reached_changes_no_bit_of_grid():
-    gamma, profile = 0.04, rough(ratio=3)
-    zero_range, _ = loop_of(profile, math.inf, gamma, "grid", 16)
-    strong, _ = loop_of(profile, 1e12, gamma, "grid", 16)
-    for column in ("separation", "mean_stress", "contact_fraction", "energy"):
-        assert np.array_equal(getattr(zero_range, column), getattr(strong, column))
-    assert (zero_range.loss, zero_range.jumps) == (strong.loss, strong.jumps)
-    assert zero_range.openings == strong.openings == 0
 
 
 def test_a_strength_that_is_never_reached_only_refines_the_steps_of_sharp():
@@ -185,15 +162,6 @@ def test_work_and_energy_agree_between_openings():
     loop = run_loop(make_method("sharp", troughs_problem()), max_penetration=0.99, load_steps=5)
     assert loop.openings > 0
     assert abs(loop.audit_residual) < 1e-5
-
-
-def test_grid_and_sharp_agree():
-    profile = rough(1, 3)
-    sharp, _ = loop_of(profile, 3e6, 0.04)
-    grid, _ = loop_of(profile, 3e6, 0.04, "grid")
-    assert sharp.openings > 0
-    assert grid.openings == sharp.openings
-    assert abs(grid.loss - sharp.loss) < grid.loss_error + sharp.loss_error
 
 
 # ---------------------------------------------------------------------- the crack

@@ -11,10 +11,10 @@ refused (PathError) is counted.
     python tools/fuzz/loops.py --seed N [--scenes 2000] [--number K] [--strength | --many]
 
 With ``--many`` loops have 20 to 80 patches, and all are compared: half a minute each. With
-``--strength`` patches open from inside, at ranges of adhesion up to four decades above that which
-keeps them closed; then no state may have a place at the strength where a crack grows, and none may
-have a tension inside a patch that exceeds the strength by more than a hundredth, unless the loop's
-warnings state it.
+``--strength`` adhesion has a range: half of them up to four decades above that which keeps patches
+closed inside, the others up to ``edge_range``. Then no state may have a gap that should have
+touched, or a place at the strength where a crack grows, and none may have a tension inside a patch
+that exceeds the strength by more than a hundredth, unless the loop's warnings state it.
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ def opening_summary(found: list[dict[str, Any]]) -> str:
         f"{sum(f.get('healed', 0) for f in found)} cracks closed again; the tension inside patches "
         f"exceeds the strength by 1 % where no crack grows in {np.sum(excess > 1.01)} loops, by a "
         f"tenth in {np.sum(excess > 1.1)}, at most {excess.max():.2f} times; "
-        f"{sum(f.get('flagged', False) for f in found)} losses are doubtful for it"
+        f"{sum(f.get('flagged', False) for f in found)} losses are doubtful for it; "
+        f"{sum(f.get('not held', 0) for f in found)} touches did not hold at first"
     )
 
 
@@ -81,7 +82,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=np.inf)
     parser.add_argument("--scenes", type=int, default=2000, help="at most so many")
     parser.add_argument("--number", type=int, help="this scene alone")
-    parser.add_argument("--strength", action="store_true", help="patches open from inside")
+    parser.add_argument("--strength", action="store_true", help="adhesion of a finite range")
     parser.add_argument("--many", action="store_true", help="20 to 80 patches, all compared")
     args = parser.parse_args()
     if args.number is not None:

@@ -73,7 +73,7 @@ class Follower:
     def recall_point(self, memory: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
         self.nucleation.searched = SearchedGaps() if memory is None else memory.searched
-        self.openings.healed = []
+        self.openings.healed, self.nucleation.healed = [], []
         self._came_on = None if memory is None else memory.branch
         if memory is None or memory.branch_data is None:
             return None
@@ -178,8 +178,9 @@ class Follower:
             if apart > -self.resolution.order:  # else the fold comes first
                 beyond = fold.at if apart < self.resolution.order else None
                 touching = self._touch_jump(touched, beyond, target)
-                before = self.states.of_point(fold.point)
-                return replace(touching, states=(before, *touching.states))
+                if touching is not None:
+                    before = self.states.of_point(fold.point)
+                    return replace(touching, states=(before, *touching.states))
         last = history.states[-1] if history.states else None
         jump, refined = self._fold_jump(last, fold, target, branch.steps.finest)
         after = None if jump is None else jump.point
@@ -201,25 +202,28 @@ class Follower:
         trail = branch.trail
         if len(trail.points) == 1:
             return None
-        points = trail.points
-        touched, clearance = locate(
-            self.nucleation, self._between, points, self.resolution.jump, trail.clearance
-        )
-        trail.restart(clearance)
-        if self.openings.is_possible:
-            opened, _ = locate(self.openings, self._between, points, self.resolution.finest, 0.0)
-            start = points[0].at
+        points, start, clearance = trail.points, trail.points[0].at, trail.clearance
+        trail.restart(0.0)
+        fold, beyond = branch.fold_ahead
+        for _ in range(MOST_OPENINGS):
+            finest = self.resolution.finest
+            touched, least = locate(self.nucleation, self._between, points, finest, clearance)
+            opened = None
+            if self.openings.is_possible:
+                opened, _ = locate(self.openings, self._between, points, finest, 0.0)
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
             ):
                 jump = self._opening_jump(opened, target)
-                if jump is not None:
-                    return jump
-        if touched is None:
-            return None
-        fold, beyond = branch.fold_ahead
-        may_fold = abs(fold - touched.point.at) < self.resolution.order
-        return self._touch_jump(touched, beyond if may_fold else None, target)
+            elif touched is not None:
+                may_fold = abs(fold - touched.point.at) < self.resolution.order
+                jump = self._touch_jump(touched, beyond if may_fold else None, target)
+            else:
+                trail.restart(least)
+                return None
+            if jump is not None:
+                return jump
+        raise NoState("contact opens, or nucleates, and goes back in turn", points[-1].at)
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
@@ -261,17 +265,16 @@ class Follower:
         """Raise where patches open and close without end."""
         last = history.jumps[-MOST_OPENINGS:]
         here = jump.jump.separation
-        if len(last) == MOST_OPENINGS and all(
-            one.kind == "opening" and one.separation == here for one in last
-        ):
+        if len(last) == MOST_OPENINGS and all(one.separation == here for one in last):
             raise NoState("patches open and close in turn", jump.at)
 
     def _touch_jump(
         self, touched: Located[Touch], beyond: float | None, target: Target
-    ) -> ComputedJump:
+    ) -> ComputedJump | None:
         """Compute the jump from the point of a branch at which surfaces touch inside a gap.
 
-        A fold that may as well come first has come ``beyond`` that d.
+        None if the patches do not hold. A fold that may as well come first has come ``beyond`` that
+        d.
         """
         point = touched.point
         before = self.states.of_point(point)
@@ -279,6 +282,9 @@ class Follower:
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,
             orders=None if beyond is None else Orders(beyond, (point.field.gaps,)),
         )  # fmt: skip
+        gained = self.jumps.has_gained(point, jump.point, touched.seeds)
+        if not gained and self.nucleation.heal(touched.seeds):
+            return None
         late = self.states.work(before, jump.states[-1], touched.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 

@@ -109,6 +109,38 @@ class Jumps:
         self.mirror = MirrorCheck(edges, problem.profile.q0 * problem.mirror_axes)
         # Under a load edges help each other: in which order they run decides nothing.
         self._may_race = edges.critical > 0 and not edges.is_load
+        self._first: tuple[float, list[Touch]] | None = None
+
+    def first_touch(self) -> tuple[float, list[Touch]]:
+        """Find the separation q0 s at which a solid that approaches touches, and the touches.
+
+        The highest crest is then as far away as adhesion reaches; or nearer, where no patch grows
+        there or the one that does comes to rest with more energy than no contact has.
+        """
+        if self._first is None:
+            nucleation = self.nucleation
+            self._first = nucleation.first_touch()
+            low, high = 0.0, nucleation.range
+            trial = high
+            while high - low > nucleation.tolerance:
+                touch = nucleation.first_touch(trial)
+                if self._holds(*touch):
+                    low, self._first = trial, touch
+                else:
+                    high = trial
+                trial = 0.5 * (low + high)
+        return self._first
+
+    def _holds(self, separation: float, touches: list[Touch]) -> bool:
+        """Return whether the patches at first touches come to rest with less energy than none."""
+        if not touches:
+            return False
+        at = 0.0 if self.edges.is_load else separation
+        try:
+            point, _ = self._relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), at)
+        except FullContact:
+            return True
+        return point is not None and self.states.of_point(point).potential < 0
 
     def compute(
         self,
@@ -218,21 +250,37 @@ class Jumps:
         adhesive = self.edges.critical > 0
         for _ in range(ENDLESS):
             if point is None:
-                if not (adhesive and self.states.overlaps_when_detached(at)):
+                touch, touches = self.first_touch()
+                if not (adhesive and self.states.attracts_when_detached(at, touch)):
                     return None
-                _, touches = self.nucleation.first_touch()
                 point = descend(np.empty((0, 2)), touches)
+                if point is None and not self.states.attracts_when_detached(at):
+                    return None
                 continue
             least, minima = self.nucleation.minimum(point.field)
             if least > 0:
                 return point.with_clearance(least)
-            grown = descend(point.field.gaps, self.nucleation.choose_seeds(minima))
-            if grown is not None and self.is_same(grown.field.gaps, point.field.gaps):
+            seeds = self.nucleation.choose_seeds(minima)
+            grown = descend(point.field.gaps, seeds)
+            if self.has_gained(point, grown, seeds):
+                point = grown
+            elif not self.nucleation.heal(seeds):
                 if adhesive and least < -self.nucleation.tolerance:
                     break
                 return point
-            point = grown
         raise NoState("surfaces overlap, and no patch comes to rest there", at)
+
+    def has_gained(self, before: Point, after: Point | None, touches: list[Touch]) -> bool:
+        """Return whether touches led to another state, with less energy where that is needed.
+
+        Contact that nucleates in an open gap may come to rest with more, which no jump has.
+        """
+        if after is None:
+            return True
+        if self.nucleation.range > 0 and touches[0].opening > 0:
+            both = (self.states.of_point(point).potential for point in (before, after))
+            return not next(both) <= next(both)
+        return not self.is_same(after.field.gaps, before.field.gaps)
 
     def _is_same_minimum(self, one: Point | None, other: Point | None) -> bool:
         """Whether two descents led to one minimum."""

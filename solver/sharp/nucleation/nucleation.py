@@ -1,14 +1,21 @@
 """Locate contact that nucleates inside gaps, and insert seed patches.
 
-Contact nucleates only where the opening has closed to zero. With adhesion a touching point grows at
+Contact nucleates where the opening has closed to zero. With adhesion a touching point grows at
 once, along a path on which the energy only falls, to its first equilibrium; on the parabola κx²/2
 that is (16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width is put
 at the touching point; the descent does the rest. Without adhesion a patch has no width at first
 touch: its seed is put when the overlap is large enough for the narrowest patch that is followed.
+
+Surfaces of a finite range of adhesion δ jump together from there on. In a minimum in which the
+opening has closed to δ, and which is not in the range of an edge already, a seed is put that grows:
+G stays below γ by a tenth at both edges. With edges of zero range the energy rises up to some
+width, so that another width may be needed; where none grows, the opening goes on closing until one
+does, at the latest at zero. What such a touch leads to must have less energy than the state before.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,6 +28,13 @@ from adhesis.solver._kernels import (
     least_clearances,
     search,
 )
+from adhesis.solver.crack import (
+    GROWTH,
+    HEALED_PLACE,
+    IN_PATCH,
+    LONGEST_TRIAL_HALF_LENGTH,
+    has_healed,
+)
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
 from adhesis.solver.sharp.equilibrium.branch_point import Point
@@ -29,24 +43,28 @@ from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation
-from adhesis.solver.sharp.tolerances import OVERLAP
+from adhesis.solver.sharp.tolerances import OVERLAP, TRIAL_WIDTHS
 
 
 @dataclass(frozen=True)
 class Touch:
-    """Local minimum of an opening: position, value and curvature κ, in units of 1/q0."""
+    """Local minimum of an opening: position, value, and width of its seed, in units of 1/q0."""
 
     theta: float
     opening: float
-    curvature: float
+    width: float
 
 
 class Minima(NamedTuple):
-    """Local minima of the openings of some gaps, as in :class:`Touch`, shape (minima,) each."""
+    """Local minima of the openings of some gaps, as in :class:`Touch`, shape (minima,) each.
+
+    A clearance is what is left before a seed is put.
+    """
 
     theta: Array
     opening: Array
-    curvature: Array
+    width: Array
+    clearance: Array
 
 
 class Nucleation:
@@ -61,42 +79,58 @@ class Nucleation:
         Touches whose clearances differ by less are equal, in units of 1/q0.
     tolerance : float
         Overlap that is allowed in a state, in units of 1/q0.
+    range : float
+        Of adhesion, in units of 1/q0.
+    healed : list of (position, 1/opening)
+        Touches whose patches did not hold: none is tried there unless the opening is smaller.
+    heals : int
+        Number of touches that did not hold, so far.
     """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
         self.searched = SearchedGaps()
+        self.range = problem.attraction_range * problem.profile.q0
+        self.healed: list[tuple[float, float]] = []
+        self.heals = 0
+        self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
             closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=edges.surface,
-            narrowest=float(3 * edges.smallest),
+            narrowest=self._narrowest,
             widest=float(edges.longest_step),
+            range=self.range,
         )
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
         self.tolerance = OVERLAP * problem.profile.h_max * problem.profile.q0
 
-    def first_touch(self) -> tuple[float, list[Touch]]:
+    def first_touch(self, opening: float = 0.0) -> tuple[float, list[Touch]]:
         """Return the separation q0 s at which the first seeds are put, and the touches.
 
-        These are at the highest crest (:meth:`Profile.first_of_equal`).
+        These are at the highest crest (:meth:`Profile.first_of_equal`), in units of 1/q0 at an
+        ``opening`` within the range; there are none where no patch grows there.
         """
         profile = self.problem.profile
         crests = profile.crests()
         chosen = self._choose(crests.position)
         curvature = crests.curvature[chosen] / profile.q0
         theta = crests.position[chosen] * profile.q0
-        highest = [Touch(float(a), 0.0, float(c)) for a, c in zip(theta, curvature, strict=True)]
-        overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
-        return profile.h_max * profile.q0 - overlap, highest
-
-    def clearance(self, opening: Array, curvature: Array) -> Array:
-        """Compute the opening left at minima before a seed is put; not positive at a touch."""
-        return self._lengths.clearances(opening, curvature)
+        widths = self._lengths.seed_widths(curvature)
+        clearance = self._lengths.clearances(np.full(len(theta), self.range), curvature)
+        separation = profile.h_max * profile.q0 - float(clearance.max()) + opening
+        if opening > 0:
+            at = 0.0 if self.edges.is_load else separation
+            left, width = self._judge(np.empty((0, 2)), at, theta, opening, float(widths[0]))
+            if left > 0:
+                return separation, []
+            widths = np.full(len(theta), width)
+        touches = [Touch(float(a), opening, float(w)) for a, w in zip(theta, widths, strict=True)]
+        return separation, touches
 
     def choose_seeds(self, minima: Minima) -> list[Touch]:
         """Choose the touch of the largest overlap; of equal ones, one and its copies."""
-        over = self.clearance(minima.opening, minima.curvature)
+        over = minima.clearance
         least = float(over.min(initial=np.inf))
         if least > 0:
             return []
@@ -105,7 +139,7 @@ class Nucleation:
         deepest = np.flatnonzero(over <= min(least + equal, 0.0))
         deepest = deepest[self._choose(minima.theta[deepest] / self.problem.profile.q0)]
         return [
-            Touch(float(minima.theta[i]), float(minima.opening[i]), float(minima.curvature[i]))
+            Touch(float(minima.theta[i]), float(minima.opening[i]), float(minima.width[i]))
             for i in deepest
         ]
 
@@ -123,15 +157,54 @@ class Nucleation:
         """
         least, count, found, self.searched = search(field.solution, self.searched, self._lengths)
         self.edges.count.openings += count
-        return least, Minima(*found)
+        theta, opening, curvature, rim, clearance = found
+        widths = self._lengths.seed_widths(curvature)
+        near = HEALED_PLACE * self.edges.wave
+        for i in np.flatnonzero((opening > 0) & (clearance <= 0) & (rim > self.range)):
+            if has_healed(theta[i], 1 / opening[i], self.healed, near, 2 * np.pi):
+                clearance[i] = opening[i]
+                continue
+            at = field.gaps, field.prescribed, theta[i : i + 1]
+            clearance[i], widths[i] = self._judge(*at, float(opening[i]), float(widths[i]))
+        least = min(least, float(clearance.min(initial=np.inf)))
+        return least, Minima(theta, opening, widths, clearance)
+
+    def _judge(
+        self, gaps: Array, prescribed: float, theta: Array, opening: float, width: float
+    ) -> tuple[float, float]:
+        """Return the clearance of equal minima within the range, and the width of their seeds.
+
+        The opening has to close by the clearance, at least, before a patch grows.
+        """
+        first = float(theta[0])
+        apart = np.abs((gaps.ravel() - first + np.pi) % (2 * np.pi) - np.pi).min(initial=np.inf)
+        longest = 2 * min(LONGEST_TRIAL_HALF_LENGTH * self.edges.wave, IN_PATCH * apart)
+
+        def release(width: float) -> float:
+            if not self._narrowest <= width <= longest:
+                return np.inf
+            seeded = with_patches(gaps, theta, np.full(len(theta), width))
+            return float(self.edges.release(seeded, prescribed, first, 0.5 * width).max())
+
+        width = min(width, longest)
+        rate = release(width)
+        for ratio in (1 / TRIAL_WIDTHS, TRIAL_WIDTHS):
+            while rate > 1 / GROWTH and (other := release(ratio * width)) < rate:
+                width, rate = ratio * width, other
+        # G falls with the square of the opening, or more slowly
+        left = opening * (1 - 1 / math.sqrt(GROWTH * max(rate, 1e-300)))
+        return max(opening - self.range, left), width
 
     def is_located(self, value: float, near: bool) -> bool:
-        """Return whether a touch is located finely enough; see ``location.Criterion``."""
-        return value > -0.5 * self.tolerance
+        """Return whether a touch is located finely enough; see ``location.Criterion``.
+
+        Within the range a value may fall at once, where surfaces part beside a minimum.
+        """
+        return value > -0.5 * self.tolerance or (near and value > -self.range)
 
     def validate_location(self, value: float, at: float) -> None:
         """Raise if surfaces overlap at the touch that was located."""
-        if value < -self.tolerance and self.edges.critical > 0:
+        if value < -self.tolerance - self.range and self.edges.critical > 0:
             raise NoState("surfaces overlap, and no first touch is found", at)
 
     def _clearance_of(self, field: GapField, indices: Integers) -> Array:
@@ -157,5 +230,17 @@ class Nucleation:
         return with_patches(
             gaps,
             np.array([t.theta for t in touches]),
-            self._lengths.seed_widths(np.array([t.curvature for t in touches])),
+            np.array([t.width for t in touches]),
         )
+
+    def heal(self, touches: list[Touch]) -> bool:
+        """Record touches whose patches did not hold; returns whether there are any.
+
+        Surfaces that overlap touch in any case.
+        """
+        if self.range > 0:
+            healed = [(touch.theta, 1 / touch.opening) for touch in touches if touch.opening > 0]
+            self.healed += healed
+            self.heals += len(healed)
+            return bool(healed)
+        return False

@@ -49,7 +49,7 @@ class Openings:
         σ_th in units of E*/2; infinite where nothing opens.
     tolerance : float
         Share of the strength by which a tension may exceed it.
-    healed : list of Crack
+    healed : list of (position, tension)
         Cracks that closed again: nothing opens there unless the tension is larger.
     heals : int
         Number of cracks that closed again, so far.
@@ -60,7 +60,7 @@ class Openings:
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.edges = edges
         self.strength = problem.strength / (problem.half_space.modulus / 2)
-        self.healed: list[Crack] = []
+        self.healed: list[tuple[float, float]] = []
         self.heals = 0
         self._nodal = nodal_tension(problem) if self.is_possible else None
 
@@ -87,7 +87,7 @@ class Openings:
             maximum = refined.maximum(node * self._nodal.step, self._nodal.step)
             if maximum is not None:
                 crack = self._crack_at(field, refined, *maximum)
-                if not has_healed(crack, self.healed, near, 2 * np.pi):
+                if not has_healed(crack.position, crack.tension, self.healed, near, 2 * np.pi):
                     found.append(crack)
         return min((crack.value for crack in found), default=1 - NEAR_STRENGTH), found
 
@@ -102,7 +102,7 @@ class Openings:
 
     def heal(self, cracks: list[Crack]) -> None:
         """Record cracks that closed again."""
-        self.healed += cracks
+        self.healed += [(crack.position, crack.tension) for crack in cracks]
         self.heals += len(cracks)
 
     def is_located(self, value: float, near: bool) -> bool:
@@ -138,8 +138,4 @@ class Openings:
     def _release(self, field: GapField, theta: float, half: float) -> float:
         """Compute G/γ of a crack that is put into the patches of a field."""
         gaps = with_gaps(field.gaps, np.array([theta]), np.array([2 * half]))
-        middle = (gaps.mean(axis=1) - theta + np.pi) % (2 * np.pi) - np.pi
-        crack = int(np.argmin(np.abs(middle)))
-        opening = self.edges.field(gaps, field.prescribed).opening[crack]
-        work = np.array([self.edges.adhesion.work(tip, False)[0] for tip in gaps[crack]])
-        return float((np.maximum(opening, 0.0) ** 2 / (self.edges.critical**2 * work)).min())
+        return float(self.edges.release(gaps, field.prescribed, theta, half).min())

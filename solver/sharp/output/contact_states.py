@@ -101,10 +101,13 @@ class States:
         """Make the state without contact at q0 s = ``separation``."""
         return ContactState.detached(separation / self.q0)
 
-    def overlaps_when_detached(self, at: float) -> bool:
-        """Return whether a state without contact at d = ``at`` would lie below s = h_max."""
-        profile, control = self.problem.profile, self.problem.control
-        return not control.is_load and at < profile.h_max * self.q0 * (1 - 1e-12)
+    def attracts_when_detached(self, at: float, touch: float | None = None) -> bool:
+        """Return whether a state without contact at d = ``at`` would lie below q0 s = ``touch``.
+
+        That is by default q0 h_max, below which surfaces would overlap.
+        """
+        touch = self.problem.profile.h_max * self.q0 if touch is None else touch
+        return not self.problem.control.is_load and at < touch * (1 - 1e-12)
 
     @property
     def _stiffness_unit(self) -> float:
