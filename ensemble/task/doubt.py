@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from adhesis.ensemble.quantities import percent
 from adhesis.solver.loading.zero_range import (
     ANY_RANGE,
-    DOUBTFUL_BARRIER,
     DOUBTFUL_EXCESS,
     DOUBTFUL_LOSS,
     DOUBTFUL_RANGE,
+    OPENED_SHARE,
     beyond_limit,
 )
 
@@ -37,9 +37,9 @@ def why_beyond(opens: bool) -> str:
     if opens:
         return (
             f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, "
-            f"or the barriers of openings are more than {DOUBTFUL_BARRIER:g} of the loss, or the "
-            "range of adhesion is longer than edge_range, touch_range or turn_range, so that what "
-            "zero range leaves open matters for it (docs/zero-range.md)"
+            "or the range of adhesion is longer than edge_range, touch_range or turn_range, or "
+            f"than {OPENED_SHARE:g} of edge_range where patches open, so that what the model "
+            "leaves out matters for it (docs/zero-range.md)"
         )
     return (
         f"{ANY_RANGE} is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "

@@ -281,9 +281,10 @@ class EquilibriumPath(ByValue, ResultViews):
         return float(found if small_scale else found - self.closing_drop)
 
     def range_warnings(self) -> list[str]:
-        """Return sentences where the loss is that of the zero-range limit alone, or of barriers."""
+        """Return sentences where the range of adhesion may matter more than the model knows."""
         given = self.problem, self.valid_range, self.lost, self.contact_fraction
-        return range_warnings(*given, *self.outer_ranges) + opening_warnings(self.jumps, self.lost)
+        opened = self.jumps, self.problem.attraction_range, self.edge_range
+        return range_warnings(*given, *self.outer_ranges) + opening_warnings(*opened)
 
     def strain_warnings(self) -> list[str]:
         """Return sentences where strains are not small."""
