@@ -143,7 +143,7 @@ double work_of_gaps(const Field& field) {
   double total = 0;
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const int m = nodes.size_of(k);
-    constexpr double per_wave = 2;  // the modes of the shortest wave, where it is densest
+    constexpr double per_wave = 3;  // two for the modes of the shortest wave, one for what decays
     const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, per_wave);
     const FineOpening fine = fine_moments(nodes.gaps[k], *circle_of(count + 1), panels);
     for (int n = m; n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);

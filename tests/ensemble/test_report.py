@@ -787,7 +787,7 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
 
 
 def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
-    """By their tension over the strength, or by their barriers over the loss."""
+    """By their tension over the strength, or by a range that is long beside edge_range."""
     text = text_of(hurst=(0.7,), gamma=(0.02,), realisations=4)
     plan = parse_campaign(text.replace("poisson = 0.5", "poisson = 0.5\nstrength = 1e9"))
     values = rows(plan)
@@ -797,13 +797,13 @@ def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
     sound = write(tmp_path / "sound.h5", plan, values)
     assert not read_status(sound)["beyond_limit"]
     values["valid_range"][1] /= 1.02
-    values["barrier"][3] = 0.11 * values["loss"][3]
+    values["barrier"][3], values["edge_range"][3] = 1e-9, 9 * 0.02 / 1e9
     values["touch_range"][2] = 0.99 * 0.02 / 1e9
     path = write(tmp_path / "r.h5", plan, values)
     status = read_status(path)
     assert [row["row"] for row in status["beyond_limit"]] == [1, 2, 3]
     assert "3 losses are doubtful: the tension inside patches exceeds" in as_text(status)
-    (warning,) = (text for text in findings.quality(aggregate(path)) if "barriers" in text)
+    (warning,) = (text for text in findings.quality(aggregate(path)) if "patches open" in text)
     assert warning.startswith("WARNING: 3 of 4 losses")
 
 
