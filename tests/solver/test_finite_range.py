@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.single_wave import SingleWave
 from benchmarks.finite_range import GridLoop
+from tests.support.dugdale_wave import DugdaleWave
 
 WAVE = SingleWave(1.0, 2 * np.pi, 1.0, 0.09 * np.pi / 4)  # α = 0.3; lengths in 1/q0, E* = 1
 
