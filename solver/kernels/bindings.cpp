@@ -143,11 +143,6 @@ struct Searched {
   SearchedGaps gaps;
 };
 
-std::optional<LinearResponse> keep(NewResponse&& made) {
-  if (!made.has_field) return std::nullopt;
-  return std::move(made.response);
-}
-
 // θ and T at rising θ, the weight of ∫ T g dθ divided by T, and b_n.
 std::tuple<Vector, Vector, Vector, Vector> rising(FineOpening fine) {
   const double spacing = pi / double(fine.theta.size() + 1);
@@ -443,17 +438,6 @@ void bind_response(nb::module_& m) {
       .def_prop_ro(
           "charges", [](const LinearResponse& r) { return each(r.tree.runs, &Run::rank); },
           "Number of charges of every run of the tree of gaps.")
-      .def(
-          "update",
-          [](const LinearResponse& known, const Vector& gaps, double prescribed,
-             const std::optional<Integers>& least, const EdgeLaw& law, const Model& model) {
-            const Integers own = least.value_or(Integers());
-            return keep(update_response(known, gaps, prescribed, own, law, model));
-          },
-          "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a, "model"_a, Unlocked(),
-          "Set up a response of gaps of which most are those of this one.")
-      .def("count_unknown", &count_unknown, "gaps"_a, "law"_a, "model"_a,
-           "Count the gaps that `update` would not take over.")
       .def("settle", &settle_response, "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked(),
            "Renew the response for a known equilibrium; False if it is outgrown.")
       .def(
@@ -485,15 +469,9 @@ void bind_response(nb::module_& m) {
            "Find the equilibrium next to these gaps by Newton's iteration.")
       .def("descend", &descend, "gaps"_a, "prescribed"_a, "most"_a, "equal_speeds"_a, "running"_a,
            "law"_a, "model"_a, Unlocked(), "Descend in energy until an event.");
-  m.def(
-      "set_up_response",
-      [](const Vector& gaps, double prescribed, const std::optional<Integers>& least,
-         const EdgeLaw& law, const Model& model) {
-        const Integers own = least.value_or(Integers());
-        return keep(set_up_response(gaps, prescribed, own, law, model));
-      },
-      "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a, "model"_a, Unlocked(),
-      "Solve the field of these gaps, and linearise about it; None if they have none.");
+  m.def("set_up_response", &set_up_response, "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a,
+        "model"_a, Unlocked(),
+        "Solve the field of these gaps, and linearise about it; None if they have none.");
 }
 
 void bind_nucleation(nb::module_& m) {
@@ -603,15 +581,6 @@ void bind_grid(nb::module_& m) {
 
 // Single parts, for their tests.
 void bind_parts(nb::module_& m) {
-  m.def("pair_runs", &pair_runs, "count"_a,
-        "Pair neighbouring runs of gaps, level by level: the halves of every run.");
-  m.def(
-      "pair_again",
-      [](const Halves& known, const Integers& source) {
-        const PairedAgain again = pair_again(known, source);
-        return std::pair(again.halves, again.same);
-      },
-      "known"_a, "source"_a, "Pair the runs of gaps most of which are those of known halves.");
   m.def(
       "count_negative",
       [](Vector h, Vector r) {
@@ -626,26 +595,6 @@ void bind_parts(nb::module_& m) {
                           each(found, &Candidate::error));
       },
       "theta"_a, "opening"_a, "Find local minima where θ falls: position, value, its error.");
-  m.def(
-      "on_new_tree",
-      [](const LinearResponse& response, double prescribed, const EdgeLaw& law,
-         const Model& model) {
-        LinearResponse out = response;
-        const int count = out.gap_count(), n = out.nodes.size();
-        const Tree known = std::exchange(
-            out.tree, Tree(out.nodes, pair_runs(count), Integers(2 * count - 1), model.digits));
-        std::copy_n(known.theta.begin(), n, out.tree.theta.begin());
-        std::copy_n(known.stretch.begin(), n, out.tree.stretch.begin());
-        for (Vector& potential : out.potential) potential.resize(out.tree.size());
-        for (int run = count; run < out.tree.run_count(); ++run) out.tree.place_charges(run);
-        out.charges.fill(Charges(out.tree.size()));
-        for (int k = 0; k < count; ++k) out.condense(k);
-        out.factor_runs(Flags(count, true));
-        out.solve(prescribed, law, model.device);
-        return out;
-      },
-      "response"_a, "prescribed"_a, "law"_a, "model"_a,
-      "Solve a response on a tree that is built anew.");
   nb::class_<EdgeModel>(m, "EdgeModel", "Model of the edge openings about solved edges.")
       .def(
           "__init__",

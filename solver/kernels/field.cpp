@@ -15,8 +15,7 @@ void weigh_inverse(const double* inverse, const GaussRule& rule, double* respons
 }
 
 Tree build_tree(const Nodes& nodes, double digits) {
-  const auto halves = pair_runs(nodes.gap_count());
-  Tree tree(nodes, halves, Integers(halves.size(), 0), digits);
+  Tree tree(nodes, digits);
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     for (int i = 0; i < nodes.size_of(k); ++i) {

@@ -10,9 +10,6 @@ from adhesis.solver._kernels import (
     FieldModel,
     LoadingDevice,
     count_negative,
-    on_new_tree,
-    pair_again,
-    pair_runs,
     set_up_response,
     solve_field,
 )
@@ -231,69 +228,6 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_gaps_that_come_and_go_leave_the_other_runs_of_the_tree_as_they_are(seed):
-    """Every run joins neighbours, and those that stay hold the gaps that they held."""
-    rng = np.random.default_rng(seed)
-    children = pair_runs(20)
-    for _ in range(30):
-        before = (len(children) + 1) // 2
-        # some stay, in order, others come
-        stay = np.flatnonzero(rng.random(before) < rng.choice([0.5, 0.95]))
-        source = np.full(max(2, before + rng.integers(-3, 4), len(stay) + 1), -1)
-        source[np.sort(rng.choice(len(source), len(stay), replace=False))] = stay
-        again, same = pair_again(children, source)
-        gaps, known = gaps_of_runs(again), gaps_of_runs(children)
-        assert gaps[-1] == list(range(len(source)))
-        for run, of_run in enumerate(gaps):
-            assert of_run == list(range(of_run[0], of_run[-1] + 1))
-            if same[run] >= 0:
-                assert known[same[run]] == [source[k] for k in of_run]
-        assert (same[: len(source)] == source).all()
-        children = again
-
-
-def test_runs_without_a_change_are_taken_over():
-    children = pair_runs(64)
-    source = np.delete(np.arange(64), 21)  # the patch between the gaps of a pair goes
-    source[20] = -1
-    _, same = pair_again(children, source)
-    assert (same[63:] < 0).sum() == 5  # all runs above the new gap: log2(64) - 1
-
-
-def gaps_of_runs(children):
-    """List the gaps of every run of a tree."""
-    gaps = []
-    for run, (one, two) in enumerate(children):
-        gaps.append([run] if one < 0 else gaps[one] + gaps[two])
-    return gaps
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
-    """Gaps merge, close and open, one after the other, each response set up from the last one."""
-    method, state = loaded
-    edges, at = method.edges, state.separation * method.q0
-    rng = np.random.default_rng(seed)
-    ends = random_gaps(40, 0.4, 0.5, seed)
-    response = set_up_response(ends, at, None, edges.law, edges.model)
-    for change in ["merge", "merge", "close", "open", "open", "merge", "close", "close", "open"]:
-        k = int(rng.integers(1, len(ends) - 1))
-        if change == "merge":
-            ends = np.concatenate([ends[:k], [[ends[k, 0], ends[k + 1, 1]]], ends[k + 2 :]])
-        elif change == "close":
-            ends = np.delete(ends, k, axis=0)
-        else:
-            one, two = ends[k, 0] + np.diff(ends[k]) * [0.4, 0.6]
-            ends = np.concatenate([ends[:k], [[ends[k, 0], one], [two, ends[k, 1]]], ends[k + 1 :]])
-        response = response.update(ends, at, None, edges.law, edges.model)
-        response.solve(at, edges.law, edges.model)
-        anew = on_new_tree(response, at, edges.law, edges.model)
-        for lasting, built in zip(response.potential, anew.potential, strict=True):
-            assert np.abs(lasting - built).max() < 1e-4 * np.abs(built).max()
-        assert anew.negative == response.negative
-
-
 @pytest.mark.parametrize("negative", range(4))
 def test_negative_eigenvalues_that_appear_together_are_counted(negative):
     """Of a pair of halves whose first one has none, and all directions of which are alike."""
@@ -320,11 +254,10 @@ def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
     assert kept.at(gaps, at) is first
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
     assert kept.near(fewer, at, None) is not first
-    version = first.version
     assert kept.at(gaps, at) is first
-    assert first.version == version
+    assert first.settled is gaps
     assert kept.at(gaps.copy(), at) is first  # equal gaps, but not those that it was solved for
-    assert first.version > version
+    assert first.settled is not gaps
     kept.forget()
     assert kept.at(gaps, at) is not first
 

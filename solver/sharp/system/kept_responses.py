@@ -20,14 +20,12 @@ class KeptResponse:
         Gaps for which it was last solved.
     is_outgrown : bool
         Whether some gap needs more nodes than it has.
-    version : int
-        Changes whenever the response does; no other response has it.
     """
 
     def __init__(self, response: LinearResponse) -> None:
         self.response = response
         self.settled: Array | None = None
-        self.is_outgrown, self.version = False, 0
+        self.is_outgrown = False
 
 
 class KeptResponses:
@@ -43,7 +41,6 @@ class KeptResponses:
     def __init__(self, problem: EdgeProblem) -> None:
         self._problem = problem
         self._kept: list[KeptResponse] = []  # the last one at the end
-        self._changes = 0
 
     def forget(self) -> None:
         """Forget all, on which results depend within the error of the field."""
@@ -56,46 +53,21 @@ class KeptResponses:
         """
         if not (np.isfinite(gaps).all() and shortest_length(gaps) > 0):
             return None
-        kept = self._kept
-        known = self._of_as_many(gaps)
+        kept, problem = self._kept, self._problem
+        known = next((old for old in kept if old.response.gap_count == len(gaps)), None)
         if known is not None:
             kept.remove(known)
-        else:
-            response = self._new(gaps, prescribed, least)
-            kept[:] = [old for old in kept if old.response.gap_count != len(gaps)]
+        if known is None or known.is_outgrown:
+            problem.count.fields += 1
+            law, model = problem.law_at(gaps), problem.model
+            response = set_up_response(gaps, prescribed, least, law, model)
             if response is None:
                 return None
             known = KeptResponse(response)
         kept.append(known)
         del kept[:-RESPONSES_KEPT]
         known.settled = None
-        self._changes += 1
-        known.version = self._changes
         return known
-
-    def _of_as_many(self, gaps: Array) -> KeptResponse | None:
-        """Return a response of as many gaps, unless the last one has more of these; else None."""
-        for known in reversed(self._kept):
-            if known.response.gap_count == len(gaps) and not known.is_outgrown:
-                last = self._kept[-1]
-                if known is last or self._unknown(known, gaps) <= self._unknown(last, gaps):
-                    return known
-                break
-        return None
-
-    def _unknown(self, known: KeptResponse, gaps: Array) -> int:
-        """Count the gaps that would be new to a response."""
-        problem = self._problem
-        return known.response.count_unknown(gaps, problem.law_at(gaps), problem.model)
-
-    def _new(self, gaps: Array, prescribed: float, least: Integers | None) -> LinearResponse | None:
-        """Set up a response of these gaps, from the last one if there is one."""
-        problem = self._problem
-        given = gaps, prescribed, least, problem.law_at(gaps), problem.model
-        problem.count.fields += 1
-        if self._kept:
-            return self._kept[-1].response.update(*given)
-        return set_up_response(*given)
 
     def at(self, gaps: Array, prescribed: float) -> KeptResponse | None:
         """Return the response about these gaps; None if they have no field."""
