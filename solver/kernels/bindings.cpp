@@ -18,8 +18,6 @@
 #include "grid.hpp"
 #include "newton.hpp"
 #include "predictor.hpp"
-#include "signals.hpp"
-#include "step_size.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -264,11 +262,9 @@ void bind_model(nb::module_& m) {
       .def(
           "free_edges",
           [](const EdgeLaw& law, const Vector& gaps) {
-            const Flags held = at_memory(gaps, law);
-            Integers out;
-            for (int e = 0; e < int(held.size()); ++e)
-              if (!held[e]) out.push_back(e);
-            return out;
+            Flags free = at_memory(gaps, law);
+            for (char& one : free) one = !one;
+            return indices(free);
           },
           "gaps"_a, "Find the edges that are not at their memory; all where edges are not pinned.")
       .def(

@@ -74,9 +74,8 @@ class EdgeMechanics(EdgeProblem):
     ) -> GapField:
         """Return the field of these gaps, with p and q0 s where they are known."""
         return GapField(
-            self.source, gaps, prescribed, self.tolerance, self.model.device,
-            lambda: self.solution(gaps, prescribed), nearly,
-        )  # fmt: skip
+            self.source, gaps, prescribed, lambda: self.solution(gaps, prescribed), nearly
+        )
 
     def response_before_fold(self, point: Point) -> FixedEdgeResponse:
         """Return the response at a point next to a fold, the edges held."""
@@ -124,7 +123,8 @@ class EdgeMechanics(EdgeProblem):
             if near is None:
                 break
             found = near.response.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
-            self.count.add_newton(found.corrections)
+            self.count.newton_steps += found.corrections
+            self.count.fields += found.corrections
             if found.found:
                 point = self._point(prescribed, found)
                 near.settled = point.gaps
@@ -138,10 +138,10 @@ class EdgeMechanics(EdgeProblem):
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
         """Make the point of an equilibrium."""
         gaps = found.gaps
+        nearly = found.pressure, found.separation
         field = GapField(
-            self.source, gaps, prescribed, self.tolerance, self.model.device,
-            lambda: found.solve_field(prescribed, self.model), (found.pressure, found.separation),
-        )  # fmt: skip
+            self.source, gaps, prescribed, lambda: found.solve_field(prescribed, self.model), nearly
+        )
         pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)
 
@@ -230,7 +230,8 @@ class EdgeMechanics(EdgeProblem):
             end = near.response.descend(
                 gaps, prescribed, most, equal_speeds, running, law, self.model
             )
-            self.count.add_descent(end.steps)
+            self.count.descent_steps += end.steps
+            self.count.fields += end.steps
             most -= end.steps
             if end.event != DescentEvent.OUTGROWN:
                 return end, near.response.orders, most

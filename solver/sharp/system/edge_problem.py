@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from adhesis.solver._kernels import (
@@ -12,7 +14,6 @@ from adhesis.solver._kernels import (
     ProfileAdhesion,
 )
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
     COARSE_FIELD,
@@ -24,6 +25,17 @@ from adhesis.solver.sharp.tolerances import (
 )
 
 FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
+
+
+@dataclass
+class Counters:
+    """Numbers of field solutions, energies, fine openings and steps."""
+
+    fields: int = 0
+    energies: int = 0
+    openings: int = 0
+    newton_steps: int = 0
+    descent_steps: int = 0
 
 
 class EdgeProblem:
