@@ -188,19 +188,16 @@ std::optional<LinearResponse> set_up_response(const Vector& ends, double prescri
     for (size_t k = 0; k < orders.size(); ++k) orders[k] = std::max(orders[k], (*least)[k]);
   auto [field, factored] = solve_field(ends, prescribed, orders, 2, model);
   if (!std::isfinite(field.pressure)) return std::nullopt;
-  const int count = field.nodes.gap_count(), n = field.nodes.size();
-  const Vector about = gap_potentials(field);
   LinearResponse out(std::move(field.nodes), std::move(field.equations), std::move(factored.tree));
   out.inverse = std::move(factored.inverse);
-  out.about = about;
-  out.about_pressure.assign(count, field.pressure);
   out.scaled_opening = field.scaled_opening;
-  std::copy(about.begin(), about.end(), out.potential[0].begin());
-  out.mean[1] = -field.unit_mean;
-  out.mean[0] =
-      dot(out.nodes.weight.data(), out.scaled_opening.data(), n) - field.pressure * out.mean[1];
+  for (int column = 0; column < 2; ++column)
+    add_scaled(-1, factored.potential[column].data(), out.potential[column].data(),
+               out.tree.size());
+  out.mean = {-factored.load_mean, -field.unit_mean};
   for (Edge& edge : out.edges) edge.held = law.pins();  // which are pinned is not known yet
-  for (int k = 0; k < count; ++k) out.linearise(k, law);
+  const int count = out.gap_count();
+  for (int k = 0; k < count; ++k) out.linearise_in_current_potential(k, field.pressure, law);
   out.factor_runs(Flags(count, true));
   return out;
 }

@@ -51,6 +51,8 @@ class Openings:
         Share of the strength by which a tension may exceed it.
     healed : list of Crack
         Cracks that closed again: nothing opens there unless the tension is larger.
+    heals : int
+        Number of cracks that closed again, so far.
     """
 
     tolerance = STRENGTH_EXCEEDED
@@ -59,6 +61,7 @@ class Openings:
         self.edges = edges
         self.strength = problem.strength / (problem.half_space.modulus / 2)
         self.healed: list[Crack] = []
+        self.heals = 0
         self._nodal = nodal_tension(problem) if self.is_possible else None
 
     @property
@@ -100,6 +103,7 @@ class Openings:
     def heal(self, cracks: list[Crack]) -> None:
         """Record cracks that closed again."""
         self.healed += cracks
+        self.heals += len(cracks)
 
     def is_located(self, value: float, near: bool) -> bool:
         """Return whether a maximum with this value is located finely enough.
