@@ -36,7 +36,7 @@ from adhesis.solver.sharp.field.gap_field import (
 )
 from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
-from adhesis.solver.sharp.system.kept_responses import KeptResponses
+from adhesis.solver.sharp.system.kept_response import KeptResponse
 from adhesis.solver.sharp.tolerances import (
     ENDLESS,
     EQUAL,
@@ -53,12 +53,12 @@ class EdgeMechanics(EdgeProblem):
 
     Attributes
     ----------
-    responses : KeptResponses
+    kept : KeptResponse
     """
 
     def __init__(self, *problem: Any) -> None:
         super().__init__(*problem)
-        self.responses = KeptResponses(self)
+        self.kept = KeptResponse(self)
         self._finer: tuple[Point, Field] | None = None
 
     def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Field:
@@ -119,20 +119,20 @@ class EdgeMechanics(EdgeProblem):
         reach = max(reach, self.settled)
         law = self.law_at(gaps if memory is None else memory)
         for _ in range(RESPONSE_TRIALS):
-            near = self.responses.near(gaps, prescribed, orders)
+            near = self.kept.near(gaps, prescribed, orders)
             if near is None:
                 break
-            found = near.response.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
+            found = near.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
             self.count.newton_steps += found.corrections
             self.count.fields += found.corrections
             if found.found:
                 point = self._point(prescribed, found)
-                near.settled = point.gaps
+                self.kept.settled = point.gaps
                 return point
             if not found.is_outgrown:
                 break
             gaps = found.gaps
-            near.is_outgrown = True
+            self.kept.forget()
         return None
 
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
@@ -147,7 +147,7 @@ class EdgeMechanics(EdgeProblem):
 
     def forget(self) -> None:
         """Forget what results would depend on within the error of the field."""
-        self.responses.forget()
+        self.kept.forget()
 
     def relax(
         self, gaps: Array, prescribed: float, reach: float, *, equal_speeds: bool = False
@@ -224,19 +224,17 @@ class EdgeMechanics(EdgeProblem):
         """
         running = Running(start)
         while True:
-            near = self.responses.near(gaps, prescribed, orders)
+            near = self.kept.near(gaps, prescribed, orders)
             if near is None:
                 return None, orders, most
-            end = near.response.descend(
-                gaps, prescribed, most, equal_speeds, running, law, self.model
-            )
+            end = near.descend(gaps, prescribed, most, equal_speeds, running, law, self.model)
             self.count.descent_steps += end.steps
             self.count.fields += end.steps
             most -= end.steps
             if end.event != DescentEvent.OUTGROWN:
-                return end, near.response.orders, most
+                return end, near.orders, most
             gaps = end.gaps
-            near.is_outgrown = True
+            self.kept.forget()
 
     def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.
@@ -245,11 +243,11 @@ class EdgeMechanics(EdgeProblem):
         first, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
-        near, free = self.responses.at(gaps, prescribed), law.free_edges(gaps)
+        near, free = self.kept.at(gaps, prescribed), law.free_edges(gaps)
         if near is None or self.critical == 0 or len(free) == 0:
             return []
-        tangent = near.response.tangent_between(gaps, free, prescribed, law, self.model)
-        by_edge = near.response.opening[free, None] * tangent
+        tangent = near.tangent_between(gaps, free, prescribed, law, self.model)
+        by_edge = near.opening[free, None] * tangent
         limit = step_limits(gaps, law.longest_step)[free]
         order = positions(gaps, self.source.highest)[free]
         found = leaving_step(by_edge + by_edge.T, limit, order)

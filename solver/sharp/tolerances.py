@@ -21,8 +21,6 @@ SMALLEST_OF_SEED = 0.05
 
 # ---------------------------------------------------------------- linear response of the gaps
 
-RESPONSES_KEPT = 3
-"""Responses that are kept, each of another number of gaps."""
 RESPONSE_TRIALS = 4
 """Times that a response is set up for one equilibrium, where gaps need more and more nodes."""
 

@@ -21,7 +21,7 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
-from adhesis.solver.sharp.system.kept_responses import KeptResponses
+from adhesis.solver.sharp.system.kept_response import KeptResponse
 from adhesis.solver.sharp.tolerances import LONGEST_STEP
 from tests.support import next_to_a_fold
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
@@ -201,8 +201,8 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     anew = edges.equilibrium(point.gaps, at, edges.wave)
     moved = point.gaps.copy()
     moved[2::5] += motion * edges.wave * np.array([-0.5, 1.0])
-    edges.responses.at(moved, at)
-    assert edges.responses.at(moved, at).settled is moved
+    edges.kept.at(moved, at)
+    assert edges.kept.settled is moved
     back = edges.equilibrium(point.gaps, at, edges.wave)
     assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.coarse
     assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
@@ -212,7 +212,7 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
 
 
 def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):
-    """A patch less, and one more: that of the other gaps is taken over, with the same result."""
+    """A patch less, and one more: with the same result as without any response."""
     edges, point = many_gaps
     gaps, at = point.gaps, point.at
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
@@ -222,7 +222,7 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         edges.forget()
         anew = edges.equilibrium(wanted, at, edges.wave)
         edges.forget()
-        edges.responses.at(known, at)
+        edges.kept.at(known, at)
         again = edges.equilibrium(wanted, at, edges.wave)
         assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.coarse
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
@@ -244,22 +244,24 @@ def test_negative_eigenvalues_that_appear_together_are_counted(negative):
     assert count_negative(interaction, response) == n - negative
 
 
-def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
-    """A jump and its rival need two in turn; what is forgotten is set up anew."""
+def test_a_response_is_kept_for_as_many_gaps(loaded):
+    """What was solved for these gaps is not solved again; what is forgotten is set up anew."""
     method, state = loaded
     edges, gaps = method.edges, state.internal.gaps
     at = state.separation * method.q0
-    kept = KeptResponses(edges)
+    kept = KeptResponse(edges)
     first = kept.at(gaps, at)
     assert kept.at(gaps, at) is first
+    assert kept.settled is gaps
+    assert kept.at(gaps.copy(), at) is first  # equal gaps, but not those that it was solved for
+    assert kept.settled is not gaps
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
     assert kept.near(fewer, at, None) is not first
-    assert kept.at(gaps, at) is first
-    assert first.settled is gaps
-    assert kept.at(gaps.copy(), at) is first  # equal gaps, but not those that it was solved for
-    assert first.settled is not gaps
+    assert kept.settled is None
+    one = kept.at(gaps, at)
+    assert one is not first
     kept.forget()
-    assert kept.at(gaps, at) is not first
+    assert kept.at(gaps, at) is not one
 
 
 def test_no_step_leads_to_another_branch():
@@ -300,20 +302,20 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
 
 
 def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(many_gaps, monkeypatch):
-    """A response is found by the number of gaps; where it does not serve, nor do its orders."""
+    """A response serves as many gaps; where it does not, nor do its orders."""
     edges, point = many_gaps
-    known = edges.responses.at(point.gaps, point.at)
+    known = edges.kept.at(point.gaps, point.at)
     asked = []
 
     def near(gaps, prescribed, least):
         asked.append(least)
         return known if len(asked) == 1 else None
 
-    monkeypatch.setattr(edges.responses, "near", near)
+    monkeypatch.setattr(edges.kept, "near", near)
     others = point.gaps + 3 * edges.wave
     with pytest.raises(NoState, match="no field"):
         edges.relax(others, point.at, edges.wave)
-    assert known.is_outgrown
+    assert edges.kept.settled is None  # forgotten
     assert asked == [None, None]
 
 
