@@ -291,7 +291,6 @@ void bind_field(nb::module_& m) {
       .def_ro("pressure", &Field::pressure, "p = 2p̄/E*; NaN if there is no solution.")
       .def_ro("separation", &Field::separation, "q0 s.")
       .def_ro("unit_mean", &Field::unit_mean, "Xᵀ (B + G)⁻¹ X.")
-      .def_ro("resistance", &Field::resistance, "-2π/resistance is ∂p/∂d at fixed edges.")
       .def_ro("opening", &Field::opening, "C at each edge.")
       .def_ro("scaled_opening", &Field::scaled_opening,
               "f: the openings over sqrt(1-η²), at all nodes.")
@@ -317,13 +316,14 @@ void bind_field(nb::module_& m) {
           },
           "scaled"_a, "Evaluate C at each edge from f at all nodes, of all modes.")
       .def(
-          "openings_by_prescribed",
+          "by_prescribed",
           [](const Field& f) {
+            const double rate = -2 * pi / f.resistance;
             Vector out = edge_openings(f.solved[1], f.nodes, f.equations, false);
-            for (double& opening : out) opening *= 2 * pi / f.resistance;
-            return out;
+            for (double& opening : out) opening *= -rate;
+            return std::tuple(rate, -f.unit_mean * rate / (2 * pi), out);
           },
-          "∂C/∂d at fixed edges.")
+          "Differentiate p, q0 s and C by d at fixed edges.")
       .def(
           "fine_opening",
           [](const Field& f, int k, double per_wave) {

@@ -24,7 +24,6 @@ from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point
 from adhesis.solver.sharp.equilibrium.griffith import (
     imbalance,
     leaving_step,
-    move_edges,
     positions,
     step_limits,
 )
@@ -34,7 +33,7 @@ from adhesis.solver.sharp.field.gap_field import (
     GapField,
     respond_at_fixed_edges,
 )
-from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
+from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, without_small
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.kept_response import KeptResponse
 from adhesis.solver.sharp.tolerances import (
@@ -298,10 +297,6 @@ class EdgeMechanics(EdgeProblem):
         opening = self.solution(gaps, prescribed).opening
         residual = imbalance(opening, gaps, law)
         e = int(np.argmax(np.abs(residual)))
-        length, patch = lengths_of(gaps)
-        beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
-        closing = CLOSING_SHARE * min(length[e // 2], beside)
-        step[e] = min(0.5 * times * law.longest_step, closing)
-        onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
-        return onwards
+        step[e] = -np.sign(residual[e]) * step_limits(gaps, 0.5 * times * law.longest_step)[e]
+        return move_edges(gaps, step)

@@ -15,8 +15,8 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import move_edges
 from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.gap.ends import move_edges
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod

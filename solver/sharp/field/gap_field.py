@@ -36,8 +36,6 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-
 from adhesis.solver._kernels import Field
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -70,9 +68,7 @@ class FixedEdgeResponse(NamedTuple):
 def respond_at_fixed_edges(solution: Field) -> FixedEdgeResponse:
     """Differentiate a solution by d, at fixed edges; FloatingPointError if there is none."""
     check_definite(solution)
-    pressure = -2 * np.pi / solution.resistance
-    separation = -solution.unit_mean * pressure / (2 * np.pi)
-    return FixedEdgeResponse(pressure, separation, solution.openings_by_prescribed())
+    return FixedEdgeResponse(*solution.by_prescribed())
 
 
 class GapField:
