@@ -49,10 +49,6 @@ class EdgeMechanics(EdgeProblem):
     """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
     The linear response of the gaps is kept from one state to the next.
-
-    Attributes
-    ----------
-    kept : KeptResponse
     """
 
     def __init__(self, *problem: Any) -> None:
@@ -115,7 +111,7 @@ class EdgeMechanics(EdgeProblem):
         """
         if not shortest_length(gaps) > 0:
             return None
-        reach = max(reach, self.settled)
+        reach = max(reach, self.newton_tolerance)
         law = self.law_at(gaps if memory is None else memory)
         for _ in range(RESPONSE_TRIALS):
             near = self.kept.near(gaps, prescribed, orders)
@@ -191,7 +187,10 @@ class EdgeMechanics(EdgeProblem):
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1
-                if gaps.shape == rested.shape and np.abs(gaps - rested).max() < self.settled:
+                if (
+                    gaps.shape == rested.shape
+                    and np.abs(gaps - rested).max() < self.newton_tolerance
+                ):
                     rests = max(rests, RESTS + 1)  # no patience changes anything
                 rested = gaps
                 strict = rests <= RESTS

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 # ---------------------------------------------------------------- equilibrium of the edges
 
-SETTLED = 1e-7
+NEWTON_TOLERANCE = 1e-7
 """λ_min. An edge this near to the reference of its gap keeps it, which ends Newton's iteration."""
-COARSE_FIELD = 10.0
+FIELD_ERROR = 10.0
 """λ_min per relative error of the field: how far an equilibrium may move with that error."""
 SMALLEST_LENGTH = 0.005
 """λ_min. Narrower patches and gaps are removed."""

@@ -183,8 +183,8 @@ def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, many_gaps):
     dense = exact.equilibrium(point.gaps, point.at, exact.wave)
     assert len(point.gaps) >= 10
     assert np.abs(dense_residual(dense.gaps, dense.at, exact)).max() < 1e-3 * exact.critical
-    # the error of the field moves an equilibrium by up to edges.coarse
-    assert np.abs(point.gaps - dense.gaps).max() < 0.5 * edges.coarse
+    # the error of the field moves an equilibrium by up to edges.field_error
+    assert np.abs(point.gaps - dense.gaps).max() < 0.5 * edges.field_error
     assert np.abs(point.rate - dense.rate).max() < 1e-4 * np.abs(dense.rate).max()
     assert point.pressure == pytest.approx(dense.pressure, rel=10 * edges.tolerance)
 
@@ -204,7 +204,7 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     edges.kept.at(moved, at)
     assert edges.kept.settled is moved
     back = edges.equilibrium(point.gaps, at, edges.wave)
-    assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.coarse
+    assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.field_error
     assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
     assert back.pressure == pytest.approx(anew.pressure, rel=1e-6)
     scale = np.abs(anew.field.opening).max()
@@ -224,7 +224,7 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         edges.forget()
         edges.kept.at(known, at)
         again = edges.equilibrium(wanted, at, edges.wave)
-        assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.coarse
+        assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.field_error
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
 
 

@@ -113,7 +113,7 @@ class Follower:
 
     def _turned_back(self, point: Point) -> Point:
         """Return the point at which a path turns back: all its edges are pinned there at first."""
-        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.settled)
+        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.newton_tolerance)
         return point.with_previous(None) if pinned is None else pinned
 
     def _imbalance(self, output: Point, point: Point) -> float:

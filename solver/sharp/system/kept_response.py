@@ -13,10 +13,6 @@ from adhesis.solver.sharp.tolerances import RESPONSE_TRIALS
 class KeptResponse:
     """The last linear response of one problem, which changes in place.
 
-    Parameters
-    ----------
-    problem : EdgeProblem
-
     Attributes
     ----------
     settled : array, optional
