@@ -99,22 +99,30 @@ struct type_caster<adhesis::Vector> : ArrayCaster<adhesis::Vector, double> {};
 template <>
 struct type_caster<adhesis::Integers> : ArrayCaster<adhesis::Integers, int64_t> {};
 
+// Square matrices likewise.
+template <>
+struct type_caster<adhesis::Matrix> {
+  NB_TYPE_CASTER(adhesis::Matrix, const_name("numpy.typing.NDArray[numpy.float64]"))
+
+  bool from_python(handle from, uint32_t flags, cleanup_list* cleanup) noexcept {
+    make_caster<adhesis::Vector> values;
+    if (!values.from_python(from, flags, cleanup)) return false;
+    value.n = int(std::lround(std::sqrt(double(values.value.size()))));
+    value.values = std::move(values.value);
+    return true;
+  }
+
+  static handle from_cpp(const adhesis::Matrix& a, rv_policy, cleanup_list* cleanup) noexcept {
+    auto out = adhesis::hand_over(a.values, {size_t(a.n), size_t(a.n)});
+    return make_caster<decltype(out)>::from_cpp(out, rv_policy::automatic, cleanup);
+  }
+};
+
 }  // namespace nanobind::detail
 
 namespace adhesis {
 
 namespace {
-
-Matrix matrix_of(Vector values) {
-  Matrix out;
-  out.n = int(std::lround(std::sqrt(double(values.size()))));
-  out.values = std::move(values);
-  return out;
-}
-
-Output<double> array_of(const Matrix& matrix) {
-  return hand_over(matrix.values, {size_t(matrix.n), size_t(matrix.n)});
-}
 
 // A value and a slope at each angle.
 template <class Evaluate>
@@ -451,15 +459,10 @@ void bind_response(nb::module_& m) {
           },
           "gaps"_a, "pressure"_a, "prescribed"_a, "model"_a,
           "Solve every gap by itself in the potential of the last solution.")
-      .def(
-          "tangent_between",
-          [](LinearResponse& r, const Vector& gaps, const Integers& edges, double prescribed,
-             const EdgeLaw& law, const Model& model) {
-            return array_of(tangent_between(r, gaps, edges, prescribed, law, model));
-          },
-          "gaps"_a, "edges"_a, "prescribed"_a, "law"_a, "model"_a,
-          "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.\n\n"
-          "All others follow, but those at their memory, which are pinned.")
+      .def("tangent_between", &tangent_between, "gaps"_a, "edges"_a, "prescribed"_a, "law"_a,
+           "model"_a,
+           "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.\n\n"
+           "All others follow, but those at their memory, which are pinned.")
       .def("find_equilibrium", &find_equilibrium, "gaps"_a, "prescribed"_a, "reach"_a, "strict"_a,
            "law"_a, "model"_a, Unlocked(),
            "Find the equilibrium next to these gaps by Newton's iteration.")
@@ -579,8 +582,8 @@ void bind_grid(nb::module_& m) {
 void bind_parts(nb::module_& m) {
   m.def(
       "count_negative",
-      [](Vector h, Vector r) {
-        return count_negative(h.data(), r.data(), matrix_of(h).n).negative;
+      [](Matrix h, Matrix r) {
+        return count_negative(h.values.data(), r.values.data(), h.n).negative;
       },
       "h"_a, "r"_a, "Count the negative eigenvalues of [[h, 1], [1, r]].");
   m.def(
@@ -592,33 +595,16 @@ void bind_parts(nb::module_& m) {
       },
       "theta"_a, "opening"_a, "Find local minima where θ falls: position, value, its error.");
   nb::class_<EdgeModel>(m, "EdgeModel", "Model of the edge openings about solved edges.")
-      .def(
-          "__init__",
-          [](EdgeModel* model, const Integers& edges, const Vector& gaps, const Vector& residual,
-             const Vector& tangent, const EdgeLaw& law, const Panels& panels) {
-            new (model) EdgeModel(edges, gaps, residual, matrix_of(tangent), law, panels);
-          },
-          "edges"_a, "gaps"_a, "residual"_a, "tangent"_a, "law"_a, "panels"_a,
-          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>())
+      .def(nb::init<const Integers&, const Vector&, const Vector&, const Matrix&, const EdgeLaw&,
+                    const Panels&>(),
+           "edges"_a, "gaps"_a, "residual"_a, "tangent"_a, "law"_a, "panels"_a,
+           nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>())
       .def_prop_ro("opening",
                    [](const EdgeModel& e) { return each(e.edges, &MovingEdge::opening); })
       .def_prop_ro("own", [](const EdgeModel& e) { return each(e.edges, &MovingEdge::own); })
-      .def_prop_ro(
-          "coupling", [](const EdgeModel& e) { return array_of(e.coupling()); }, new_array)
-      .def_prop_ro("forces",
-                   [](const EdgeModel& model) {
-                     Vector out(model.edges.size());
-                     model.forces(out);
-                     return out;
-                   })
-      .def_prop_ro(
-          "hessian",
-          [](const EdgeModel& model) {
-            Matrix out(int(model.edges.size()));
-            model.hessian(out);
-            return array_of(out);
-          },
-          new_array)
+      .def_prop_ro("coupling", &EdgeModel::coupling)
+      .def_prop_ro("forces", &EdgeModel::forces)
+      .def_prop_ro("hessian", &EdgeModel::hessian)
       .def("advance", &EdgeModel::advance, "step"_a, "Move the edges outwards by these steps.")
       .def("flow", &flow_through, "limit"_a, "equal_speeds"_a, "is_long"_a, "strongest"_a, "law"_a);
   nb::class_<ModelFlow>(m, "ModelFlow", "Flow through the model.")
@@ -626,19 +612,10 @@ void bind_parts(nb::module_& m) {
            "lengths"_a, "residuals"_a)
       .def_ro("motion", &ModelFlow::motion)
       .def_ro("lengths", &ModelFlow::lengths);
-  m.def(
-      "implicit_step",
-      [](const Vector& hessian, const Vector& force, double longest, bool equal_speeds) {
-        return implicit_step(matrix_of(hessian), force, longest, equal_speeds);
-      },
-      "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a, "Take a linearly implicit step.");
-  m.def(
-      "distance_to_minimum",
-      [](const Vector& hessian, const Vector& force) {
-        return distance_to_minimum(matrix_of(hessian), force);
-      },
-      "hessian"_a, "force"_a,
-      "Compute the largest motion to the minimum of a quadratic model; infinite without one.");
+  m.def("implicit_step", &implicit_step, "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a,
+        "Take a linearly implicit step.");
+  m.def("distance_to_minimum", &distance_to_minimum, "hessian"_a, "force"_a,
+        "Compute the largest motion to the minimum of a quadratic model; infinite without one.");
   m.def("model_error", &model_error, "flow"_a, "residual"_a, "edges"_a, "gaps"_a, "law"_a);
   m.def("next_reach", &next_reach, "before"_a, "length"_a, "error"_a);
 }

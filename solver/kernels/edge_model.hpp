@@ -44,11 +44,11 @@ class EdgeModel {
   void advance(const Vector& step);
 
   // Forces C_c² - C |C|.
-  void forces(Vector& force) const;
+  Vector forces() const;
 
   // H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others. Pinned
   // edges, which have no force, are kept where they are.
-  void hessian(Matrix& out) const;
+  Matrix hessian() const;
 
   // ∂C_e/∂n_f over C_f; zero on the diagonal.
   const Matrix& coupling() const { return coupling_; }
