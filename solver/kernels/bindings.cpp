@@ -433,13 +433,6 @@ void bind_response(nb::module_& m) {
           "opening", [](const LinearResponse& r) { return each(r.edges, &Edge::opening); },
           "C of every edge in its reference.")
       .def_prop_ro(
-          "potential",
-          [](const LinearResponse& r) { return std::pair(r.potential_at(0), r.potential_at(1)); },
-          "Potentials of the last solution without p, and with a unit of p.")
-      .def_prop_ro(
-          "negative", [](const LinearResponse& r) { return r.tree.runs.back().count.negative; },
-          "Number of negative eigenvalues.")
-      .def_prop_ro(
           "charges", [](const LinearResponse& r) { return each(r.tree.runs, &Run::rank); },
           "Number of charges of every run of the tree of gaps.")
       .def("settle", &settle_response, "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked(),

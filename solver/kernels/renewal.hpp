@@ -3,7 +3,7 @@
 // A gap whose edge leaves its reference is linearised anew where it is now, in the potential of the
 // last solution, and the runs of the tree that hold the gap are computed anew. So a state next to a
 // known one costs the changed gaps and one pass through the tree. Where a patch comes or goes the
-// response is set up anew: one that took over all other gaps cost more, as it lost accuracy.
+// response is set up anew: taking over the other gaps saves time beyond some 150 of them only.
 #pragma once
 
 #include "field.hpp"
