@@ -40,10 +40,34 @@ void fill_nodes(int k, const GaussRule& rule, Nodes& nodes) {
 void fill_block(const Gap& gap, const double* theta, const double* weight, const GaussRule& rule,
                 double* block) {
   const int m = rule.count;
+  const double alpha = gap.alpha, middle = 0.5 * (gap.end[0] + gap.end[1]);
+  const bool is_short = gap.length() < periodic_series;
+  // sines of differences from those of the nodes: of small ones the kernels are series
+  Vector sine(m), cosine(m), power(m);
+  for (int i = 0; i < m; ++i) {
+    power[i] = std::exp(alpha * rule.eta[i]);
+    if (!is_short) {
+      sine[i] = std::sin(0.5 * (theta[i] - middle));
+      cosine[i] = std::cos(0.5 * (theta[i] - middle));
+    }
+  }
   for (int i = 0; i < m; ++i) {
     for (int j = 0; j <= i; ++j) {
-      const double far = periodic_images(theta[i] - theta[j]);
-      const double near = mapped_kernel(gap.alpha, rule.eta[i] - rule.eta[j]);
+      double x = theta[i] - theta[j], far;
+      if (is_short || std::abs(x) < periodic_series) {
+        far = periodic_images(x);
+      } else {
+        double half = sine[i] * cosine[j] - cosine[i] * sine[j];
+        far = 1 / (half * half) - 4 / (x * x);
+      }
+      double y = rule.eta[i] - rule.eta[j], near;
+      if (std::abs(alpha * y) < mapped_series) {
+        near = mapped_kernel(alpha, y);
+      } else {
+        double ratio = power[i] / power[j];
+        double twice = ratio - 1 / ratio;  // twice the hyperbolic sine
+        near = 4 * (4 * alpha * alpha / (twice * twice) - 1 / (y * y));
+      }
       double both = weight[i] * weight[j] * far + rule.weights[i] * rule.weights[j] * near;
       block[i * m + j] = block[j * m + i] = rule.crack[i * m + j] - both / (4 * pi);
     }

@@ -14,7 +14,8 @@ namespace adhesis {
 
 namespace {
 
-constexpr double surely_smooth = 2.0;  // modes·length/distance of a panel that surely spans less
+constexpr double largest_series = 0.36;  // z up to which artanh z is a short series
+constexpr double surely_smooth = 2.0;    // modes·length/distance of a panel that surely spans less
 
 // Nodes of the moments: 1 - η and 1 + η, and the weights times S and S'.
 struct MomentNodes {
@@ -31,6 +32,13 @@ struct MomentNodes {
   }
 };
 
+// Compute artanh z/z, y = z², where |z| is hardly above 1/3.
+double artanh_over(double y) {
+  double series = 1.0 / 15 + y * (1.0 / 17 + y * (1.0 / 19 + y * (1.0 / 21 + y / 23)));
+  series = 1.0 / 7 + y * (1.0 / 9 + y * (1.0 / 11 + y * (1.0 / 13 + y * series)));
+  return 1 + y * (1.0 / 3 + y * (1.0 / 5 + y * series));
+}
+
 // Bound the number of nodes of both end pieces.
 int most_end_nodes(const Gap& gap, const Panels& panels) {
   int cells = 2;
@@ -43,7 +51,7 @@ int most_end_nodes(const Gap& gap, const Panels& panels) {
 WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels& panels,
                           MomentNodes& nodes) {
   const Poles poles = poles_of(gap, side);
-  const double scale = 1 / (2 * gap.alpha);
+  const double scale = 1 / gap.alpha;
   const double origin = gap.end[side] / panels.width;
   const double per = (side == 0 ? 1 : -1) / panels.width;
   double r[64], position[64], value[64];  // distances of the nodes of a cell from the end
@@ -54,6 +62,7 @@ WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels&
     double* nearer = &nodes.from_end[side][nodes.count];
     double* farther = &nodes.from_end[1 - side][nodes.count];
     double* weight = &nodes.source[0][nodes.count];
+    double known = 0, known_distance = 0;  // where the logarithm of the map is known
     if (first) {
       // the square root at the end becomes smooth in y
       for (int i = 0; i < rule; ++i) {
@@ -62,13 +71,24 @@ WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels&
         weight[i] = 2 * y * panels.end_w[i] * stop;
       }
     } else {
+      known = 0.5 * (begin + stop);
       const double half = 0.5 * (stop - begin);
+      known_distance = 0.5 * scale * log_ratio(known, poles);
       for (int i = 0; i < rule; ++i) {
-        r[i] = begin + half * (1 + panels.x[i]);
+        r[i] = known + half * panels.x[i];
         weight[i] = half * panels.w[i];
       }
     }
-    for (int i = 0; i < rule; ++i) nearer[i] = scale * log_ratio(r[i], poles);
+    const double a = poles.near + known, b = poles.far - known, d = stop - known;
+    if (d * (a + b) < largest_series * (2 * a * b + d * (b - a))) {
+      for (int i = 0; i < rule; ++i) {
+        double d = r[i] - known;
+        double z = d * (a + b) / (2 * a * b + d * (b - a));
+        nearer[i] = known_distance + scale * z * artanh_over(z * z);
+      }
+    } else {
+      for (int i = 0; i < rule; ++i) nearer[i] = 0.5 * scale * log_ratio(r[i], poles);
+    }
     for (int i = 0; i < rule; ++i) {
       farther[i] = 2 - nearer[i];
       position[i] = origin + per * r[i];
@@ -122,6 +142,9 @@ std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes, con
 }
 
 // Place the nodes of compressed panels.
+//
+// A panel is no longer than its distance from either end, so the logarithm of the map differs at
+// its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
 WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Panels& panels,
                       MomentNodes& nodes) {
   const int p = panels.nodes();
@@ -135,9 +158,15 @@ WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Pane
       centre = gap.length() - centre;
       half = -half;
     }
+    const double a = poles.near + centre, b = poles.far - centre;
+    const double distance = log_ratio(centre, poles) * scale;
     double* nearer = &nodes.from_end[side][nodes.count];
     double* farther = &nodes.from_end[1 - side][nodes.count];
-    for (int i = 0; i < p; ++i) nearer[i] = scale * log_ratio(centre + half * panels.x[i], poles);
+    for (int i = 0; i < p; ++i) {
+      double d = half * panels.x[i];
+      double z = d * (a + b) / (2 * a * b + d * (b - a));
+      nearer[i] = distance + 2 * z * artanh_over(z * z) * scale;
+    }
     for (int i = 0; i < p; ++i) farther[i] = 2 - nearer[i];
     for (int field = 0; field < nodes.fields; ++field) {
       const double* weights = &panels.weights[field][tile.row * p];
