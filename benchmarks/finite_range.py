@@ -19,7 +19,7 @@ polynomials:
              + (2 σ0 / (π E*)) ln |(tan ψ + tan φ) / (tan ψ - tan φ)|,   ψ like φ at θ
 
 by superposing flat punches, as Johnson, Int. J. Solids Struct. 32 (1995) 423, for one wave; the
-last term is that of ``adhesis.solver.references.dugdale_wave``. The separation is the mean gap.
+last term is that of ``tests.support.dugdale_wave``. The separation is the mean gap.
 
 **random**: any random profile, by minimising the energy of the gap g ≥ 0 on a uniform periodic
 grid at a fixed mean gap, from each state to the next in small steps:

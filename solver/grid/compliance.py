@@ -122,19 +122,21 @@ class EdgeCompliance:
         self, width: int, gap: int, neighbours: tuple[int, int, int] | None
     ) -> float:
         """Compute S of the geometry with rounded lengths."""
-        key: tuple[int, ...]
         if neighbours is None:
-            # The shorter of patch and gap is rounded; together they are the period.
-            short = _rounded[min(width, self.n - width)]
-            width = short if width <= self.n - width else self.n - short
-            key = (width,)
+            key = self._rounded_patch(width)[:1]
         else:
             near, far_gap, far = neighbours
-            key = (_rounded[width], _rounded[gap], _rounded[near], _rounded[far_gap], _rounded[far])
+            key = tuple(_rounded[k] for k in (width, gap, near, far_gap, far))
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = self._compute(key)
         return known
+
+    def _rounded_patch(self, width: int) -> tuple[int, ...]:
+        """Round the shorter of the only patch and the only gap; together they are the period."""
+        short = _rounded[min(width, self.n - width)]
+        width = short if width <= self.n - width else self.n - short
+        return width, self.n - width, 0, 0, 0
 
     def across_patch(self, width: int, left: int, right: int, before: int, after: int) -> Array:
         """Compute S of the two free nodes beside a patch, shape (2, 2), in m/Pa.
@@ -148,12 +150,8 @@ class EdgeCompliance:
         before, after : int
             Contact nodes beyond them; 0 for none.
         """
-        key: tuple[int, ...]
         if before == 0 and after == 0:
-            # A single patch: the shorter of it and the only gap is rounded.
-            short = _rounded[min(width, self.n - width)]
-            width = short if width <= self.n - width else self.n - short
-            key = (0, width, self.n - width, 0, 0, 0)
+            key = (0, *self._rounded_patch(width))
         else:
             key = (0, *(_rounded[k] for k in (width, left, right, before, after)))
         known = self._pairs.get(key)

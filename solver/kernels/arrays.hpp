@@ -107,4 +107,16 @@ inline double largest(const Vector& values) {
   return size;
 }
 
+// Indices of those that are marked.
+inline Integers indices(const Flags& marked) {
+  Integers out;
+  for (int i = 0; i < int(marked.size()); ++i)
+    if (marked[i]) out.push_back(i);
+  return out;
+}
+
+// Throw if a signal's handler in Python raises: an interrupt, or a time limit. Long kernels call it
+// between their steps, where what they change is complete.
+void check_signals();
+
 }  // namespace adhesis

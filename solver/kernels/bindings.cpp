@@ -18,8 +18,6 @@
 #include "grid.hpp"
 #include "newton.hpp"
 #include "predictor.hpp"
-#include "signals.hpp"
-#include "step_size.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -101,22 +99,30 @@ struct type_caster<adhesis::Vector> : ArrayCaster<adhesis::Vector, double> {};
 template <>
 struct type_caster<adhesis::Integers> : ArrayCaster<adhesis::Integers, int64_t> {};
 
+// Square matrices likewise.
+template <>
+struct type_caster<adhesis::Matrix> {
+  NB_TYPE_CASTER(adhesis::Matrix, const_name("numpy.typing.NDArray[numpy.float64]"))
+
+  bool from_python(handle from, uint32_t flags, cleanup_list* cleanup) noexcept {
+    make_caster<adhesis::Vector> values;
+    if (!values.from_python(from, flags, cleanup)) return false;
+    value.n = int(std::lround(std::sqrt(double(values.value.size()))));
+    value.values = std::move(values.value);
+    return true;
+  }
+
+  static handle from_cpp(const adhesis::Matrix& a, rv_policy, cleanup_list* cleanup) noexcept {
+    auto out = adhesis::hand_over(a.values, {size_t(a.n), size_t(a.n)});
+    return make_caster<decltype(out)>::from_cpp(out, rv_policy::automatic, cleanup);
+  }
+};
+
 }  // namespace nanobind::detail
 
 namespace adhesis {
 
 namespace {
-
-Matrix matrix_of(Vector values) {
-  Matrix out;
-  out.n = int(std::lround(std::sqrt(double(values.size()))));
-  out.values = std::move(values);
-  return out;
-}
-
-Output<double> array_of(const Matrix& matrix) {
-  return hand_over(matrix.values, {size_t(matrix.n), size_t(matrix.n)});
-}
 
 // A value and a slope at each angle.
 template <class Evaluate>
@@ -142,11 +148,6 @@ auto each(const std::vector<Object>& objects, Member Object::* member) {
 struct Searched {
   SearchedGaps gaps;
 };
-
-std::optional<LinearResponse> keep(NewResponse&& made) {
-  if (!made.has_field) return std::nullopt;
-  return std::move(made.response);
-}
 
 // θ and T at rising θ, the weight of ∫ T g dθ divided by T, and b_n.
 std::tuple<Vector, Vector, Vector, Vector> rising(FineOpening fine) {
@@ -269,11 +270,9 @@ void bind_model(nb::module_& m) {
       .def(
           "free_edges",
           [](const EdgeLaw& law, const Vector& gaps) {
-            const Flags held = at_memory(gaps, law);
-            Integers out;
-            for (int e = 0; e < int(held.size()); ++e)
-              if (!held[e]) out.push_back(e);
-            return out;
+            Flags free = at_memory(gaps, law);
+            for (char& one : free) one = !one;
+            return indices(free);
           },
           "gaps"_a, "Find the edges that are not at their memory; all where edges are not pinned.")
       .def(
@@ -300,7 +299,6 @@ void bind_field(nb::module_& m) {
       .def_ro("pressure", &Field::pressure, "p = 2p̄/E*; NaN if there is no solution.")
       .def_ro("separation", &Field::separation, "q0 s.")
       .def_ro("unit_mean", &Field::unit_mean, "Xᵀ (B + G)⁻¹ X.")
-      .def_ro("resistance", &Field::resistance, "-2π/resistance is ∂p/∂d at fixed edges.")
       .def_ro("opening", &Field::opening, "C at each edge.")
       .def_ro("scaled_opening", &Field::scaled_opening,
               "f: the openings over sqrt(1-η²), at all nodes.")
@@ -326,13 +324,14 @@ void bind_field(nb::module_& m) {
           },
           "scaled"_a, "Evaluate C at each edge from f at all nodes, of all modes.")
       .def(
-          "openings_by_prescribed",
+          "by_prescribed",
           [](const Field& f) {
+            const double rate = -2 * pi / f.resistance;
             Vector out = edge_openings(f.solved[1], f.nodes, f.equations, false);
-            for (double& opening : out) opening *= 2 * pi / f.resistance;
-            return out;
+            for (double& opening : out) opening *= -rate;
+            return std::tuple(rate, -f.unit_mean * rate / (2 * pi), out);
           },
-          "∂C/∂d at fixed edges.")
+          "Differentiate p, q0 s and C by d at fixed edges.")
       .def(
           "fine_opening",
           [](const Field& f, int k, double per_wave) {
@@ -434,26 +433,8 @@ void bind_response(nb::module_& m) {
           "opening", [](const LinearResponse& r) { return each(r.edges, &Edge::opening); },
           "C of every edge in its reference.")
       .def_prop_ro(
-          "potential",
-          [](const LinearResponse& r) { return std::pair(r.potential_at(0), r.potential_at(1)); },
-          "Potentials of the last solution without p, and with a unit of p.")
-      .def_prop_ro(
-          "negative", [](const LinearResponse& r) { return r.tree.runs.back().count.negative; },
-          "Number of negative eigenvalues.")
-      .def_prop_ro(
           "charges", [](const LinearResponse& r) { return each(r.tree.runs, &Run::rank); },
           "Number of charges of every run of the tree of gaps.")
-      .def(
-          "update",
-          [](const LinearResponse& known, const Vector& gaps, double prescribed,
-             const std::optional<Integers>& least, const EdgeLaw& law, const Model& model) {
-            const Integers own = least.value_or(Integers());
-            return keep(update_response(known, gaps, prescribed, own, law, model));
-          },
-          "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a, "model"_a, Unlocked(),
-          "Set up a response of gaps of which most are those of this one.")
-      .def("count_unknown", &count_unknown, "gaps"_a, "law"_a, "model"_a,
-           "Count the gaps that `update` would not take over.")
       .def("settle", &settle_response, "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked(),
            "Renew the response for a known equilibrium; False if it is outgrown.")
       .def(
@@ -471,29 +452,18 @@ void bind_response(nb::module_& m) {
           },
           "gaps"_a, "pressure"_a, "prescribed"_a, "model"_a,
           "Solve every gap by itself in the potential of the last solution.")
-      .def(
-          "tangent_between",
-          [](LinearResponse& r, const Vector& gaps, const Integers& edges, double prescribed,
-             const EdgeLaw& law, const Model& model) {
-            return array_of(tangent_between(r, gaps, edges, prescribed, law, model));
-          },
-          "gaps"_a, "edges"_a, "prescribed"_a, "law"_a, "model"_a,
-          "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.\n\n"
-          "All others follow, but those at their memory, which are pinned.")
+      .def("tangent_between", &tangent_between, "gaps"_a, "edges"_a, "prescribed"_a, "law"_a,
+           "model"_a,
+           "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.\n\n"
+           "All others follow, but those at their memory, which are pinned.")
       .def("find_equilibrium", &find_equilibrium, "gaps"_a, "prescribed"_a, "reach"_a, "strict"_a,
            "law"_a, "model"_a, Unlocked(),
            "Find the equilibrium next to these gaps by Newton's iteration.")
       .def("descend", &descend, "gaps"_a, "prescribed"_a, "most"_a, "equal_speeds"_a, "running"_a,
            "law"_a, "model"_a, Unlocked(), "Descend in energy until an event.");
-  m.def(
-      "set_up_response",
-      [](const Vector& gaps, double prescribed, const std::optional<Integers>& least,
-         const EdgeLaw& law, const Model& model) {
-        const Integers own = least.value_or(Integers());
-        return keep(set_up_response(gaps, prescribed, own, law, model));
-      },
-      "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a, "model"_a, Unlocked(),
-      "Solve the field of these gaps, and linearise about it; None if they have none.");
+  m.def("set_up_response", &set_up_response, "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a,
+        "model"_a, Unlocked(),
+        "Solve the field of these gaps, and linearise about it; None if they have none.");
 }
 
 void bind_nucleation(nb::module_& m) {
@@ -606,19 +576,10 @@ void bind_grid(nb::module_& m) {
 
 // Single parts, for their tests.
 void bind_parts(nb::module_& m) {
-  m.def("pair_runs", &pair_runs, "count"_a,
-        "Pair neighbouring runs of gaps, level by level: the halves of every run.");
-  m.def(
-      "pair_again",
-      [](const Halves& known, const Integers& source) {
-        const PairedAgain again = pair_again(known, source);
-        return std::pair(again.halves, again.same);
-      },
-      "known"_a, "source"_a, "Pair the runs of gaps most of which are those of known halves.");
   m.def(
       "count_negative",
-      [](Vector h, Vector r) {
-        return count_negative(h.data(), r.data(), matrix_of(h).n).negative;
+      [](Matrix h, Matrix r) {
+        return count_negative(h.values.data(), r.values.data(), h.n).negative;
       },
       "h"_a, "r"_a, "Count the negative eigenvalues of [[h, 1], [1, r]].");
   m.def(
@@ -629,54 +590,17 @@ void bind_parts(nb::module_& m) {
                           each(found, &Candidate::error));
       },
       "theta"_a, "opening"_a, "Find local minima where θ falls: position, value, its error.");
-  m.def(
-      "on_new_tree",
-      [](const LinearResponse& response, double prescribed, const EdgeLaw& law,
-         const Model& model) {
-        LinearResponse out = response;
-        const int count = out.gap_count(), n = out.nodes.size();
-        const Tree known = std::exchange(
-            out.tree, Tree(out.nodes, pair_runs(count), Integers(2 * count - 1), model.digits));
-        std::copy_n(known.theta.begin(), n, out.tree.theta.begin());
-        std::copy_n(known.stretch.begin(), n, out.tree.stretch.begin());
-        for (Vector& potential : out.potential) potential.resize(out.tree.size());
-        for (int run = count; run < out.tree.run_count(); ++run) out.tree.place_charges(run);
-        out.charges.fill(Charges(out.tree.size()));
-        for (int k = 0; k < count; ++k) out.condense(k);
-        out.factor_runs(Flags(count, true));
-        out.solve(prescribed, law, model.device);
-        return out;
-      },
-      "response"_a, "prescribed"_a, "law"_a, "model"_a,
-      "Solve a response on a tree that is built anew.");
   nb::class_<EdgeModel>(m, "EdgeModel", "Model of the edge openings about solved edges.")
-      .def(
-          "__init__",
-          [](EdgeModel* model, const Integers& edges, const Vector& gaps, const Vector& residual,
-             const Vector& tangent, const EdgeLaw& law, const Panels& panels) {
-            new (model) EdgeModel(edges, gaps, residual, matrix_of(tangent), law, panels);
-          },
-          "edges"_a, "gaps"_a, "residual"_a, "tangent"_a, "law"_a, "panels"_a,
-          nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>())
+      .def(nb::init<const Integers&, const Vector&, const Vector&, const Matrix&, const EdgeLaw&,
+                    const Panels&>(),
+           "edges"_a, "gaps"_a, "residual"_a, "tangent"_a, "law"_a, "panels"_a,
+           nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>())
       .def_prop_ro("opening",
                    [](const EdgeModel& e) { return each(e.edges, &MovingEdge::opening); })
       .def_prop_ro("own", [](const EdgeModel& e) { return each(e.edges, &MovingEdge::own); })
-      .def_prop_ro(
-          "coupling", [](const EdgeModel& e) { return array_of(e.coupling()); }, new_array)
-      .def_prop_ro("forces",
-                   [](const EdgeModel& model) {
-                     Vector out(model.edges.size());
-                     model.forces(out);
-                     return out;
-                   })
-      .def_prop_ro(
-          "hessian",
-          [](const EdgeModel& model) {
-            Matrix out(int(model.edges.size()));
-            model.hessian(out);
-            return array_of(out);
-          },
-          new_array)
+      .def_prop_ro("coupling", &EdgeModel::coupling)
+      .def_prop_ro("forces", &EdgeModel::forces)
+      .def_prop_ro("hessian", &EdgeModel::hessian)
       .def("advance", &EdgeModel::advance, "step"_a, "Move the edges outwards by these steps.")
       .def("flow", &flow_through, "limit"_a, "equal_speeds"_a, "is_long"_a, "strongest"_a, "law"_a);
   nb::class_<ModelFlow>(m, "ModelFlow", "Flow through the model.")
@@ -684,19 +608,10 @@ void bind_parts(nb::module_& m) {
            "lengths"_a, "residuals"_a)
       .def_ro("motion", &ModelFlow::motion)
       .def_ro("lengths", &ModelFlow::lengths);
-  m.def(
-      "implicit_step",
-      [](const Vector& hessian, const Vector& force, double longest, bool equal_speeds) {
-        return implicit_step(matrix_of(hessian), force, longest, equal_speeds);
-      },
-      "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a, "Take a linearly implicit step.");
-  m.def(
-      "distance_to_minimum",
-      [](const Vector& hessian, const Vector& force) {
-        return distance_to_minimum(matrix_of(hessian), force);
-      },
-      "hessian"_a, "force"_a,
-      "Compute the largest motion to the minimum of a quadratic model; infinite without one.");
+  m.def("implicit_step", &implicit_step, "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a,
+        "Take a linearly implicit step.");
+  m.def("distance_to_minimum", &distance_to_minimum, "hessian"_a, "force"_a,
+        "Compute the largest motion to the minimum of a quadratic model; infinite without one.");
   m.def("model_error", &model_error, "flow"_a, "residual"_a, "edges"_a, "gaps"_a, "law"_a);
   m.def("next_reach", &next_reach, "before"_a, "length"_a, "error"_a);
 }

@@ -1,7 +1,7 @@
 // Factor and solve small symmetric positive definite systems.
 //
 // Factors are A = LᵀL with L lower, by rows and from the last one on: every loop then starts at
-// the beginning of a row, and eight rows are subtracted at once.
+// the beginning of a row.
 #pragma once
 
 #include "arrays.hpp"

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 
-#include "signals.hpp"
-#include "step_size.hpp"
-
 namespace adhesis {
 
 namespace {
@@ -104,13 +101,6 @@ Flags held_edges(const Flags& runs, const Vector& ends, const EdgeLaw& law) {
   for (int e = 0; e < count; ++e)
     if (runs[e]) some[e] = some[(e + 1) % count] = some[(e + count - 1) % count] = true;
   return some;
-}
-
-Integers indices(const Flags& marked) {
-  Integers out;
-  for (int e = 0; e < int(marked.size()); ++e)
-    if (marked[e]) out.push_back(e);
-  return out;
 }
 
 // Let held edges flow through the model; `strongest` is the largest norm of forces so far.

@@ -8,6 +8,7 @@
 // the end of each step shows how wrong the model was.
 #pragma once
 
+#include "edge_model.hpp"
 #include "renewal.hpp"
 
 namespace adhesis {

@@ -148,13 +148,16 @@ void EdgeModel::follow_lengths(const Vector& step) {
     edges[e].theta += outwards(edges[e].edge) * 0.5 * step[e];
 }
 
-void EdgeModel::forces(Vector& force) const {
+Vector EdgeModel::forces() const {
+  Vector force(edges.size());
   for (size_t e = 0; e < edges.size(); ++e)
     force[e] =
         edges[e].critical * edges[e].critical - edges[e].opening * std::abs(edges[e].opening);
+  return force;
 }
 
-void EdgeModel::hessian(Matrix& out) const {
+Matrix EdgeModel::hessian() const {
+  Matrix out(int(edges.size()));
   for (int e = 0; e < out.n; ++e) {
     const MovingEdge& edge = edges[e];
     const double twice = 2 * std::max(edge.opening, 0.0);
@@ -166,24 +169,23 @@ void EdgeModel::hessian(Matrix& out) const {
     if (!edges[e].pinned) continue;
     for (int f = 0; f < out.n; ++f) out(e, f) = out(f, e) = e == f ? 1 : 0;
   }
+  return out;
 }
 
 ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds, bool is_long,
                        double strongest, const EdgeLaw& law) {
   const int count = int(model.edges.size());
   ModelFlow out;
-  Matrix hessian(count);
-  Vector force(count);
   const double longest = (is_long ? 1 : MODEL_SHORT_STEP) * law.longest_step;
   double length = 0, share = 1, first = 0, shortest = law.rest_step;
   for (double own : limit) shortest = std::min(shortest, law.rest_step * own / law.longest_step);
   while (share == 1) {
-    model.forces(force);
+    const Vector force = model.forces();
     const double total = norm(force);
     strongest = std::max(strongest, total);
     first = std::max(first, total);
     if (is_long ? near_balance(total, strongest, law) : FORCES_FELL * total < first) break;
-    model.hessian(hessian);
+    const Matrix hessian = model.hessian();
     Vector step = implicit_step(hessian, force, longest, equal_speeds);
     if (law.pins()) stop_at_memory(model, force, step, law);
     if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
@@ -212,6 +214,32 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
 bool near_balance(double force, double strongest, const EdgeLaw& law) {
   const double small = NEAR_BALANCE * law.critical * law.critical;
   return force < small && FORCES_FELL * force < strongest;
+}
+
+double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
+                   const Vector& ends, const EdgeLaw& law) {
+  double worst = 0;
+  for (size_t e = 0; e < residual.size(); ++e) {
+    const double critical = critical_opening(ends[edges[e]], law).value;
+    const double at_end = std::abs(residual[e] + critical - flow.opening[e]);
+    for (size_t i = 0; i < flow.lengths.size(); ++i) {
+      const double share = flow.lengths[i] / flow.lengths.back();
+      const double error = share * share * at_end;
+      const double unbalance = std::max(std::abs(flow.residuals[i][e]) - error, 0.0);
+      const double allowed = MODEL_ERROR * law.critical + MODEL_SHARE * unbalance;
+      // not written as > : an error that is no number is too large
+      if (!(error <= worst * allowed)) worst = error / allowed;
+    }
+  }
+  return worst;
+}
+
+double next_reach(double before, double length, double error) {
+  const double safe = REACH_SAFETY / std::sqrt(std::max(error, 1e-9));
+  const double factor = std::min(STEP_GROWTH, std::max(STEP_REDUCTION, safe));
+  double reach = length * factor;
+  if (error <= 1) reach = std::max(reach, factor >= 1 ? before : 0.0);
+  return reach;
 }
 
 }  // namespace adhesis

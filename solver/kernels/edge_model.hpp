@@ -44,11 +44,11 @@ class EdgeModel {
   void advance(const Vector& step);
 
   // Forces C_c² - C |C|.
-  void forces(Vector& force) const;
+  Vector forces() const;
 
   // H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others. Pinned
   // edges, which have no force, are kept where they are.
-  void hessian(Matrix& out) const;
+  Matrix hessian() const;
 
   // ∂C_e/∂n_f over C_f; zero on the diagonal.
   const Matrix& coupling() const { return coupling_; }
@@ -95,5 +95,16 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
 
 // Whether forces that were as large as `strongest` have come near a minimum or saddle.
 bool near_balance(double force, double strongest, const EdgeLaw& law);
+
+// Measure by how much the openings of the model are wrong at the end of a long step, in units of
+// what is allowed.
+//
+// `residual` is C - C_c of the field there. On the way the errors are taken to grow as the square
+// of its length, and far from balance more is allowed.
+double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
+                   const Vector& ends, const EdgeLaw& law);
+
+// Choose the next reach after a long step of this length, in longest steps, and error.
+double next_reach(double before, double length, double error);
 
 }  // namespace adhesis

@@ -15,8 +15,7 @@ void weigh_inverse(const double* inverse, const GaussRule& rule, double* respons
 }
 
 Tree build_tree(const Nodes& nodes, double digits) {
-  const auto halves = pair_runs(nodes.gap_count());
-  Tree tree(nodes, halves, Integers(halves.size(), 0), digits);
+  Tree tree(nodes, digits);
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     for (int i = 0; i < nodes.size_of(k); ++i) {
@@ -40,13 +39,13 @@ Vector apply_inverse(const Nodes& nodes, const Vector& inverse, const Vector& x)
   return out;
 }
 
-// Apply (B + G)⁻¹ to a load.
+// Apply (B + G)⁻¹ to a load; `potential` receives what the gaps do to each other then.
 Vector solve_load(const Nodes& nodes, const FactoredGaps& gaps, const Vector& weights,
-                  const Vector& load) {
+                  const Vector& load, Vector& potential) {
   const Tree& tree = gaps.tree;
   const int n = nodes.size();
   Charges charges(tree.size());
-  Vector potential(tree.size());
+  potential.resize(tree.size());
   Vector solved = apply_inverse(nodes, gaps.inverse, load);
   for (int i = 0; i < n; ++i) charges.isolated[i] = weights[i] * solved[i];
   for (int run = tree.count; run < tree.run_count(); ++run) tree.charge(run, charges);
@@ -105,9 +104,11 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
                   &tree.response[tree.runs[k].response]);
   }
   for (int run = count; run < tree.run_count(); ++run) tree.factor(run);
-  field.solved = {solve_load(nodes, out.factored, weights, field.equations.load),
-                  solve_load(nodes, out.factored, weights, nodes.weight)};
-  const double load_mean = dot(nodes.weight.data(), field.solved[0].data(), n);
+  Pair& potential = out.factored.potential;
+  field.solved = {solve_load(nodes, out.factored, weights, field.equations.load, potential[0]),
+                  solve_load(nodes, out.factored, weights, nodes.weight, potential[1])};
+  const double load_mean = out.factored.load_mean =
+      dot(nodes.weight.data(), field.solved[0].data(), n);
   field.unit_mean = dot(nodes.weight.data(), field.solved[1].data(), n);
   auto [weight, compliance] = model.device;
   field.resistance = weight * field.unit_mean + 2 * pi * compliance;
@@ -160,23 +161,6 @@ Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const 
   field.opening = edge_openings(f, nodes, field.equations, true);
   field.scaled_opening = f;
   return field;
-}
-
-Vector gap_potentials(const Field& field) {
-  const Nodes& nodes = field.nodes;
-  Vector out(nodes.size());
-  for (int k = 0; k < nodes.gap_count(); ++k) {
-    const Vector& w = gauss_rules()[nodes.orders[k]].weights;
-    const int m = nodes.size_of(k), first = nodes.offset[k];
-    for (int i = 0; i < m; ++i) {
-      // A f + w g + S~ + p X = 0
-      double total =
-          field.equations.load[first + i] + field.pressure * nodes.weight[first + i] +
-          dot(&field.equations.blocks[nodes.square[k] + i * m], &field.scaled_opening[first], m);
-      out[first + i] = -total / w[i];
-    }
-  }
-  return out;
 }
 
 double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,

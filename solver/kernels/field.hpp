@@ -27,6 +27,8 @@ struct Field {
 struct FactoredGaps {
   Vector inverse;  // of the diagonal blocks
   Tree tree;
+  Pair potential;        // of the gaps on each other by the loads S~ and X
+  double load_mean = 0;  // Xᵀ (B + G)⁻¹ S~
 };
 
 struct SolvedField {
@@ -47,9 +49,6 @@ Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const 
 // Evaluate C = sqrt(2 dη/dθ) f(±1) at every gap end, less the terms of higher modes if asked for.
 Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equations,
                      bool with_end_terms);
-
-// Potential of the other gaps at every node, from the balance of its own gap.
-Vector gap_potentials(const Field& field);
 
 // Interpolate a potential g at θ from G = g dθ/dη at the nodes of a gap; beyond an end of the gap
 // it is the potential at that end.

@@ -1,5 +1,7 @@
 #include "grid.hpp"
 
+#include "cholesky.hpp"
+
 namespace adhesis {
 
 double total(Numbers values) {
@@ -55,16 +57,10 @@ double advance(Changed stress, Changed displacement, Changed residual, Numbers d
 
 double inverse_form(Changed values, Numbers vector) {
   const int n = int(vector.size());
-  double *matrix = values.data(), sum = 0;
-  Vector y(n);
-  for (int i = 0; i < n; ++i) {
-    double* row = matrix + i * n;
-    for (int j = 0; j < i; ++j) row[j] = (row[j] - dot(row, matrix + j * n, j)) / matrix[j * n + j];
-    row[i] = std::sqrt(row[i] - dot(row, row, i));
-    y[i] = (vector[i] - dot(row, y.data(), i)) / row[i];
-    sum += y[i] * y[i];
-  }
-  return sum;
+  Vector solved(vector.begin(), vector.end());
+  if (!factor_rows(values.data(), n, n)) return not_a_number;
+  solve_column(values.data(), n, n, solved.data());
+  return dot(solved.data(), vector.data(), n);
 }
 
 }  // namespace adhesis

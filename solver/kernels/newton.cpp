@@ -1,18 +1,10 @@
 #include "newton.hpp"
 
 #include "condensed.hpp"
-#include "signals.hpp"
 
 namespace adhesis {
 
 namespace {
-
-Integers indices(const Flags& marked) {
-  Integers out;
-  for (int e = 0; e < int(marked.size()); ++e)
-    if (marked[e]) out.push_back(e);
-  return out;
-}
 
 // Pin edges that come to their memory, and release those whose opening no longer holds them.
 //

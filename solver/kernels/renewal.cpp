@@ -50,7 +50,11 @@ bool any(const Flags& flags) { return std::find(flags.begin(), flags.end(), true
 
 }  // namespace
 
-Outdated is_outdated(const Gap& known, const Gap& gap, double softness, const EdgeLaw& law) {
+Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, const EdgeLaw& law) {
+  const Gap& known = response.nodes.gaps[k];
+  const double softness = response.softness[k];
+  // in other potentials than those of its reference its edges follow otherwise
+  const double balanced = UNBALANCED * law.critical;
   Outdated out = {false, false};
   for (int side = 0; side < 2; ++side) {
     const double moved = std::abs(gap.end[side] - known.end[side]);
@@ -66,20 +70,10 @@ Outdated is_outdated(const Gap& known, const Gap& gap, double softness, const Ed
     if (!(moved <= REFERENCE_FAR * least)) out.far = true;
     if (!(std::abs(patch - before) <= REFERENCE_PATCH * std::min(before, patch)))
       out.changed = true;
-  }
-  return out;
-}
-
-Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, const EdgeLaw& law) {
-  const double softness = response.softness[k];
-  Outdated out = is_outdated(response.nodes.gaps[k], gap, softness, law);
-  // in other potentials than those of its reference its edges follow otherwise
-  const double allowed = UNBALANCED * law.critical;
-  for (int side = 0; side < 2; ++side) {
     const Edge& edge = response.edges[2 * k + side];
     const bool pinned = law.pins() && edge.held;
-    const double residual = edge.imbalance(side).value;
-    if (std::abs(residual) * softness > allowed && allowed > 0 && !pinned) out.changed = true;
+    if (std::abs(edge.imbalance(side).value) * softness > balanced && balanced > 0 && !pinned)
+      out.changed = true;
   }
   return out;
 }
@@ -182,6 +176,30 @@ bool settle_response(LinearResponse& response, const Vector& ends, double prescr
     return false;
   response.solve(prescribed, law, model.device);
   return true;
+}
+
+std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed,
+                                              const std::optional<Integers>& least,
+                                              const EdgeLaw& law, const Model& model) {
+  Integers orders = choose_orders(map_gaps(ends), model.digits);
+  // While edges move towards one state, a gap must not lose modes again, or the field's error would
+  // drive them to and fro.
+  if (least && least->size() == orders.size())
+    for (size_t k = 0; k < orders.size(); ++k) orders[k] = std::max(orders[k], (*least)[k]);
+  auto [field, factored] = solve_field(ends, prescribed, orders, 2, model);
+  if (!std::isfinite(field.pressure)) return std::nullopt;
+  LinearResponse out(std::move(field.nodes), std::move(field.equations), std::move(factored.tree));
+  out.inverse = std::move(factored.inverse);
+  out.scaled_opening = field.scaled_opening;
+  for (int column = 0; column < 2; ++column)
+    add_scaled(-1, factored.potential[column].data(), out.potential[column].data(),
+               out.tree.size());
+  out.mean = {-factored.load_mean, -field.unit_mean};
+  for (Edge& edge : out.edges) edge.held = law.pins();  // which are pinned is not known yet
+  const int count = out.gap_count();
+  for (int k = 0; k < count; ++k) out.linearise_in_current_potential(k, field.pressure, law);
+  out.factor_runs(Flags(count, true));
+  return out;
 }
 
 }  // namespace adhesis

@@ -3,7 +3,7 @@
 // A gap whose edge leaves its reference is linearised anew where it is now, in the potential of the
 // last solution, and the runs of the tree that hold the gap are computed anew. So a state next to a
 // known one costs the changed gaps and one pass through the tree. Where a patch comes or goes the
-// other gaps keep their responses, and the tree all runs that hold no change.
+// response is set up anew: taking over the other gaps saves time beyond some 150 of them only.
 #pragma once
 
 #include "field.hpp"
@@ -15,13 +15,10 @@ struct Outdated {
   bool changed, far;  // whether a gap has left its reference, and whether far
 };
 
-// Compare a gap with its reference. The response is wrong to second order, in which the motion
-// squared over the gap or the patch beside it may be the error of the field; the less the softer
-// the gap is: next to a fold.
-Outdated is_outdated(const Gap& known, const Gap& gap, double softness, const EdgeLaw& law);
-
 // Return whether gap k, now `gap`, is to be renewed: it has left its reference, or was out of
-// balance in it.
+// balance in it. The response is wrong to second order, in which the motion squared over the gap or
+// the patch beside it may be the error of the field; the less the softer the gap is: next to a
+// fold.
 Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, const EdgeLaw& law);
 
 bool any_outdated(const LinearResponse& response, const Vector& ends, const EdgeLaw& law);
@@ -46,22 +43,10 @@ void condense_gaps(LinearResponse& response, const Flags& some);
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
                      const EdgeLaw& law, const Model& model);
 
-struct NewResponse {
-  LinearResponse response;
-  bool has_field;
-};
-
-// Solve the field of these gaps, and linearise about it; `least` are the least orders of the gaps,
-// or empty.
-NewResponse set_up_response(const Vector& ends, double prescribed, const Integers& least,
-                            const EdgeLaw& law, const Model& model);
-
-// Set up a response of gaps of which most are those of another.
-NewResponse update_response(const LinearResponse& known, const Vector& ends, double prescribed,
-                            const Integers& least, const EdgeLaw& law, const Model& model);
-
-// Count the gaps that update_response would not take over.
-int count_unknown(const LinearResponse& known, const Vector& ends, const EdgeLaw& law,
-                  const Model& model);
+// Solve the field of these gaps, if they have one, and linearise about it; `least` are the least
+// orders of the gaps.
+std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed,
+                                              const std::optional<Integers>& least,
+                                              const EdgeLaw& law, const Model& model);
 
 }  // namespace adhesis

@@ -15,6 +15,24 @@ Gap interval(const std::vector<Gap>& gaps, int first, int last) {
   return {{gaps[first].end[0], gaps[last].end[1]}, {left, right}, alpha_of(length, left, right)};
 }
 
+// Pair neighbouring runs of gaps, level by level: the halves of every run, of a gap -1.
+std::vector<std::array<int, 2>> pair_runs(int count) {
+  std::vector<std::array<int, 2>> halves(2 * count - 1, {-1, -1});
+  Integers level(count);
+  for (int i = 0; i < count; ++i) level[i] = i;
+  int made = count;
+  while (level.size() > 1) {
+    Integers above;
+    for (size_t i = 0; i + 1 < level.size(); i += 2) {
+      halves[made] = {level[i], level[i + 1]};
+      above.push_back(made++);
+    }
+    if (level.size() % 2 == 1) above.push_back(level.back());
+    level = above;
+  }
+  return halves;
+}
+
 // Return the number of charges that a run needs.
 int wanted_rank(const Gap& interval, double digits) {
   int wanted = int(std::ceil((digits + CHARGE_MARGIN) / convergence_rate(interval)));
@@ -245,73 +263,9 @@ WIDE NegativeCount count_negative(double* h, double* r, int n) {
   return out;
 }
 
-Halves pair_runs(int count) {
-  Halves halves(2 * count - 1, {-1, -1});
-  Integers level(count);
-  for (int i = 0; i < count; ++i) level[i] = i;
-  int made = count;
-  while (level.size() > 1) {
-    Integers above;
-    for (size_t i = 0; i + 1 < level.size(); i += 2) {
-      halves[made] = {level[i], level[i + 1]};
-      above.push_back(made++);
-    }
-    if (level.size() % 2 == 1) above.push_back(level.back());
-    level = above;
-  }
-  return halves;
-}
-
-PairedAgain pair_again(const Halves& known, const Integers& source) {
-  const int count = int(source.size()), before = (int(known.size()) + 1) / 2;
-  PairedAgain out{Halves(2 * count - 1, {-1, -1}), Integers(2 * count - 1, -1)};
-  std::copy(source.begin(), source.end(), out.same.begin());
-  Integers image(known.size(), -1);  // of every run of the known tree
-  int made = count;
-  int first = -1;  // run of the gaps before all known ones
-  int free = 0;    // index in the known tree
-  for (int k = 0; k < count; ++k) {
-    int after = k;
-    while (after < count && source[after] < 0) ++after;
-    const int end = after < count ? source[after] : before;
-    if (source[k] >= 0) free = source[k];
-    if (source[k] >= 0 || free < end) {
-      image[free] = k;
-      if (first >= 0) {
-        out.halves[made] = {first, k};
-        image[free] = made++;
-        first = -1;
-      }
-      ++free;
-    } else if (free == 0 && first < 0) {
-      first = k;
-    } else {
-      int& partner = free == 0 ? first : image[free - 1];
-      out.halves[made] = {partner, k};
-      partner = made++;
-    }
-  }
-  for (int run = before; run < int(known.size()); ++run) {
-    auto [left, right] = known[run];
-    const int one = image[left], two = image[right];
-    image[run] = std::max(one, two);
-    if (one >= 0 && two >= 0) {
-      out.halves[made] = {one, two};
-      if (out.same[one] == left && out.same[two] == right) out.same[made] = run;
-      image[run] = made++;
-    }
-  }
-  return out;
-}
-
-Halves Tree::halves() const {
-  Halves out;
-  for (const Run& run : runs) out.push_back(run.half);
-  return out;
-}
-
-Tree::Tree(const Nodes& nodes, const Halves& halves, const Integers& known, double digits)
-    : runs(halves.size()), count(nodes.gap_count()) {
+Tree::Tree(const Nodes& nodes, double digits) : count(nodes.gap_count()) {
+  const auto halves = pair_runs(count);
+  runs.resize(halves.size());
   Run end;  // of all runs so far
   for (int i = 0; i < run_count(); ++i) {
     Run& run = runs[i];
@@ -331,7 +285,7 @@ Tree::Tree(const Nodes& nodes, const Halves& halves, const Integers& known, doub
       run.rank = 0;
       if (i < run_count() - 1) {  // outside the whole there is nothing
         run.interval = interval(nodes.gaps, run.range[0], run.range[1]);
-        run.rank = known[i] > 0 ? known[i] : wanted_rank(run.interval, digits);
+        run.rank = wanted_rank(run.interval, digits);
       }
     }
     end.node += run.rank;

@@ -23,9 +23,6 @@
 
 namespace adhesis {
 
-// The halves of every run; of a gap -1.
-using Halves = std::vector<std::array<int, 2>>;
-
 // Number of negative eigenvalues, and the distance of a gap's 2×2, or of the pair of a run's
 // halves, from singular: 1 without interaction.
 struct NegativeCount {
@@ -66,13 +63,11 @@ struct Tree {
 
   Tree() = default;
 
-  // Allocate the tree of gaps in runs with these halves; `known` are numbers of charges, or 0.
-  Tree(const Nodes& nodes, const Halves& halves, const Integers& known, double digits);
+  // Allocate the tree of gaps.
+  Tree(const Nodes& nodes, double digits);
 
   int size() const { return int(theta.size()); }
   int run_count() const { return int(runs.size()); }
-
-  Halves halves() const;
 
   // Place the charges of a run, and compute its interpolation and kernel; the charges of which
   // halves have moved, if its own have not.
@@ -93,19 +88,6 @@ struct Tree {
   void pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const;
   void pass_down(const Charges& charges, Vector& potential) const;
 };
-
-// Pair neighbouring runs, level by level.
-Halves pair_runs(int count);
-
-struct PairedAgain {
-  Halves halves;
-  Integers same;  // index of each run in the known tree, -1 if it has changed
-};
-
-// Pair the runs of gaps most of which are gaps of a known tree: source[k] is the index there, or
-// -1. A gap that is not in the tree replaces one that is gone, if there is one between the same
-// neighbours; else it is paired with the gap before it.
-PairedAgain pair_again(const Halves& known, const Integers& source);
 
 // Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.
 //

@@ -1,4 +1,1 @@
-"""Loading paths through contact states: loops, several turning points, any path; their results.
-
-Import from its modules.
-"""
+"""Loading paths through contact states: loops, several turning points, any path; their results."""

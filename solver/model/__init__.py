@@ -1,4 +1,1 @@
-"""Problem and its states: profile, half-space, control, problem, contact state, jump.
-
-Import from its modules.
-"""
+"""Problem and its states: profile, half-space, control, problem, contact state, jump."""

@@ -5,7 +5,6 @@
 ``periodic_punch``  Koiter's row of flat strips
 ``parabola``        JKR in plane strain
 ``last_gap``        one gap in an otherwise closed contact
-``exact_wave``      the single wave as a ``Method``
 
 Import from its modules.
 """

@@ -1,4 +1,1 @@
-"""The running program: threads, signals, memory.
-
-Import from its modules.
-"""
+"""The running program: threads, signals, memory."""

@@ -24,7 +24,6 @@ from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point
 from adhesis.solver.sharp.equilibrium.griffith import (
     imbalance,
     leaving_step,
-    move_edges,
     positions,
     step_limits,
 )
@@ -34,9 +33,9 @@ from adhesis.solver.sharp.field.gap_field import (
     GapField,
     respond_at_fixed_edges,
 )
-from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
+from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, without_small
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
-from adhesis.solver.sharp.system.kept_responses import KeptResponses
+from adhesis.solver.sharp.system.kept_response import KeptResponse
 from adhesis.solver.sharp.tolerances import (
     ENDLESS,
     EQUAL,
@@ -50,15 +49,11 @@ class EdgeMechanics(EdgeProblem):
     """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
     The linear response of the gaps is kept from one state to the next.
-
-    Attributes
-    ----------
-    responses : KeptResponses
     """
 
     def __init__(self, *problem: Any) -> None:
         super().__init__(*problem)
-        self.responses = KeptResponses(self)
+        self.kept = KeptResponse(self)
         self._finer: tuple[Point, Field] | None = None
 
     def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Field:
@@ -74,9 +69,8 @@ class EdgeMechanics(EdgeProblem):
     ) -> GapField:
         """Return the field of these gaps, with p and q0 s where they are known."""
         return GapField(
-            self.source, gaps, prescribed, self.tolerance, self.model.device,
-            lambda: self.solution(gaps, prescribed), nearly,
-        )  # fmt: skip
+            self.source, gaps, prescribed, lambda: self.solution(gaps, prescribed), nearly
+        )
 
     def release(self, gaps: Array, prescribed: float, theta: float, half: float) -> Array:
         """Compute G/γ at the two edges next to θ ± ``half``, all edges being held."""
@@ -126,37 +120,38 @@ class EdgeMechanics(EdgeProblem):
         """
         if not shortest_length(gaps) > 0:
             return None
-        reach = max(reach, self.settled)
+        reach = max(reach, self.newton_tolerance)
         law = self.law_at(gaps if memory is None else memory)
         for _ in range(RESPONSE_TRIALS):
-            near = self.responses.near(gaps, prescribed, orders)
+            near = self.kept.near(gaps, prescribed, orders)
             if near is None:
                 break
-            found = near.response.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
-            self.count.add_newton(found.corrections)
+            found = near.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
+            self.count.newton_steps += found.corrections
+            self.count.fields += found.corrections
             if found.found:
                 point = self._point(prescribed, found)
-                near.settled = point.gaps
+                self.kept.settled = point.gaps
                 return point
             if not found.is_outgrown:
                 break
             gaps = found.gaps
-            near.is_outgrown = True
+            self.kept.forget()
         return None
 
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
         """Make the point of an equilibrium."""
         gaps = found.gaps
+        nearly = found.pressure, found.separation
         field = GapField(
-            self.source, gaps, prescribed, self.tolerance, self.model.device,
-            lambda: found.solve_field(prescribed, self.model), (found.pressure, found.separation),
-        )  # fmt: skip
+            self.source, gaps, prescribed, lambda: found.solve_field(prescribed, self.model), nearly
+        )
         pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)
 
     def forget(self) -> None:
         """Forget what results would depend on within the error of the field."""
-        self.responses.forget()
+        self.kept.forget()
 
     def relax(
         self, gaps: Array, prescribed: float, reach: float, *, equal_speeds: bool = False
@@ -201,7 +196,10 @@ class EdgeMechanics(EdgeProblem):
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1
-                if gaps.shape == rested.shape and np.abs(gaps - rested).max() < self.settled:
+                if (
+                    gaps.shape == rested.shape
+                    and np.abs(gaps - rested).max() < self.newton_tolerance
+                ):
                     rests = max(rests, RESTS + 1)  # no patience changes anything
                 rested = gaps
                 strict = rests <= RESTS
@@ -233,18 +231,17 @@ class EdgeMechanics(EdgeProblem):
         """
         running = Running(start)
         while True:
-            near = self.responses.near(gaps, prescribed, orders)
+            near = self.kept.near(gaps, prescribed, orders)
             if near is None:
                 return None, orders, most
-            end = near.response.descend(
-                gaps, prescribed, most, equal_speeds, running, law, self.model
-            )
-            self.count.add_descent(end.steps)
+            end = near.descend(gaps, prescribed, most, equal_speeds, running, law, self.model)
+            self.count.descent_steps += end.steps
+            self.count.fields += end.steps
             most -= end.steps
             if end.event != DescentEvent.OUTGROWN:
-                return end, near.response.orders, most
+                return end, near.orders, most
             gaps = end.gaps
-            near.is_outgrown = True
+            self.kept.forget()
 
     def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.
@@ -253,11 +250,11 @@ class EdgeMechanics(EdgeProblem):
         first, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
-        near, free = self.responses.at(gaps, prescribed), law.free_edges(gaps)
+        near, free = self.kept.at(gaps, prescribed), law.free_edges(gaps)
         if near is None or self.critical == 0 or len(free) == 0:
             return []
-        tangent = near.response.tangent_between(gaps, free, prescribed, law, self.model)
-        by_edge = near.response.opening[free, None] * tangent
+        tangent = near.tangent_between(gaps, free, prescribed, law, self.model)
+        by_edge = near.opening[free, None] * tangent
         limit = step_limits(gaps, law.longest_step)[free]
         order = positions(gaps, self.source.highest)[free]
         found = leaving_step(by_edge + by_edge.T, limit, order)
@@ -308,10 +305,6 @@ class EdgeMechanics(EdgeProblem):
         opening = self.solution(gaps, prescribed).opening
         residual = imbalance(opening, gaps, law)
         e = int(np.argmax(np.abs(residual)))
-        length, patch = lengths_of(gaps)
-        beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
-        closing = CLOSING_SHARE * min(length[e // 2], beside)
-        step[e] = min(0.5 * times * law.longest_step, closing)
-        onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
-        return onwards
+        step[e] = -np.sign(residual[e]) * step_limits(gaps, 0.5 * times * law.longest_step)[e]
+        return move_edges(gaps, step)

@@ -73,7 +73,7 @@ class SharpReport(MethodReport):
     jump_resolution : float
         Separation to which a jump is located, over h_max.
     fields, energies, openings, newton_steps, descent_steps : int
-        See ``counters.Counters``.
+        See ``system.edge_problem.Counters``.
     """
 
     accuracy: float

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 # ---------------------------------------------------------------- equilibrium of the edges
 
-SETTLED = 1e-7
+NEWTON_TOLERANCE = 1e-7
 """λ_min. An edge this near to the reference of its gap keeps it, which ends Newton's iteration."""
-COARSE_FIELD = 10.0
+FIELD_ERROR = 10.0
 """λ_min per relative error of the field: how far an equilibrium may move with that error."""
 SMALLEST_LENGTH = 0.005
 """λ_min. Narrower patches and gaps are removed."""
@@ -21,8 +21,6 @@ SMALLEST_OF_SEED = 0.05
 
 # ---------------------------------------------------------------- linear response of the gaps
 
-RESPONSES_KEPT = 3
-"""Responses that are kept, each of another number of gaps."""
 RESPONSE_TRIALS = 4
 """Times that a response is set up for one equilibrium, where gaps need more and more nodes."""
 

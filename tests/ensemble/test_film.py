@@ -26,8 +26,8 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.loop.film import Film
 from adhesis.ensemble.loop.film_scenes import scenes_of
 from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.references.exact_wave import ExactWave
 from tests.support.browser import needs_browser, seen_by_browser
+from tests.support.exact_wave import ExactWave
 
 MATERIAL = HalfSpace(1e6, 0.5)
 

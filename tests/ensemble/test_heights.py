@@ -19,9 +19,9 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.heights import closure_warning, read_heights
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.model.profile import Array, self_affine_profile, single_wave
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.campaign_support import campaign_text
+from tests.support.exact_wave import ExactWave
 
 N = 16
 SINGLE = single_wave(1e-9, 1e-3)

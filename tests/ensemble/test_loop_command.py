@@ -17,8 +17,8 @@ import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.provenance import provenance
 from adhesis.ensemble.quantities import units_of
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.exact_wave import ExactWave
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2

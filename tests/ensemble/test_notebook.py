@@ -45,7 +45,7 @@ from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks, views
 from adhesis.solver.loading import loop_result
-from adhesis.solver.references.exact_wave import ExactWave
+from tests.support.exact_wave import ExactWave
 
 WAVE = single_wave(1e-6, 1e-3)
 

@@ -20,8 +20,8 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.run.launch import python, python_environment
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.exact_wave import ExactWave
 from tests.support.synthetic_results import campaign, rows, write
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9

@@ -24,8 +24,8 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.run.lock import holder
 from adhesis.ensemble.run.session import run_campaign
-from adhesis.solver.references.exact_wave import ExactWave
 from tests.support.campaign_support import campaign_text
+from tests.support.exact_wave import ExactWave
 from tests.support.fake_run import fake_engine
 from tests.support.synthetic_results import campaign, rows, write
 

@@ -15,8 +15,8 @@ import xarray as xr
 import adhesis
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.sealed_file import sealed
-from adhesis.solver.references.exact_wave import ExactWave
 from tests.support.crafted_hdf5 import made, put, virtual
+from tests.support.exact_wave import ExactWave
 
 SEAL = len(sealed(b""))
 HALF_SPACE = adhesis.HalfSpace(1e6, 0.5)

@@ -47,7 +47,7 @@ from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, real, shown, whole
 from adhesis.solver.loading.cycle import check_cycle
 from adhesis.solver.method import MethodReport
-from adhesis.solver.references.exact_wave import ExactWave
+from tests.support.exact_wave import ExactWave
 from tests.support.wrong_values import outside
 
 PERIOD, AMPLITUDE = 1e-3, 1e-6

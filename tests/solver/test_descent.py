@@ -153,12 +153,13 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     prescribed = separation * 2 * np.pi * 1e-3
     none = Running(ends)
     while True:
-        near = edges.responses.near(ends, prescribed, None)
+        near = edges.kept.near(ends, prescribed, None)
         assert near is not None
-        found = near.response.descend(ends, prescribed, most, False, none, edges.law, edges.model)
+        found = near.descend(ends, prescribed, most, False, none, edges.law, edges.model)
         if found.event != DescentEvent.OUTGROWN:
             return found
-        near.is_outgrown, ends = True, found.gaps
+        edges.kept.forget()
+        ends = found.gaps
 
 
 NARROW = [[0.2, 2 * np.pi - 0.2]]  # one narrow patch on the crest at θ = 0
@@ -178,10 +179,12 @@ def test_a_descent_in_pieces_keeps_the_reach_to_which_its_model_led(wave):
     edges, ends = wave.edges, np.array(NARROW)
     prescribed, running = 0.5 * 2 * np.pi * 1e-3, Running(np.array(NARROW))
     for _ in range(30):
-        near = edges.responses.near(ends, prescribed, None)
+        near = edges.kept.near(ends, prescribed, None)
         assert near is not None
-        found = near.response.descend(ends, prescribed, 2, False, running, edges.law, edges.model)
-        near.is_outgrown, ends = found.event == DescentEvent.OUTGROWN, found.gaps
+        found = near.descend(ends, prescribed, 2, False, running, edges.law, edges.model)
+        ends = found.gaps
+        if found.event == DescentEvent.OUTGROWN:
+            edges.kept.forget()
         if found.event == DescentEvent.AT_REST:
             break
     assert found.event == DescentEvent.AT_REST

@@ -23,10 +23,10 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.method import Method, PathError
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
+from tests.support.exact_wave import ExactWave
 from tests.support.grids import grid_of
 
 WAVE = single_wave(1e-6, 1e-3)

@@ -20,12 +20,12 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.model.profile import Array
-from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.nucleation.nucleation import Touch
 from benchmarks.finite_range import GridLoop
+from tests.support.dugdale_wave import DugdaleWave
 from tests.support.explicit_solution import explicit_openings
 
 WAVE = SingleWave(1.0, 2 * np.pi, 1.0, 0.09 * np.pi / 4)  # α = 0.3; lengths in 1/q0, E* = 1

@@ -33,9 +33,9 @@ from adhesis.solver.loading.zero_range import (
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Jump
-from adhesis.solver.references.dugdale_wave import DugdaleWave
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.dugdale_wave import DugdaleWave
+from tests.support.exact_wave import ExactWave
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 
 PERIOD = 2e-3

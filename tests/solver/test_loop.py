@@ -12,8 +12,8 @@ from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Profile
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.exact_wave import ExactWave
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11

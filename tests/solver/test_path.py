@@ -17,9 +17,9 @@ from adhesis import (
 )
 from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.path_record import Axis
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.sharp.method import SharpMethod
 from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
+from tests.support.exact_wave import ExactWave
 
 ROUGH = self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)
 HALF_SPACE = HalfSpace(1e6, 0.0)

@@ -23,8 +23,8 @@ from adhesis.solver.loading.mean_stress_event import up_to
 from adhesis.solver.method import ContactState, Method, Path
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Profile
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.exact_wave import ExactWave
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11

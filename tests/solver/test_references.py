@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import quad
 
 from adhesis import self_affine_profile, single_wave
-from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
 from adhesis.solver.references.parabola import parabola_load, parabola_pull_off
 from adhesis.solver.references.periodic_punch import pull_off_stress
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.dugdale_wave import DugdaleWave
 
 MODULUS = 1.3
 

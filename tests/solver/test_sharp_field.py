@@ -51,9 +51,7 @@ def solved_field(
 ) -> GapField:
     """Solve the field of these gaps to a relative accuracy."""
     model = FieldModel(device, float(-np.log(tolerance)), source.panels)
-    return GapField(
-        source, gaps, prescribed, tolerance, device, lambda: solve_field(gaps, prescribed, model)
-    )
+    return GapField(source, gaps, prescribed, lambda: solve_field(gaps, prescribed, model))
 
 
 def energy(source, gaps, separation):
@@ -123,7 +121,7 @@ def test_a_narrow_gap_of_many_modes_opens_as_one_of_few(source, separation):
     for least in (0, MOST_NODES):
         chosen = solve_field(gaps, separation, model).orders
         solution = solve_field(gaps, separation, model, np.maximum(chosen, least))
-        field = GapField(source, gaps, separation, 1e-8, FIXED_SEPARATION, lambda of=solution: of)
+        field = GapField(source, gaps, separation, lambda of=solution: of)
         shape = fine_opening(field, 0)
         assert len(shape.theta) >= solution.offset[1]
         openings.append(np.interp(gaps[0].mean(), shape.theta, shape.opening))

@@ -12,8 +12,8 @@ import adhesis.solver.validate.claims as validation
 import adhesis.solver.validate.judge as judging
 from adhesis import ContactState, HalfSpace, Problem
 from adhesis.ensemble.command.main import main
-from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.validate.claims import METHODS, Row, validate
+from tests.support.exact_wave import ExactWave
 
 WAVE_CLAIMS = tuple(
     claim

@@ -1,4 +1,1 @@
-"""Continuation of stable branches: predictor, corrector, events, jumps.
-
-Import from its modules.
-"""
+"""Continuation of stable branches: predictor, corrector, events, jumps."""

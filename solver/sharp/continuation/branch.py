@@ -148,10 +148,6 @@ class Fold:
 class Trail:
     """Accepted points since the last search for touches; at the first of them nothing overlaps.
 
-    Parameters
-    ----------
-    point : Point
-
     Attributes
     ----------
     points : list of Point

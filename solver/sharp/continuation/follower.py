@@ -17,7 +17,7 @@ from adhesis.solver.sharp.continuation.jump import ComputedJump, History, Jumps,
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import positions, step_limits
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.gap.ends import outward
+from adhesis.solver.sharp.gap.ends import move_edges
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import (
     ClosingBound,
@@ -113,7 +113,7 @@ class Follower:
 
     def _turned_back(self, point: Point) -> Point:
         """Return the point at which a path turns back: all its edges are pinned there at first."""
-        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.settled)
+        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.newton_tolerance)
         return point.with_previous(None) if pinned is None else pinned
 
     def _imbalance(self, output: Point, point: Point) -> float:
@@ -382,8 +382,7 @@ class Follower:
         longest = step_limits(gaps, abs(length))
         motion = np.zeros(gaps.size)
         motion[edge] = math.copysign(longest[edge], length)
-        moved: Array = gaps + (outward(gaps) * motion).reshape(-1, 2)
-        return moved
+        return move_edges(gaps, motion)
 
     def _early_closure_error(self, before: ContactState, point: Point, way: float) -> float:
         """Bound the work in J/m² that a loop under a load misses, as it is closed before the fold.

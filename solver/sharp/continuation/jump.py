@@ -290,12 +290,14 @@ class Jumps:
 
     def _is_same(self, here: Array, there: Array) -> bool:
         """Whether gaps are those of one minimum."""
-        apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.coarse)
+        apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.field_error)
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
     def is_same(self, one: Array, other: Array) -> bool:
         """Whether two equilibria are one to the accuracy at which they are known."""
-        return one.shape == other.shape and bool(np.abs(one - other).max() < 10 * self.edges.coarse)
+        return one.shape == other.shape and bool(
+            np.abs(one - other).max() < 10 * self.edges.field_error
+        )
 
     def _descend(
         self, gaps: Array, at: float, touches: list[Touch], rivals: list[Rival]

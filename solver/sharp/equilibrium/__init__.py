@@ -1,4 +1,1 @@
-"""Points of a branch, the balance of the edges, and steps off a saddle.
-
-Import from its modules.
-"""
+"""Points of a branch, the balance of the edges, and steps off a saddle."""

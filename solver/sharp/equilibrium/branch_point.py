@@ -9,7 +9,7 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.field.gap_field import GapField
-from adhesis.solver.sharp.gap.ends import outward
+from adhesis.solver.sharp.gap.ends import move_edges, outward
 
 ALL_EDGES = slice(None)
 
@@ -136,5 +136,4 @@ class Point:
 
     def extrapolate(self, at: float) -> Array:
         """Extrapolate the gaps to d = ``at``, along the tangent."""
-        motion = outward(self.gaps) * self.rate * (at - self.at)
-        return self.gaps + motion.reshape(-1, 2)
+        return move_edges(self.gaps, self.rate * (at - self.at))

@@ -1,4 +1,4 @@
-"""Griffith's condition at the edges, C_e = C_c, motions of the edges, and steps off a saddle."""
+"""Griffith's condition at the edges, C_e = C_c, limits of steps, and steps off a saddle."""
 
 from __future__ import annotations
 
@@ -7,18 +7,13 @@ import numpy as np
 from adhesis.solver._kernels import CLOSING_SHARE, EdgeLaw
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.threads import one_thread
-from adhesis.solver.sharp.gap.ends import lengths_of, outward
+from adhesis.solver.sharp.gap.ends import lengths_of
 from adhesis.solver.sharp.tolerances import EQUAL
 
 
 def imbalance(opening: Array, gaps: Array, law: EdgeLaw) -> Array:
     """Compute C_e - C_c from C at every edge, positive where contact recedes, shape (2L,)."""
     return np.asarray(opening - law.critical_of(gaps, opening))
-
-
-def move_edges(gaps: Array, step: Array) -> Array:
-    """Move the contact outwards by ``step`` at every edge."""
-    return np.asarray(gaps + (outward(gaps) * step).reshape(-1, 2))
 
 
 def step_limits(gaps: Array, longest: float) -> Array:

@@ -1,4 +1,1 @@
-"""Elastic field of given contact edges, on a tree of gaps.
-
-Import from its modules.
-"""
+"""Elastic field of given contact edges, on a tree of gaps."""

@@ -36,9 +36,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-
-from adhesis.solver._kernels import Field, LoadingDevice
+from adhesis.solver._kernels import Field
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 
@@ -70,9 +68,7 @@ class FixedEdgeResponse(NamedTuple):
 def respond_at_fixed_edges(solution: Field) -> FixedEdgeResponse:
     """Differentiate a solution by d, at fixed edges; FloatingPointError if there is none."""
     check_definite(solution)
-    pressure = -2 * np.pi / solution.resistance
-    separation = -solution.unit_mean * pressure / (2 * np.pi)
-    return FixedEdgeResponse(pressure, separation, solution.openings_by_prescribed())
+    return FixedEdgeResponse(*solution.by_prescribed())
 
 
 class GapField:
@@ -86,9 +82,6 @@ class GapField:
         gaps[0, 0] + 2π.
     prescribed : float
         d of :class:`LoadingDevice`: q0 s at fixed separation.
-    tolerance : float
-        Wanted relative accuracy of the interaction between gaps.
-    device : LoadingDevice
     solve : callable
         Solves (1) for these gaps.
     nearly : tuple of float, optional
@@ -101,13 +94,10 @@ class GapField:
         source: StressSource,
         gaps: Array,
         prescribed: float,
-        tolerance: float,
-        device: LoadingDevice,
         solve: Callable[[], Field],
         nearly: tuple[float, float] | None = None,
     ) -> None:
         self.source, self.gaps, self.prescribed = source, gaps, prescribed
-        self.tolerance, self.device = tolerance, device
         self._solve: Callable[[], Field] | None = solve
         self._nearly = nearly
 

@@ -1,4 +1,1 @@
-"""Ends of gaps, and the full-contact stress on panels.
-
-Import from its modules.
-"""
+"""Ends of gaps, and the full-contact stress on panels."""

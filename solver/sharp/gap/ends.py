@@ -34,6 +34,11 @@ def _signs(count: int) -> Array:
     return sign
 
 
+def move_edges(gaps: Array, step: Array) -> Array:
+    """Move the contact outwards by ``step`` at every edge."""
+    return np.asarray(gaps + (outward(gaps) * step).reshape(-1, 2))
+
+
 def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
     """Drop the patches that ``keep`` (one value for the patch right of each gap) excludes."""
     if not keep.any():

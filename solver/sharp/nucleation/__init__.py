@@ -1,4 +1,1 @@
-"""Nucleation of contact inside a gap, and of a crack inside a patch.
-
-Import from its modules.
-"""
+"""Nucleation of contact inside a gap, and of a crack inside a patch."""

@@ -1,4 +1,1 @@
-"""Contact states and fields in SI units from a solution.
-
-Import from its modules.
-"""
+"""Contact states and fields in SI units from a solution."""

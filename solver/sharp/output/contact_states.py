@@ -65,13 +65,7 @@ def loading_device(problem: Problem) -> LoadingDevice:
 
 
 class States:
-    """Contact states and conversions of units of one problem.
-
-    Parameters
-    ----------
-    problem : Problem
-    edges : EdgeProblem
-    """
+    """Contact states and conversions of units of one problem."""
 
     def __init__(self, problem: Problem, edges: EdgeProblem) -> None:
         self.problem, self.adhesion, self.count = problem, edges.adhesion, edges.count

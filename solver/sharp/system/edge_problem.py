@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from adhesis.solver._kernels import (
@@ -12,18 +14,28 @@ from adhesis.solver._kernels import (
     ProfileAdhesion,
 )
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
-    COARSE_FIELD,
     DESCENT_HANDS_OVER,
+    FIELD_ERROR,
     LONGEST_STEP,
-    SETTLED,
+    NEWTON_TOLERANCE,
     SMALLEST_LENGTH,
     SMALLEST_OF_SEED,
 )
 
 FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
+
+
+@dataclass
+class Counters:
+    """Numbers of field solutions, energies, fine openings and steps."""
+
+    fields: int = 0
+    energies: int = 0
+    openings: int = 0
+    newton_steps: int = 0
+    descent_steps: int = 0
 
 
 class EdgeProblem:
@@ -45,10 +57,9 @@ class EdgeProblem:
     ----------
     wave : float
         λ_min in θ.
-    settled : float
-        An edge this near to the reference of its gap keeps it.
-    coarse : float
-        Displacement of an equilibrium that the error of the field can cause.
+    newton_tolerance, field_error : float
+        Correction that ends Newton's iteration; displacement of an equilibrium that the error of
+        the field can cause.
     smallest : float
         Narrower patches and gaps are removed.
     surface : float
@@ -69,8 +80,8 @@ class EdgeProblem:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.adhesion = adhesion or ProfileAdhesion(source.panels)
         self.wave = 2 * np.pi / source.top
-        self.settled = SETTLED * self.wave
-        self.coarse = max(self.settled, COARSE_FIELD * tolerance * self.wave)
+        self.newton_tolerance = NEWTON_TOLERANCE * self.wave
+        self.field_error = max(self.newton_tolerance, FIELD_ERROR * tolerance * self.wave)
         self.longest_step = LONGEST_STEP * self.wave
         # far below the width at which a patch on the sharpest crest first comes to rest,
         # (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8, where adhesion is weakest
@@ -83,8 +94,8 @@ class EdgeProblem:
         self.law = EdgeLaw(
             adhesion=self.adhesion,
             critical=float(critical),
-            newton_tolerance=self.settled,
-            field_error=self.coarse,
+            newton_tolerance=self.newton_tolerance,
+            field_error=self.field_error,
             rest_step=DESCENT_HANDS_OVER * self.wave,
             longest_step=self.longest_step,
             smallest=float(self.smallest),
