@@ -9,6 +9,7 @@ from adhesis import HalfSpace, Problem, self_affine_profile
 from adhesis.solver._kernels import (
     FieldModel,
     LoadingDevice,
+    count_negative,
     set_up_response,
     solve_field,
 )
@@ -238,3 +239,19 @@ def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
         state = method.follow(state, profile.h_max * (1 - 0.0225 * step)).states[-1]
     assert method.report().descent_steps < 50_000
     assert state.patches > 40
+
+
+@pytest.mark.parametrize("negative", range(4))
+def test_negative_eigenvalues_that_appear_together_are_counted(negative):
+    """Of a pair of halves whose first one has none, and all directions of which are alike."""
+    rng = np.random.default_rng(negative)
+    n = 12
+    root, _ = np.linalg.qr(rng.standard_normal((n, n)))
+    softest = np.where(np.arange(n) < negative, 1.5, 0.5)  # of the interaction over the stiffness
+    response = root @ np.diag(np.linspace(1, 2, n)) @ root.T
+    inverse_root = np.linalg.inv(np.linalg.cholesky(response))
+    other, _ = np.linalg.qr(rng.standard_normal((n, n)))
+    interaction = inverse_root.T @ other @ np.diag(softest) @ other.T @ inverse_root
+    both = np.block([[interaction, np.eye(n)], [np.eye(n), response]])
+    assert (np.linalg.eigvalsh(both) < 0).sum() == n - negative
+    assert count_negative(interaction, response) == n - negative
