@@ -15,6 +15,7 @@ from adhesis.solver.checks import counted
 from adhesis.solver.loading.ledger import Ledger, estimated_error, states_before_jumps
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.loading.zero_range import (
+    SMEARED,
     TOUCH_SHARE,
     InteriorTension,
     interior_tension,
@@ -323,6 +324,8 @@ class EquilibriumPath(ByValue, ResultViews):
         if math.isfinite(strength):
             range_ = self.problem.work_of_adhesion / strength
             largest = 0.0 if interior is None else interior.tension
+            zones = SMEARED * (range_ / self.edge_range) ** 4
+            outside += f"; zones at edges, left out, change the loss by about {100 * zones:.1g} %"
             return (
                 f"adhesion of a range of {range_:.3g} m: surfaces jump together from there on, and "
                 f"patches open from inside at {strength:.3g} Pa, "

@@ -79,6 +79,10 @@ OPENED_SHARE = 0.1
 real interface yields over a zone before it opens. At a quarter losses were 4 to 46 % too small, and
 zones grow as the square of the range (docs/zero-range.md)."""
 
+SMEARED = 0.05
+"""Share of the loss of zero range that cohesive zones at edges change, over (δ/``edge_range``)⁴:
+0.04 to 0.06 beside exact waves under Dugdale's law (docs/zero-range.md)."""
+
 # Number of jumps of unloading before which tension is searched, those with the largest drops: where
 # tension is largest, contact is lost with a large drop. And number of states of the whole path.
 _JUMPS, _SAMPLES = 16, 6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
@@ -146,6 +147,15 @@ def test_a_weight_loses_what_it_loses_without_a_range():
     ranged, without = (loop_at(0.3, share, Control(0.0)) for share in (0.1, 0.0))
     assert ranged.jumps[0].separation == pytest.approx(1.1 * A, rel=1e-12)
     assert abs(ranged.loss - without.loss) < ranged.loss_error + without.loss_error
+
+
+@pytest.mark.parametrize(("alpha", "share"), [(0.1, 0.02), (0.3, 0.1), (0.5, 0.2)])
+def test_a_loop_says_what_zones_at_its_edges_change(alpha, share):
+    wave, loop = wave_of(alpha), loop_at(alpha, share)
+    left_out = 100 * (loop.loss - DugdaleWave(wave, share * A).loss) / wave.loop.loss
+    said = re.search(r"edges, left out, change the loss by about (\S+) %", loop.range_summary())
+    assert said is not None
+    assert 0.6 < float(said[1]) / left_out < 1.6
 
 
 def test_surfaces_that_would_part_again_touch_from_nearer_by():
