@@ -143,7 +143,7 @@ double work_of_gaps(const Field& field) {
   double total = 0;
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const int m = nodes.size_of(k);
-    constexpr double per_wave = 3;  // two for the modes of the shortest wave, one for what decays
+    constexpr double per_wave = 2.5;  // two for the modes of the shortest wave, the rest decay
     const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, per_wave);
     const FineOpening fine = fine_moments(nodes.gaps[k], *circle_of(count + 1), panels);
     for (int n = m; n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);
@@ -162,11 +162,14 @@ std::vector<Minimum> find_minima(const Field& field, const Integers& gaps, doubl
     const auto begin = fine.opening.begin(), end = fine.opening.end();
     for (Candidate minimum : local_minima(fine.theta, fine.opening)) {
       if (minimum.opening < range + MINIMUM_DOUBT * minimum.error) refine(gap, fine.modes, minimum);
-      const auto place =
-          std::lower_bound(fine.theta.begin(), fine.theta.end(), minimum.theta, std::greater<>());
-      const auto split =
-          begin + std::clamp<std::ptrdiff_t>(place - fine.theta.begin(), 1, count - 1);
-      const double rim = std::min(*std::max_element(begin, split), *std::max_element(split, end));
+      double rim = infinity;
+      if (range > 0 && minimum.opening <= range) {
+        const auto place =
+            std::lower_bound(fine.theta.begin(), fine.theta.end(), minimum.theta, std::greater<>());
+        const auto split =
+            begin + std::clamp<std::ptrdiff_t>(place - fine.theta.begin(), 1, count - 1);
+        rim = std::min(*std::max_element(begin, split), *std::max_element(split, end));
+      }
       out.push_back({minimum.theta, minimum.opening, 2 * minimum.half, rim, k});
     }
   }

@@ -46,7 +46,8 @@ struct Candidate {
 // through a fourth node on either side.
 std::vector<Candidate> local_minima(const Vector& x, const Vector& y);
 
-// `rim` is the opening up to which the surfaces part at least on the way to either end of the gap.
+// `rim` is the opening up to which the surfaces part at least on the way to either end of the gap,
+// within the range of adhesion; infinite beyond it.
 struct Minimum {
   double theta, opening, curvature, rim;
   int gap;

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -160,7 +160,10 @@ class Nucleation:
         theta, opening, curvature, rim, clearance = found
         widths = self._lengths.seed_widths(curvature)
         near = HEALED_PLACE * self.edges.wave
-        for i in np.flatnonzero((opening > 0) & (clearance <= 0) & (rim > self.range)):
+        touching: Any = ()
+        if self.range > 0:
+            touching = np.flatnonzero((opening > 0) & (clearance <= 0) & (rim > self.range))
+        for i in touching:
             if has_healed(theta[i], 1 / opening[i], self.healed, near, 2 * np.pi):
                 clearance[i] = opening[i]
                 continue
