@@ -19,6 +19,7 @@ from adhesis.solver.loading.zero_range import (
     DOUBTFUL_EXCESS,
     DOUBTFUL_LOSS,
     DOUBTFUL_RANGE,
+    EDGE_SHARE,
     OPENED_SHARE,
     beyond_limit,
 )
@@ -37,8 +38,8 @@ def why_beyond(opens: bool) -> str:
     if opens:
         return (
             f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, "
-            "or the range of adhesion is longer than edge_range, touch_range or turn_range, or "
-            f"than {OPENED_SHARE:g} of edge_range where patches open, so that what the model "
+            f"or the range of adhesion is longer than touch_range, turn_range or {EDGE_SHARE:.2g} "
+            f"of edge_range, {OPENED_SHARE:g} of it where patches open, so that what the model "
             "leaves out matters for it (docs/zero-range.md)"
         )
     return (

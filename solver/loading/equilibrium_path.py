@@ -324,8 +324,9 @@ class EquilibriumPath(ByValue, ResultViews):
         if math.isfinite(strength):
             range_ = self.problem.work_of_adhesion / strength
             largest = 0.0 if interior is None else interior.tension
-            zones = SMEARED * (range_ / self.edge_range) ** 4
-            outside += f"; zones at edges, left out, change the loss by about {100 * zones:.1g} %"
+            zones = 100 * SMEARED * (range_ / self.edge_range) ** 4
+            if range_ < self.edge_range:
+                outside += f"; zones at edges, left out, change the loss by about {zones:.1g} %"
             return (
                 f"adhesion of a range of {range_:.3g} m: surfaces jump together from there on, and "
                 f"patches open from inside at {strength:.3g} Pa, "

@@ -83,6 +83,9 @@ SMEARED = 0.05
 """Share of the loss of zero range that cohesive zones at edges change, over (δ/``edge_range``)⁴:
 0.04 to 0.06 beside exact waves under Dugdale's law (docs/zero-range.md)."""
 
+EDGE_SHARE = (TOUCH_SHARE / SMEARED) ** 0.25
+"""Of ``edge_range``: at a longer range that is given, zones at edges change a hundredth or more."""
+
 # Number of jumps of unloading before which tension is searched, those with the largest drops: where
 # tension is largest, contact is lost with a large drop. And number of states of the whole path.
 _JUMPS, _SAMPLES = 16, 6
@@ -369,7 +372,8 @@ def beyond_limit(
     short = least_range(valid_range, edge_range, touch_range, turn_range) < DOUBTFUL_RANGE
     closed = (short | (loss > most)) & (gamma > 0)
     exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
-    long = gamma > strength * least_range(math.inf, edge_range, touch_range, turn_range)
+    edges = EDGE_SHARE * np.asarray(edge_range)
+    long = gamma > strength * least_range(math.inf, edges, touch_range, turn_range)
     opened = (np.asarray(barrier) > 0) & (gamma > OPENED_SHARE * strength * np.asarray(edge_range))
     opened = exceeded | long | opened
     return np.asarray(np.where(np.isposinf(strength), closed, np.isfinite(strength) & opened))
@@ -377,7 +381,7 @@ def beyond_limit(
 
 _WHAT_A_LONGER_RANGE_DOES = {
     "valid_range": "patches would open from inside and lose less",
-    "edge_range": "edges would give way over zones as long as what holds them",
+    "edge_range": "edges would give way over zones that are not short",
     "touch_range": "surfaces would jump into contact from further away and lose less",
     "turn_range": "jumps that lie just beyond the turning point would come before it",
 }
@@ -412,10 +416,13 @@ def range_warnings(
                 "such places yield, which zero range leaves open, may matter for the loss "
                 "(docs/zero-range.md)"
             )
-        own, least = gamma / problem.strength, min(bounds, key=lambda name: bounds[name])
-        if own > bounds[least]:
+        own = gamma / problem.strength
+        shares = {"edge_range": EDGE_SHARE, "touch_range": 1.0, "turn_range": 1.0}
+        least = min(bounds, key=lambda name: shares[name] * bounds[name])
+        if own > shares[least] * bounds[least]:
+            share = "" if shares[least] == 1 else f"{shares[least]:.2g} of "
             out.append(
-                f"the range of adhesion, {1e9 * own:.3g} nm, is longer than {least}, "
+                f"the range of adhesion, {1e9 * own:.3g} nm, is longer than {share}{least}, "
                 f"{1e9 * bounds[least]:.3g} nm: {_WHAT_A_LONGER_RANGE_DOES[least]}, which is not "
                 "in the model (docs/zero-range.md)"
             )

@@ -149,13 +149,16 @@ def test_a_weight_loses_what_it_loses_without_a_range():
     assert abs(ranged.loss - without.loss) < ranged.loss_error + without.loss_error
 
 
-@pytest.mark.parametrize(("alpha", "share"), [(0.1, 0.02), (0.3, 0.1), (0.5, 0.2)])
-def test_a_loop_says_what_zones_at_its_edges_change(alpha, share):
+@pytest.mark.parametrize(
+    ("alpha", "share", "doubtful"), [(0.1, 0.02, False), (0.3, 0.1, False), (0.5, 0.2, True)]
+)
+def test_a_loop_says_what_zones_at_its_edges_change(alpha, share, doubtful):
     wave, loop = wave_of(alpha), loop_at(alpha, share)
     left_out = 100 * (loop.loss - DugdaleWave(wave, share * A).loss) / wave.loop.loss
     said = re.search(r"edges, left out, change the loss by about (\S+) %", loop.range_summary())
     assert said is not None
     assert 0.6 < float(said[1]) / left_out < 1.6
+    assert any("0.67 of edge_range" in text for text in loop.warnings) == doubtful
 
 
 def test_surfaces_that_would_part_again_touch_from_nearer_by():
