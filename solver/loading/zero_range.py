@@ -400,8 +400,7 @@ def range_warnings(
 
     At a finite strength patches open from inside, and touches come earlier; doubtful is then a
     tension that exceeds it where no crack grows, and a range of adhesion that edges or turns do not
-    allow. ``range_`` is
-    ``valid_range``.
+    allow. ``range_`` is ``valid_range``.
     """
     out: list[str] = []
     bounds = {"edge_range": edge_range, "touch_range": touch_range, "turn_range": turn_range}
