@@ -40,10 +40,10 @@ class StatusLine:
         at_once: bool = False,
     ) -> None:
         self._stream = stream or sys.stderr
-        self._live = self._stream.isatty()
+        self.is_live = self._stream.isatty()
         self._every = every
         self._started = time.monotonic()
-        self._next = self._started + (0.0 if at_once or self._live else self._interval())
+        self._next = self._started + (0.0 if at_once or self.is_live else self._interval())
         self._begun = False  # whether a line on the terminal has no end yet
 
     @property
@@ -57,7 +57,7 @@ class StatusLine:
         if now < self._next and not last:
             return
         self._next = now + self._interval()
-        if not self._live:
+        if not self.is_live:
             print(text(), file=self._stream, flush=True)
             return
         # A line that wraps cannot be rewritten.
@@ -76,7 +76,7 @@ class StatusLine:
             self.show(text, last=True)
 
     def _interval(self) -> float:
-        if self._live:
+        if self.is_live:
             return _LIVE
         return self._every(self.seconds) if callable(self._every) else self._every
 
@@ -89,50 +89,34 @@ class Bar(Protocol):
 
 
 @contextmanager
-def bar(what: str) -> Iterator[Bar]:
-    """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals and a last one."""
-    line = StatusLine(_EVERY)
-    shown = what
+def bar(what: str, *, every: float = _EVERY, last: bool = True) -> Iterator[Bar]:
+    """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals (s) and a last one.
+
+    They come from another thread, so that there is no silence. Without ``last`` what ends within
+    the first interval has no line.
+    """
+    line, over, shown = StatusLine(every), threading.Event(), what
 
     def show(done: float | None, total: float | None, text: str = "") -> None:
         nonlocal shown
         parts = [text or what]
         if done is not None and total:
             parts.append(f"[{'#' * round(_CELLS * done / total):.<{_CELLS}}]")
-        shown = "  ".join([*parts, duration(line.seconds)])
-        line.show(lambda: shown)
+        shown = "  ".join(parts)
 
+    def text() -> str:
+        return f"{printable(shown)}  {duration(line.seconds)}"
+
+    def keep_on() -> None:
+        while not over.wait(min(_LIVE, every)):
+            line.show(text)
+
+    thread = threading.Thread(target=keep_on, daemon=True)
+    thread.start()
     try:
         yield show
     finally:
-        line.show(lambda: shown, last=True)
-
-
-@contextmanager
-def following(what: str, every: float = _EVERY) -> Iterator[Bar]:
-    """Show how far a command is: a bar on a terminal, elsewhere a line at intervals (s).
-
-    The lines come from another thread, so that there is no silence; what ends within the first
-    interval has none.
-    """
-    if sys.stderr.isatty():
-        with bar(what) as show:
-            yield show
-        return
-    shown, started, over = what, time.monotonic(), threading.Event()
-
-    def keep(done: float | None, total: float | None, text: str = "") -> None:
-        nonlocal shown
-        shown = text or (what if total is None else f"{what}: {done:g} of {total:g}")
-
-    def lines() -> None:
-        while not over.wait(every):
-            log(f"{shown} ({time.monotonic() - started:.0f} s)")
-
-    thread = threading.Thread(target=lines, daemon=True)
-    thread.start()
-    try:
-        yield keep
-    finally:
         over.set()
         thread.join()
+        if last or line.is_live:
+            line.show(text, last=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
-from adhesis.ensemble.reporter import following
+from adhesis.ensemble.reporter import bar
 
 if TYPE_CHECKING:
     from adhesis.ensemble.bench.equal_error import Line
@@ -60,7 +60,7 @@ def execute(args: argparse.Namespace) -> int:
     check_output_folder("--to", args.to, _FILES, {})
     # A file or a pipe has no width of its own; the tables need this one.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
-    with following("adhesis bench: measuring") as show_run:
+    with bar("adhesis bench: measuring", last=False) as show_run:
 
         def show(line: Line) -> None:
             run = line.run

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
-from adhesis.ensemble.reporter import following
+from adhesis.ensemble.reporter import bar
 
 if TYPE_CHECKING:
     from adhesis.solver.validate.claims import Row
@@ -45,7 +45,7 @@ def execute(args: argparse.Namespace) -> int:
             raise InputError(f"--method is {name!r}: it must be one of {', '.join(METHODS)}")
     lines = not args.json and not sys.stdout.isatty()
     judged: list[Row] = []
-    with following("adhesis validate") as show:
+    with bar("adhesis validate", last=False) as show:
 
         def follow(row: Row) -> None:
             judged.append(row)

@@ -6,31 +6,34 @@ import io
 import sys
 import time
 
-from adhesis.ensemble.reporter import following
+from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.progress import ProgressLine, Summary
 
 
-def test_what_takes_long_is_told_and_what_is_over_is_not(monkeypatch) -> None:
+def test_what_takes_long_is_told_and_what_is_over_is_not(capsys) -> None:
     said: list[str] = []
-    monkeypatch.setattr("adhesis.ensemble.reporter.log", said.append)
-    with following("claims", every=0.05) as show:
+    with bar("claims", every=0.05, last=False) as show:
         end = time.monotonic() + 20
-        while not any(line.startswith("claims: 1 of 2 (") for line in said):
-            show(min(len(said), 1), 2)
+        while not any(line.startswith("one claim  [############............]  ") for line in said):
+            said += capsys.readouterr().err.splitlines()
+            if said:
+                show(1, 2, "one claim")
             assert time.monotonic() < end
             time.sleep(0.005)
-    assert said[0].startswith("claims")
-    reported = len(said)
-    with following("no sooner than it is due", every=60.0):
+    assert said[0].startswith("claims  ")
+    capsys.readouterr()
+    with bar("no sooner than it is due", every=60.0, last=False):
         pass
-    assert len(said) == reported
+    assert not capsys.readouterr().err
+    with bar("loading", every=60.0):
+        pass
+    assert capsys.readouterr().err.startswith("loading  ")
 
 
 def test_what_is_printed_beside_a_bar_goes_to_stdout(capsys, monkeypatch) -> None:
     terminal = _Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setenv("TERM", "xterm")
-    with following("claims") as show:
+    with bar("claims") as show:
         show(1, 2, "the first claim")
         print("the first claim holds")
     assert capsys.readouterr().out == "the first claim holds\n"
