@@ -107,23 +107,9 @@ class _Progress:
             f"{name} ({branch}, {drive_text(drive, self.load)})"
             for name, (_, branch, drive) in loops.running.items()
         )
-        left = self._left(loops)
+        left = None if finished else loops.seconds_left
         line = f"{len(loops.done)} of {len(self.plan.runs)} loops"
         if running:
             line += f"; running {running}"
         line += f"; {self.line.seconds:.0f} s so far"
-        return line + (f", about {duration(left)} left" if loops.done and not finished else "")
-
-    def _left(self, loops: Loops) -> float:
-        """Expected wall seconds, corrected by what the loops have taken so far."""
-        expected = self.plan.seconds
-        running = {name: seconds for name, (seconds, _, _) in loops.running.items()}
-        ended = list(loops.took)[1:]  # the first one loads what the processes share
-        predicted = sum(expected[name] for name in ended)
-        ratio = sum(loops.took[name] for name in ended) / predicted if predicted > 0 else 1.0
-        rest = [
-            max(ratio * expected[name] - seconds, 0.25 * seconds)
-            for name, seconds in running.items()
-        ]
-        waiting = sum(ratio * expected[name] for name in loops.waiting)
-        return max([(waiting + sum(rest)) / max(loops.processes, 1), *rest])
+        return line if left is None else f"{line}, about {duration(left)} left"

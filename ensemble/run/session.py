@@ -212,7 +212,7 @@ class _Session:
 
         progress = self._progress = ProgressLine(
             self._counts,
-            lambda: schedule.seconds_left(master.in_flight, len(channel.workers)),
+            lambda: schedule.seconds_left(master.notes, len(channel.workers)),
             self.stream,
         )
 
