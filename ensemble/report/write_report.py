@@ -58,7 +58,6 @@ def _write_files(
     from adhesis.ensemble.report.curves_dataset import curves_dataset
     from adhesis.ensemble.report.figures.catalogue import sections
     from adhesis.ensemble.report.figures.style import save, style
-    from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
     from adhesis.ensemble.report.tables import loss_tables, mechanisms
@@ -82,9 +81,7 @@ def _write_files(
     for number, item in enumerate(items, 1):
         progress(f"figure {number} of {len(items)}, {item.name}")
         with style():
-            figure = item.draw(data if item.whole else data.shown)
-            if not item.whole:
-                figure.say_below(below(data.shown.cells, common(data.shown)))
+            figure = item.of(data)
         save(figure, directory / item.name)
     progress("pages")
     page = write_page(data, figures)

@@ -18,7 +18,7 @@ from adhesis.ensemble.report.figures.shapes_and_spectra import (
     shown_penetrations,
 )
 from adhesis.ensemble.report.figures.style import PublishedFigure
-from adhesis.ensemble.report.further_axes import together
+from adhesis.ensemble.report.further_axes import below, common, together
 from adhesis.ensemble.report.paper import PaperFigure
 
 
@@ -38,6 +38,14 @@ class Illustration:
     whole: bool = False  # whether it draws all cells, and not those of :attr:`Aggregate.shown`
     # Returns whether there is something to see: more than one point, or fields
     is_worth: Callable[[Aggregate], bool] = lambda data: True
+
+    def of(self, data: Aggregate) -> PublishedFigure:
+        """Draw it; below the panels stands which cells are shown."""
+        if self.whole:
+            return self.draw(data)
+        figure = self.draw(data.shown)
+        figure.say_below(below(data.shown.cells, common(data.shown)))
+        return figure
 
 
 def _several(name: str) -> Callable[[Aggregate], bool]:
