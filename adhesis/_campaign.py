@@ -209,7 +209,7 @@ class Campaign:
 
 def _warn_of_failures(path: Path) -> None:
     """Warn with the number of failed tasks and the first reason."""
-    from adhesis.ensemble.results.status import read_status
+    from adhesis.ensemble.aggregate.status import read_status
 
     status = read_status(path)
     if status["failed"]:

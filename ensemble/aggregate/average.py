@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.cells import Cell, read_cells, stress_scale
+from adhesis.ensemble.aggregate.cells import Cell, finished_cells, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion, read_companion
 from adhesis.ensemble.aggregate.jumps import JumpStatistics, count_jumps
 from adhesis.ensemble.aggregate.mean_curves import Curve, average_curves
@@ -140,7 +140,7 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     """
     with Results(path) as results:
         status, kept = results.status(), np.append(results.column(KEPT), len(results))
-        cells = tuple(_averaged(results, cell, kept) for cell in read_cells(results, status))
+        cells = tuple(_averaged(results, cell, kept) for cell in finished_cells(results))
         failed = np.flatnonzero(status == FAILED)[:_MAX_FAILURES]
         companions = tuple(read_companion(other, results.campaign) for other in beside)
         return Aggregate(

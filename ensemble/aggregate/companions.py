@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from adhesis.ensemble.aggregate.cells import Cell, read_cells
+from adhesis.ensemble.aggregate.cells import Cell, finished_cells
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.compare import differing
 from adhesis.ensemble.campaign.rules import shown
@@ -67,7 +67,7 @@ class LossDifference:
 def read_companion(path: Path | str, campaign: Campaign) -> Companion:
     """Read another results file and the keys in which its campaign differs (InputError)."""
     with Results(path) as results:
-        other, cells = results.campaign, read_cells(results, results.status())
+        other, cells = results.campaign, finished_cells(results)
         doubts = results.doubts()
     values, keys = other.values(), differing_keys(campaign, other)
     return Companion(

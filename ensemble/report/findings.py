@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
 from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
@@ -318,16 +318,10 @@ def _limit(data: Aggregate) -> list[str]:
 
 def doubts(data: Aggregate) -> list[str]:
     """Loops whose own checks say that their loss is off by a share that counts, worst first."""
-    found = []
-    for cell in data.cells:
-        loss = cell.values["loss"]
-        audit = np.abs(cell.values["audit_residual"])
-        error = cell.values["loss_error"]
-        for k in np.flatnonzero(cell.doubtful):
-            share = max(audit[k], error[k] / abs(loss[k]) if loss[k] else np.inf)
-            text = f"row {cell.rows[k]}, {cell_name(cell)} ({percent(share)})"
-            found.append((-share, text))
-    return [text for _, text in sorted(found)]
+    return [
+        f"row {cell.rows[k]}, {cell_name(cell)} ({percent(cell.doubt[k])})"
+        for cell, k in doubtful_loops(data.cells)
+    ]
 
 
 def _table_1(data: Aggregate) -> list[str]:

@@ -14,6 +14,7 @@ import pytest
 import adhesis
 import adhesis.ensemble.results.read as reading
 from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
@@ -23,7 +24,6 @@ from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING, ROW_DATASETS
-from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.run.session import Options, run_campaign
 from adhesis.ensemble.task.dataset import KEPT
 from tests.support.campaign_support import differences, write_campaign

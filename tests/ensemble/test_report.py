@@ -23,6 +23,7 @@ from matplotlib.markers import CARETDOWN
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command.main import main
@@ -41,7 +42,6 @@ from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.write_report import write_report
-from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import GAP_BINS
 from tests.support.browser import needs_browser, seen_by_browser

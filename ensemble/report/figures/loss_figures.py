@@ -19,7 +19,6 @@ from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.findings import typical_cell
-from adhesis.ensemble.report.further_axes import loops_short_of_preload
 from adhesis.ensemble.report.tables.loss_tables import papers_loss
 from adhesis.solver.model.profile import Array
 
@@ -362,7 +361,7 @@ def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
 
 def hollow_of(cells: Sequence[Cell]) -> list[bool]:
     """Return whether loops of each cell failed or were short of their preload."""
-    return [cell.failed > 0 or loops_short_of_preload(cell) > 0 for cell in cells]
+    return [cell.failed > 0 or cell.short_of_preload > 0 for cell in cells]
 
 
 def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:
@@ -370,7 +369,7 @@ def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:
     drawn = [cell for cell in cells if cell.done]
     reasons = {
         "failed": any(cell.failed for cell in drawn),
-        "short of the preload": any(loops_short_of_preload(cell) for cell in drawn),
+        "short of the preload": any(cell.short_of_preload for cell in drawn),
     }
     label = " or ".join(reason for reason, holds in reasons.items() if holds)
     look_of_mark: Any = {"color": "0.3", "marker": "o", "markerfacecolor": "white"}
