@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import name_at
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
@@ -78,6 +79,11 @@ class Cell:
     def point(self) -> tuple[float, ...]:
         """Values on the axes of the campaign: H, γ, and those of further axes."""
         return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
+
+    @property
+    def name(self) -> str:
+        """Values on these axes: "H = 0.8, γ = 0.04 J/m²"."""
+        return name_at(self.hurst, self.work_of_adhesion, self.others)
 
     @property
     def least_range(self) -> Array:

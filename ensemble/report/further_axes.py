@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.campaign.tasks import name_at, place
+from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.quantities import common_unit, gamma_text, with_unit
 
 _LABELS = {
@@ -32,11 +32,6 @@ _LABELS = {
     "stripe_amplitude": r"amplitude $\varepsilon$ of the stripes",
     "stripe_phase": r"phase $\varphi$ of the stripes",
 }
-
-
-def cell_name(cell: Cell) -> str:
-    """Return "H = 0.8, γ = 0.04 J/m²", and where the cell stands on further axes."""
-    return name_at(cell.hurst, cell.work_of_adhesion, cell.others)
 
 
 def axis_label(axis: Axis) -> tuple[str, float]:
