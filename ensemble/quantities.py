@@ -82,10 +82,10 @@ class Quantity:
         return unit
 
     def check(self, number: float) -> None:
-        """Raise InputError for a number that can hardly be in the SI unit."""
+        """Raise UnitError for a number that can hardly be in the SI unit."""
         if self.largest < abs(number) < math.inf:
             shown = f"{number:g}"
-            raise InputError(
+            raise UnitError(
                 f"is {shown}, which would be {shown} {self.unit}: give its unit, "
                 f"{self.question.format(shown)}"
             )
