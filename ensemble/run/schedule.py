@@ -11,7 +11,6 @@ it. Tasks that share work go out together, as one unit.
 from __future__ import annotations
 
 import heapq
-from collections import Counter
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -96,7 +95,7 @@ class Schedule:
         """
         if not self._known_prior:
             return None
-        left = Counter({name: float(group.waiting) for name, group in self._groups.items()})
+        left: dict[Hashable, float] = {n: group.waiting for n, group in self._groups.items()}
         for task in in_flight:
             left[self._group_of[task]] += 0.5
         return sum(count * (self.estimate(name) or 0.0) for name, count in left.items()) / workers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -52,7 +52,9 @@ class Loops:
         expected = seconds or {}
         tasks = range(len(self._jobs))
         self._groups = {task: task for task in tasks}
-        priors = {task: expected.get(self._jobs[task].name, 1.0) for task in tasks}
+        priors: dict[Hashable, float] = {
+            task: expected.get(self._jobs[task].name, 1.0) for task in tasks
+        }
         self._schedule = Schedule(tasks, self._groups, priors, dict.fromkeys(tasks, 0))
         self._master: Master | None = None
 

@@ -306,6 +306,16 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return the index of the state before each jump; the next one is that after it."""
         return states_before_jumps(self.jumps, self.branch, self.separation, self.contact_fraction)
 
+    @property
+    def audit_residual(self) -> float:
+        """Work less energy that is lost and stored, relative to the work."""
+        raise NotImplementedError
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to doubt the loss or work, one sentence each."""
+        raise NotImplementedError
+
     def __str__(self) -> str:
         """Summarise it for a terminal, with its warnings."""
         return "\n".join([self.summary(), *(f"WARNING     {text}" for text in self.warnings)])
