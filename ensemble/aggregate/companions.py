@@ -21,7 +21,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 
-Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
+Kind = Literal["resolution", "load steps", "other"]
 
 # Keys that choose tasks and outputs, and do not change a loop.
 _IGNORED = ("sweep.", "stop.", "output.", "solver.time_limit")
@@ -36,8 +36,7 @@ class Companion:
     cells: tuple[Cell, ...]
     # "key = value" of the keys that differ, with the values of this campaign
     differs: tuple[str, ...]
-    # Subject of the difference: "resolution" (the solver), "load steps", "penetration" (the largest
-    # one, load steps may go with it), "spectrum" (the profile), "other"
+    # Subject of the difference: "resolution" (the solver), "load steps", "other"
     kind: Kind
     further: tuple[Axis, ...] = ()  # axes beside H and γ of the reported campaign
     doubts: tuple[str, ...] = ()  # sentences on damage of the file
@@ -92,10 +91,6 @@ def kind_of(keys: Sequence[str]) -> Kind:
         return "resolution"
     if list(keys) == ["cycle.load_steps"]:
         return "load steps"
-    if "cycle.max_penetration" in keys and all(key.startswith("cycle.") for key in keys):
-        return "penetration"
-    if keys and all(key.startswith("profile.") for key in keys):
-        return "spectrum"
     return "other"
 
 

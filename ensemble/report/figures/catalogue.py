@@ -202,19 +202,7 @@ MECHANISMS = (
         is_worth=_several("work_of_adhesion"),
     ),
 )
-PENETRATIONS = (
-    Illustration(
-        "loss_against_max_penetration",
-        "Loss against the largest penetration",
-        "This campaign and those beside it that differ in max_penetration: means with 95 % "
-        "intervals over the realisations that all of them have finished. The curves are moved "
-        "apart a little.",
-        loss_figures.loss_against_penetration,
-        is_worth=lambda data: bool(loss_figures.of_penetration(data)),
-    ),
-)
-
-ALL = (*LOOPS, *LOSSES, *FIELDS, *MECHANISMS, *PENETRATIONS)
+ALL = (*LOOPS, *LOSSES, *FIELDS, *MECHANISMS)
 
 
 def sections(data: Aggregate) -> dict[str, list[Illustration]]:
@@ -226,7 +214,6 @@ def sections(data: Aggregate) -> dict[str, list[Illustration]]:
         "axes": tuple(_along_axis(data, axis) for axis in with_figure(data)),
         "mechanisms": MECHANISMS,
         "fields": FIELDS,
-        "companions": PENETRATIONS,
     }
     return {
         name: [item for item in items if item.is_worth(data if item.whole else data.shown)]
