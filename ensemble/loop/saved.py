@@ -36,15 +36,6 @@ _KIND = "adhesis_result"
 _NOT_KEPT = {"problem", "method", "contact_states", "new_method"}
 _PARTS: dict[str, tuple[str, type]] = {"jumps": ("jump", Jump), "minor_loops": ("minor", MinorLoop)}
 _TYPES = {"float": float, "int": np.int64, "bool": bool}  # of jumps and minor loops; else texts
-# What a file may hold: variables of either kind of result, and their dimensions.
-_MEMBERS = frozenset(
-    (
-        *(entry.name for kind in _KINDS.values() for entry in fields(kind)),
-        *(f"{dim}_{entry.name}" for dim, part in _PARTS.values() for entry in fields(part)),
-        *("coefficient_real", "coefficient_imag", "harmonic", "state", "jump", "minor"),
-        *("pattern_real", "pattern_imag", "pattern_harmonic"),
-    )
-)
 
 
 @dataclass(frozen=True)
@@ -200,7 +191,7 @@ def load(path: str | os.PathLike[str]) -> Result:
     """
     path = checks.path("path", path)
     try:
-        return _result(read_sealed(path, _MEMBERS))
+        return _result(read_sealed(path))
     except InputError:
         raise
     except FileNotFoundError:
