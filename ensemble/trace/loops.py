@@ -46,11 +46,12 @@ class Loops:
         self, jobs: Sequence[Job], processes: int, seconds: Mapping[str, float] | None = None
     ) -> None:
         self._jobs = tuple(jobs)
-        self.processes = min(processes, len(self._jobs))
+        self.count = len(self._jobs)
+        self.processes = min(processes, self.count)
         self.done: dict[str, Result | str] = {}
         self.pids: list[int] = []
         expected = seconds or {}
-        tasks = range(len(self._jobs))
+        tasks = range(self.count)
         self._groups = {task: task for task in tasks}
         priors: dict[Hashable, float] = {
             task: expected.get(self._jobs[task].name, 1.0) for task in tasks
@@ -69,7 +70,7 @@ class Loops:
         """By job name: seconds so far, and the branch and prescribed value reached."""
         if self._master is None:
             return {}
-        notes = self._master.notes
+        notes = dict(self._master.notes)  # another thread may ask
         return {self._jobs[k].name: note or (0.0, "loading", 0.0) for k, note in notes.items()}
 
     @property
