@@ -58,11 +58,7 @@ class RankError(InputError):
 
 
 class WriteError(_Printable):
-    """An output could not be written: the disk is full, say. What was written before is sound."""
-
-
-class OutputError(Exception):
-    """stdout could not be written; the text gives the reason of the system."""
+    """An output or stdout could not be written: what was written before is sound."""
 
 
 class Terminated(KeyboardInterrupt):

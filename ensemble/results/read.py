@@ -18,7 +18,7 @@ from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
 from adhesis.ensemble.errors import InputError, lack
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
-from adhesis.ensemble.results.head import check_head
+from adhesis.ensemble.results.head import HEAD, check_head
 from adhesis.ensemble.task.dataset import KEPT, sizes_of
 
 _LOOKS = 3
@@ -48,8 +48,7 @@ class Results:
         try:
             with _damage(self.path):
                 self._check_members()
-                found = self._file.attrs
-                self.attributes = {n: found[n] for n in schema.ROOT_ATTRIBUTES if n in found}
+                self.attributes = {n: v for n, v in self._file.attrs.items() if n != HEAD}
                 schema.check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
