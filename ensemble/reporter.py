@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol, Self, TextIO
+from typing import Self, TextIO
 
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import duration
@@ -88,11 +88,8 @@ class Display:
             self._begun = not end
 
 
-class Bar(Protocol):
-    """Takes what is shown by :func:`bar`."""
-
-    def __call__(self, done: float | None, total: float | None, text: str = "") -> None:
-        """Show a text, and how much is done; unknown if ``total`` is None."""
+# Takes how much is done, of how much in all, None where that is unknown, and perhaps a text.
+Bar = Callable[..., None]
 
 
 @contextmanager
