@@ -84,13 +84,13 @@ class Estimate:
         return furthest / abs(self.mean) if known else float("inf")
 
 
-def estimates(values: Array) -> list[Estimate]:
+def estimates(values: Array, with_interval: bool = True) -> list[Estimate]:
     """One :class:`Estimate` for each row of ``values``, shape (quantities, n)."""
     values = np.atleast_2d(np.asarray(values, dtype=float))
     count, n = values.shape
     nothing = np.full(count, np.nan)
     mean = values.mean(axis=1) if n else nothing
     std = values.std(axis=1, ddof=1) if n > 1 else nothing
-    low, high = interval(values) if n else (nothing, nothing)
+    low, high = interval(values) if with_interval and n else (nothing, nothing)
     sem = std / np.sqrt(max(n, 1))
     return [Estimate(n, *map(float, row)) for row in zip(mean, std, sem, low, high, strict=True)]

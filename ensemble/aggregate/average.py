@@ -9,7 +9,7 @@ averages of a file that a run is still writing are consistent.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain, pairwise
 from pathlib import Path
@@ -172,7 +172,7 @@ def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedC
             found = average_curves(results, f"{branch}_{name}", cell.rows, factors)
             curves |= {f"{branch}_{curve}": average for curve, average in found.items()}
     return AveragedCell(
-        **vars(cell),
+        **{entry.name: getattr(cell, entry.name) for entry in fields(Cell)},
         curves=curves,
         jumps=count_jumps(results, cell.rows),
         fields=average_fields(results, cell.rows, kept),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from operator import itemgetter
 
 import numpy as np
@@ -71,9 +72,6 @@ class Cell:
     # ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
     # spent per largest contact area, in J/m²)
     values: dict[str, Array]
-    # Means of these, but not of ranges of adhesion, the largest interior tension and its place, and
-    # ``opening_strength``
-    estimates: dict[str, Estimate]
 
     @property
     def point(self) -> tuple[float, ...]:
@@ -84,6 +82,18 @@ class Cell:
     def name(self) -> str:
         """Values on these axes: "H = 0.8, γ = 0.04 J/m²"."""
         return name_at(self.hurst, self.work_of_adhesion, self.others)
+
+    @cached_property
+    def estimates(self) -> dict[str, Estimate]:
+        """Means of the values, but of ranges, the largest interior tension and its place."""
+        names = [name for name in self.values if name not in _NOT_AVERAGED]
+        means = estimates(np.array([self.values[name] for name in names]))
+        found = dict(zip(names, means, strict=True))
+        for name in ("small_scale_share", "largest_contact_fraction"):
+            share = found[name]
+            low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave it
+            found[name] = replace(share, low=float(low), high=float(high))
+        return found
 
     @property
     def least_range(self) -> Array:
@@ -192,20 +202,9 @@ def read_cells(results: Results) -> list[Cell]:
                 realisation=realisation[rows],
                 seed=seed[rows],
                 values=values,
-                estimates=_estimates(values),
             )
         )
     return cells
-
-
-def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
-    names = [name for name in values if name not in _NOT_AVERAGED]
-    found = dict(zip(names, estimates(np.array([values[name] for name in names])), strict=True))
-    for name in ("small_scale_share", "largest_contact_fraction"):
-        share = found[name]
-        low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave [0, 1]
-        found[name] = replace(share, low=float(low), high=float(high))
-    return found
 
 
 def stress_scale(campaign: Campaign, h_max: Array) -> Array:

@@ -24,6 +24,7 @@ from adhesis.ensemble.aggregate.cells import (
 )
 from adhesis.ensemble.campaign.tasks import Tasks
 from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
@@ -35,6 +36,7 @@ from adhesis.solver.values import finite
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
+_AVERAGED = ("wall_time", "loss", "loss_dimensionless")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
 
@@ -113,10 +115,11 @@ def _times(times: NDArray[np.float64]) -> dict[str, float]:
 
 
 def _group(cell: Cell) -> dict[str, Any]:
-    loss, scaled = cell.estimates["loss"], cell.estimates["loss_dimensionless"]
+    values = np.array([cell.values[name] for name in _AVERAGED])
+    seconds, loss, scaled = estimates(values, with_interval=False)  # which loads scipy
     group: dict[str, Any] = {
         **{name: getattr(cell, name) for name in _CODES},
-        "mean_seconds": finite(cell.estimates["wall_time"].mean),
+        "mean_seconds": finite(seconds.mean),
         "loss": finite(loss.mean),
         "loss_standard_error": finite(loss.sem),
         "loss_dimensionless": finite(scaled.mean),

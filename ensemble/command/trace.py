@@ -94,7 +94,7 @@ def execute(args: argparse.Namespace) -> int:
 def _run(prepared: Prepared, cycle: Cycle, plan: Plan, quiet: bool) -> Answer:
     """Run the plan, with lines on stderr: loops done, what is running, time left."""
     if quiet:
-        return run_plan(prepared, cycle, plan)
+        return run_plan(prepared, cycle, plan, None)
     loops: Loops | None = None
 
     def watch(found: Loops) -> None:
