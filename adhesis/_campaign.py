@@ -67,12 +67,12 @@ class Campaign:
     """
 
     def __init__(self, source: Mapping[str, Any] | str | os.PathLike[str]) -> None:
-        from adhesis.ensemble.campaign.file import load_campaign, read_campaign
+        from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 
         if isinstance(source, Mapping):
-            self._tables = read_campaign(_toml(source))
+            self._tables = parse_campaign(_toml(source))
         elif isinstance(source, str) and "\n" in source:
-            self._tables = read_campaign(source)
+            self._tables = parse_campaign(source)
         elif isinstance(source, str | os.PathLike):
             self._tables = load_campaign(checks.path("source", source))
         else:
@@ -209,7 +209,7 @@ class Campaign:
 
 def _warn_of_failures(path: Path) -> None:
     """Warn with the number of failed tasks and the first reason."""
-    from adhesis.ensemble.results.status import read_status
+    from adhesis.ensemble.aggregate.status import read_status
 
     status = read_status(path)
     if status["failed"]:

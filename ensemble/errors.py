@@ -50,7 +50,7 @@ class InputError(_Printable, ValueError):
 
 
 class UnitError(InputError):
-    """A number has a unit that is none of its quantity; the text begins with "is"."""
+    """A number has no unit of its quantity, or one is to be given; the text begins with "is"."""
 
 
 class RankError(InputError):
@@ -58,11 +58,7 @@ class RankError(InputError):
 
 
 class WriteError(_Printable):
-    """An output could not be written: the disk is full, say. What was written before is sound."""
-
-
-class OutputError(Exception):
-    """stdout could not be written; the text gives the reason of the system."""
+    """An output or stdout could not be written: what was written before is sound."""
 
 
 class Terminated(KeyboardInterrupt):

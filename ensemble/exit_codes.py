@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import traceback
 
-from adhesis.ensemble.errors import InputError, OutputError, Terminated, WriteError, lack
+from adhesis.ensemble.errors import InputError, Terminated, WriteError, lack
 
 DONE = 0
 SOME_FAILED = 1
@@ -33,8 +33,6 @@ def ended_by(error: BaseException) -> tuple[int, str]:
             return BAD_INPUT, str(error)
         case WriteError():
             return WRITE_FAILED, str(error)
-        case OutputError():
-            return WRITE_FAILED, f"stdout could not be written: {error}"
         case BrokenPipeError():
             return PIPE_CLOSED, ""
         case Terminated():

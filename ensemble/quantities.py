@@ -82,10 +82,10 @@ class Quantity:
         return unit
 
     def check(self, number: float) -> None:
-        """Raise InputError for a number that can hardly be in the SI unit."""
+        """Raise UnitError for a number that can hardly be in the SI unit."""
         if self.largest < abs(number) < math.inf:
             shown = f"{number:g}"
-            raise InputError(
+            raise UnitError(
                 f"is {shown}, which would be {shown} {self.unit}: give its unit, "
                 f"{self.question.format(shown)}"
             )
@@ -405,8 +405,3 @@ def with_error(value: float, error: float, least: float = -math.inf, most: float
         middle, *ends = (f"{round(part, places):.{shown}f}" for part in (value, low, high))
         return f"{middle}, from {ends[0]} to {ends[1]}"
     return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f}"
-
-
-def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
-    """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
-    return f", {loss / work_of_adhesion:.4g} γ" if work_of_adhesion > 0 else ""

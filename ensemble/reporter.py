@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol, TextIO
+from typing import Self, TextIO
 
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import duration
@@ -24,74 +24,77 @@ def log(text: str) -> None:
     print(printable(text), file=sys.stderr, flush=True)
 
 
-class StatusLine:
-    """One line: rewritten on a terminal, elsewhere written anew at intervals.
+class Display:
+    """One line, shown while something goes on: rewritten on a terminal, elsewhere written anew.
 
+    It is shown by another thread, so that there is no silence. ``text`` takes the time so far in s;
     ``every`` is the time between lines where there is no terminal, in s, or a function of the time
-    since the start. ``at_once`` shows the first text when it is given, not after the first
-    interval.
+    so far. ``at_once`` shows the first line at once, not after the first interval; with ``last``
+    there is a last one. On a terminal there always are both.
     """
 
     def __init__(
         self,
-        every: float | Callable[[float], float],
+        text: Callable[[float], str],
+        every: float | Callable[[float], float] = _EVERY,
         stream: TextIO | None = None,
         *,
         at_once: bool = False,
+        last: bool = False,
     ) -> None:
-        self._stream = stream or sys.stderr
+        self._text, self._every, self._stream = text, every, stream or sys.stderr
         self._live = self._stream.isatty()
-        self._every = every
-        self._started = time.monotonic()
-        self._next = self._started + (0.0 if at_once or self._live else self._interval())
+        self._at_once, self._last = at_once or self._live, last or self._live
+        self._over, self._writing = threading.Event(), threading.Lock()
         self._begun = False  # whether a line on the terminal has no end yet
 
-    @property
-    def seconds(self) -> float:
-        """Time since the start, in s."""
-        return time.monotonic() - self._started
+    def __enter__(self) -> Self:
+        self._started = time.monotonic()
+        self._thread = threading.Thread(target=self._keep_on, daemon=True)
+        self._thread.start()
+        return self
 
-    def show(self, text: Callable[[], str], *, last: bool = False) -> None:
-        """Show a text if it is time to; ``last`` shows it anyway and ends the line."""
-        now = time.monotonic()
-        if now < self._next and not last:
-            return
-        self._next = now + self._interval()
-        if not self._live:
-            print(text(), file=self._stream, flush=True)
-            return
-        # A line that wraps cannot be rewritten.
-        line = text()[: shutil.get_terminal_size().columns - 1]
-        print(_REWRITE + line, end="\n" if last else "", file=self._stream, flush=True)
-        self._begun = not last
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+        if self._last:
+            self._show("\n")
 
     def say(self, text: str) -> None:
         """Write a line of its own."""
-        print((_REWRITE if self._begun else "") + text, file=self._stream, flush=True)
-        self._begun = False
+        with self._writing:
+            print((_REWRITE if self._begun else "") + text, file=self._stream, flush=True)
+            self._begun = False
 
-    def close(self, text: Callable[[], str]) -> None:
-        """Show a last text where a line on the terminal has no end yet."""
-        if self._begun:
-            self.show(text, last=True)
+    def _keep_on(self) -> None:
+        if self._at_once:
+            self._show()
+        while not self._over.wait(self._interval()):
+            self._show()
 
     def _interval(self) -> float:
-        if self._live:
-            return _LIVE
-        return self._every(self.seconds) if callable(self._every) else self._every
+        seconds = time.monotonic() - self._started
+        every = self._every(seconds) if callable(self._every) else self._every
+        return min(_LIVE, every) if self._live else every
+
+    def _show(self, end: str = "") -> None:
+        line = printable(self._text(time.monotonic() - self._started))
+        with self._writing:
+            if not self._live:
+                print(line, file=self._stream, flush=True)
+                return
+            line = line[: shutil.get_terminal_size().columns - 1]  # one that wraps stays
+            print(_REWRITE + line, end=end, file=self._stream, flush=True)
+            self._begun = not end
 
 
-class Bar(Protocol):
-    """Takes what is shown by :func:`bar`."""
-
-    def __call__(self, done: float | None, total: float | None, text: str = "") -> None:
-        """Show a text, and how much is done; unknown if ``total`` is None."""
+# Takes how much is done, of how much in all, None where that is unknown, and perhaps a text.
+Bar = Callable[..., None]
 
 
 @contextmanager
-def bar(what: str) -> Iterator[Bar]:
-    """Show a bar on a terminal; elsewhere, as in a notebook, lines at intervals and a last one."""
-    line = StatusLine(_EVERY)
+def bar(what: str, *, every: float = _EVERY, last: bool = True) -> Iterator[Bar]:
+    """Show a bar on a terminal; elsewhere, as in a notebook, lines; see :class:`Display`."""
     shown = what
 
     def show(done: float | None, total: float | None, text: str = "") -> None:
@@ -99,40 +102,7 @@ def bar(what: str) -> Iterator[Bar]:
         parts = [text or what]
         if done is not None and total:
             parts.append(f"[{'#' * round(_CELLS * done / total):.<{_CELLS}}]")
-        shown = "  ".join([*parts, duration(line.seconds)])
-        line.show(lambda: shown)
+        shown = "  ".join(parts)
 
-    try:
+    with Display(lambda seconds: f"{shown}  {duration(seconds)}", every, last=last):
         yield show
-    finally:
-        line.show(lambda: shown, last=True)
-
-
-@contextmanager
-def following(what: str, every: float = _EVERY) -> Iterator[Bar]:
-    """Show how far a command is: a bar on a terminal, elsewhere a line at intervals (s).
-
-    The lines come from another thread, so that there is no silence; what ends within the first
-    interval has none.
-    """
-    if sys.stderr.isatty():
-        with bar(what) as show:
-            yield show
-        return
-    shown, started, over = what, time.monotonic(), threading.Event()
-
-    def keep(done: float | None, total: float | None, text: str = "") -> None:
-        nonlocal shown
-        shown = text or (what if total is None else f"{what}: {done:g} of {total:g}")
-
-    def lines() -> None:
-        while not over.wait(every):
-            log(f"{shown} ({time.monotonic() - started:.0f} s)")
-
-    thread = threading.Thread(target=lines, daemon=True)
-    thread.start()
-    try:
-        yield keep
-    finally:
-        over.set()
-        thread.join()

@@ -39,7 +39,6 @@ def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
         return paths
 
     monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", save)
-    monkeypatch.setattr("adhesis.ensemble.trace.figures.save", save)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -29,13 +29,13 @@ import h5py
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.status import read_status
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import ROW_DATASETS
-from adhesis.ensemble.results.status import read_status
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import differences, write_campaign

@@ -1,4 +1,1 @@
-"""Average over realisations, from results files alone, in bounded memory.
-
-Import from its modules; :func:`adhesis.ensemble.aggregate.average.aggregate` computes all averages.
-"""
+"""Average over realisations, from results files alone, in bounded memory; judge them."""

@@ -9,7 +9,7 @@ averages of a file that a run is still writing are consistent.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain, pairwise
 from pathlib import Path
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.cells import Cell, read_cells, stress_scale
+from adhesis.ensemble.aggregate.cells import Cell, finished_cells, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion, read_companion
 from adhesis.ensemble.aggregate.jumps import JumpStatistics, count_jumps
 from adhesis.ensemble.aggregate.mean_curves import Curve, average_curves
@@ -140,7 +140,7 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     """
     with Results(path) as results:
         status, kept = results.status(), np.append(results.column(KEPT), len(results))
-        cells = tuple(_averaged(results, cell, kept) for cell in read_cells(results, status))
+        cells = tuple(_averaged(results, cell, kept) for cell in finished_cells(results))
         failed = np.flatnonzero(status == FAILED)[:_MAX_FAILURES]
         companions = tuple(read_companion(other, results.campaign) for other in beside)
         return Aggregate(
@@ -172,7 +172,7 @@ def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedC
             found = average_curves(results, f"{branch}_{name}", cell.rows, factors)
             curves |= {f"{branch}_{curve}": average for curve, average in found.items()}
     return AveragedCell(
-        **vars(cell),
+        **{entry.name: getattr(cell, entry.name) for entry in fields(Cell)},
         curves=curves,
         jumps=count_jumps(results, cell.rows),
         fields=average_fields(results, cell.rows, kept),

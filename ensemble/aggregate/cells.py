@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import name_at
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
+from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
 from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
 from adhesis.ensemble.task.fields import FieldPlan, field_plan
 from adhesis.ensemble.task.row import JUMP_COUNT, NUMBERS, TIMES
@@ -52,10 +56,11 @@ class Cell:
     campaign: Campaign  # its tables hold the values of the cell
     penetration: dict[str, Array]  # Δ/h_max of the curves of each branch
     plan: FieldPlan  # states with stored fields: their Δ/h_max, wave numbers, positions
-    # done, failed, pending: numbers of tasks
+    # done, failed, pending, not_needed: numbers of tasks
     done: int
     failed: int
     pending: int
+    not_needed: int
     rows: Rows  # shape (done,); rows of the done tasks in the file, by realisation
     # realisation, seed: shape (done,)
     realisation: NDArray[np.int64]
@@ -67,14 +72,28 @@ class Cell:
     # ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
     # spent per largest contact area, in J/m²)
     values: dict[str, Array]
-    # Means of these, but not of ranges of adhesion, the largest interior tension and its place, and
-    # ``opening_strength``
-    estimates: dict[str, Estimate]
 
     @property
     def point(self) -> tuple[float, ...]:
         """Values on the axes of the campaign: H, γ, and those of further axes."""
         return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
+
+    @property
+    def name(self) -> str:
+        """Values on these axes: "H = 0.8, γ = 0.04 J/m²"."""
+        return name_at(self.hurst, self.work_of_adhesion, self.others)
+
+    @cached_property
+    def estimates(self) -> dict[str, Estimate]:
+        """Means of the values, but of ranges, the largest interior tension and its place."""
+        names = [name for name in self.values if name not in _NOT_AVERAGED]
+        means = estimates(np.array([self.values[name] for name in names]))
+        found = dict(zip(names, means, strict=True))
+        for name in ("small_scale_share", "largest_contact_fraction"):
+            share = found[name]
+            low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave it
+            found[name] = replace(share, low=float(low), high=float(high))
+        return found
 
     @property
     def least_range(self) -> Array:
@@ -87,9 +106,21 @@ class Cell:
         return doubtful(self.values, self.campaign.solver.accuracy)
 
     @property
+    def doubt(self) -> Array:
+        """Share of the loss of each done task by which it may be off by its own account."""
+        loss, error = np.abs(self.values["loss"]), self.values["loss_error"]
+        share = np.divide(error, loss, out=np.full_like(loss, np.inf), where=loss > 0)
+        return np.maximum(np.abs(self.values["audit_residual"]), share)
+
+    @property
     def beyond_zero_range(self) -> NDArray[np.bool_]:
         """Which done tasks have a loss that a finite range may not have, shape (done,)."""
         return beyond_zero_range({**self.values, "work_of_adhesion": self.work_of_adhesion})
+
+    @property
+    def short_of_preload(self) -> int:
+        """Number of loops that turned before their preload was reached."""
+        return int(np.sum(self.values["preload_reached"] == 0))
 
     @property
     def precision(self) -> Precision | None:
@@ -101,17 +132,36 @@ class Cell:
         return Precision(stop.quantity, stop.relative_error, known, not self.pending)
 
 
-def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
-    """Read every cell by H, γ, further axes, ascending; InputError if no task is finished."""
-    if not np.any(status == DONE):
-        damaged = results.damaged().size
+def doubtful_loops(cells: Iterable[Cell]) -> list[tuple[Cell, int]]:
+    """Return the loops with a doubtful loss, as cell and place in it, the worst first."""
+    return _sorted((-cell.doubt, cell.doubtful, cell) for cell in cells)
+
+
+def loops_beyond_zero_range(cells: Iterable[Cell]) -> list[tuple[Cell, int]]:
+    """Return the loops beyond zero range, as cell and place in it, the least range first."""
+    return _sorted((cell.least_range, cell.beyond_zero_range, cell) for cell in cells)
+
+
+def _sorted(loops: Iterable[tuple[Array, NDArray[np.bool_], Cell]]) -> list[tuple[Cell, int]]:
+    found = [(by[k], cell, int(k)) for by, chosen, cell in loops for k in np.flatnonzero(chosen)]
+    return [(cell, k) for _, cell, k in sorted(found, key=itemgetter(0))]
+
+
+def finished_cells(results: Results) -> list[Cell]:
+    """Read every cell as :func:`read_cells`; InputError if no task is finished."""
+    cells, damaged = read_cells(results), results.damaged().size
+    if not any(cell.done for cell in cells):
         raise InputError(
-            f"{results.path} holds no finished task yet ({np.sum(status == FAILED)} failed"
+            f"{results.path} holds no finished task yet ({sum(c.failed for c in cells)} failed"
             + (f" and {damaged} damaged" if damaged else "")
-            + f", of {status.size}): there is nothing to report"
+            + f", of {len(results)}): there is nothing to report"
         )
-    campaign = results.campaign
-    tasks = results.tasks()
+    return cells
+
+
+def read_cells(results: Results) -> list[Cell]:
+    """Read every cell by H, γ, further axes, ascending."""
+    campaign, tasks, status = results.campaign, results.tasks(), results.status()
     realisation, seed = tasks.column("realisation"), tasks.column("seed")
     columns = {name: results.column(name) for name in _PER_TASK}
     cells = []
@@ -130,7 +180,9 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         scale = stress_scale(of_cell, values["h_max"]) * values["h_max"]
         for name in ("loss_error", "energy_at_stake"):
             values[f"{name}_dimensionless"] = values[name] / scale
-        failed = int(np.sum(status[rows_of_cell] == FAILED))
+        failed, pending, spare = (
+            int(np.sum(status[rows_of_cell] == code)) for code in (FAILED, PENDING, NOT_NEEDED)
+        )
         cells.append(
             Cell(
                 hurst=task.hurst,
@@ -144,25 +196,15 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
                 plan=field_plan(campaign, task),
                 done=rows.size,
                 failed=failed,
-                pending=int(np.sum(status[rows_of_cell] == PENDING)),
+                pending=pending,
+                not_needed=spare,
                 rows=rows,
                 realisation=realisation[rows],
                 seed=seed[rows],
                 values=values,
-                estimates=_estimates(values),
             )
         )
     return cells
-
-
-def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
-    names = [name for name in values if name not in _NOT_AVERAGED]
-    found = dict(zip(names, estimates(np.array([values[name] for name in names])), strict=True))
-    for name in ("small_scale_share", "largest_contact_fraction"):
-        share = found[name]
-        low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave [0, 1]
-        found[name] = replace(share, low=float(low), high=float(high))
-    return found
 
 
 def stress_scale(campaign: Campaign, h_max: Array) -> Array:

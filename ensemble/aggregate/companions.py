@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from adhesis.ensemble.aggregate.cells import Cell, read_cells
+from adhesis.ensemble.aggregate.cells import Cell, finished_cells
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.compare import differing
 from adhesis.ensemble.campaign.rules import shown
@@ -21,7 +21,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 
-Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
+Kind = Literal["resolution", "load steps", "other"]
 
 # Keys that choose tasks and outputs, and do not change a loop.
 _IGNORED = ("sweep.", "stop.", "output.", "solver.time_limit")
@@ -36,8 +36,7 @@ class Companion:
     cells: tuple[Cell, ...]
     # "key = value" of the keys that differ, with the values of this campaign
     differs: tuple[str, ...]
-    # Subject of the difference: "resolution" (the solver), "load steps", "penetration" (the largest
-    # one, load steps may go with it), "spectrum" (the profile), "other"
+    # Subject of the difference: "resolution" (the solver), "load steps", "other"
     kind: Kind
     further: tuple[Axis, ...] = ()  # axes beside H and γ of the reported campaign
     doubts: tuple[str, ...] = ()  # sentences on damage of the file
@@ -67,7 +66,7 @@ class LossDifference:
 def read_companion(path: Path | str, campaign: Campaign) -> Companion:
     """Read another results file and the keys in which its campaign differs (InputError)."""
     with Results(path) as results:
-        other, cells = results.campaign, read_cells(results, results.status())
+        other, cells = results.campaign, finished_cells(results)
         doubts = results.doubts()
     values, keys = other.values(), differing_keys(campaign, other)
     return Companion(
@@ -92,10 +91,6 @@ def kind_of(keys: Sequence[str]) -> Kind:
         return "resolution"
     if list(keys) == ["cycle.load_steps"]:
         return "load steps"
-    if "cycle.max_penetration" in keys and all(key.startswith("cycle.") for key in keys):
-        return "penetration"
-    if keys and all(key.startswith("profile.") for key in keys):
-        return "spectrum"
     return "other"
 
 

@@ -19,7 +19,6 @@ from typing import Any
 from adhesis.ensemble.campaign.rules import list_of, number_in, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError, quoted
-from adhesis.ensemble.quantities import Quantity
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
@@ -41,33 +40,7 @@ def load_campaign(path: Path | str) -> Campaign:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     _check_size(str(path), size, _LONGEST_TEXT + len(codecs.BOM_UTF8))
-    return read_campaign(_decoded(data, str(path)), str(path))
-
-
-def read_campaign(text: str, source: str = "campaign") -> Campaign:
-    """Read and check the text of a campaign that is to be computed (InputError).
-
-    Numbers that can hardly be in SI units are refused, as by the options of the command line. The
-    text in a results file is read by :func:`parse_campaign`, which takes them: its loops have been
-    computed.
-    """
-    campaign = parse_campaign(text, source)
-    with _of(source):
-        _ask_for_units(tomllib.loads(text))
-    return campaign
-
-
-def _ask_for_units(document: dict[str, Any]) -> None:
-    for table, kind in TABLES.items():
-        for entry in fields(kind):
-            quantity: Quantity | None = entry.metadata["rule"].quantity
-            values = document.get(table, {}).get(entry.name, [])
-            for value in values if isinstance(values, list) else [values]:
-                if quantity is not None and not isinstance(value, str):
-                    try:
-                        quantity.check(value)
-                    except InputError as error:
-                        raise InputError(f"[{table}] {entry.name} {error}") from None
+    return parse_campaign(_decoded(data, str(path)), str(path))
 
 
 def _decoded(data: bytes, source: str) -> str:

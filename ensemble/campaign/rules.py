@@ -53,7 +53,11 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
         if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError
         number = (checks.whole if bounds.whole else checks.real)("", value, bounds)
-        return Written(number, value.unit) if isinstance(value, Written) else number
+        if isinstance(value, Written):
+            return Written(number, value.unit)
+        if quantity is not None:
+            quantity.check(number)
+        return number
 
     example = "" if quantity is None else f', or a {quantity.name} as "{quantity.example}"'
     return Rule(bounds.text + example, read, quantity, bounds)

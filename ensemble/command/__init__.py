@@ -1,5 +1,4 @@
-"""The command line: one module a command, and :mod:`adhesis.ensemble.command.main` that calls them.
+"""The command line: a module a command, with ``EXAMPLES``, ``add_arguments`` and ``execute``.
 
-Import :func:`adhesis.ensemble.command.main.main`; a command module offers ``add_arguments(parser)``
-and ``execute(args) -> int`` (the exit code), and its docstring's first line is its help.
+Its docstring's first line is its help; :mod:`adhesis.ensemble.command.main` calls them.
 """

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
-from adhesis.ensemble.reporter import following
+from adhesis.ensemble.reporter import bar
 
 if TYPE_CHECKING:
     from adhesis.ensemble.bench.equal_error import Line
 
 _DEFAULT = Path("out/benchmark")
-_WIDTH = 120
 EXAMPLES = (
     "adhesis bench --quick",
     "adhesis bench --to out/benchmark --budget 60",
@@ -49,18 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
-    from rich.console import Console
-
-    from adhesis.ensemble.bench.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, RECORD, cells, page
+    from adhesis.ensemble.bench.bench_page import LINE_COLUMNS, RECORD, cells, page
     from adhesis.ensemble.bench.equal_error import benchmark, exponents, ratios
     from adhesis.ensemble.bench.scenes import FULL, GROWTH, QUICK
-    from adhesis.ensemble.report.tables.table import make_table, rich_table
+    from adhesis.ensemble.report.tables.table import make_table
     from adhesis.ensemble.versions import processor
 
     check_output_folder("--to", args.to, _FILES, {})
-    # A file or a pipe has no width of its own; the tables need this one.
-    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
-    with following("adhesis bench: measuring") as show_run:
+    with bar("adhesis bench: measuring", last=False) as show_run:
 
         def show(line: Line) -> None:
             run = line.run
@@ -72,18 +67,10 @@ def execute(args: argparse.Namespace) -> int:
         measured = benchmark(scenes, seconds=args.budget, on_line=show)
     lines = [line for line in measured if line.run.scene not in GROWTH]
     grown = [line for line in measured if line.run.scene in GROWTH]
-    for scene in dict.fromkeys(line.run.scene for line in lines):
-        chosen = [line for line in lines if line.run.scene is scene]
-        title = f"{scene.title}; reference: {chosen[0].reference.text}"
-        rows = [cells(line, LINE_COLUMNS) for line in chosen]
-        console.print(rich_table(title, LINE_COLUMNS, rows, slice(2, None)))
-    if grown:
-        rows = [cells(line, GROWTH_COLUMNS) for line in grown]
-        console.print(rich_table("How the cost grows", GROWTH_COLUMNS, rows, slice(2, None)))
-    compared = ratios(lines)
     machine = f"one core of {processor()}, Python {platform.python_version()}"
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
-    text = page(lines, grown, compared, exponents(grown), f"`{command}` on {machine}")
+    text = page(lines, grown, ratios(lines), exponents(grown), f"`{command}` on {machine}")
+    print(text)
     from adhesis.ensemble.bench.bench_figure import draw  # matplotlib, when all is measured
     from adhesis.ensemble.report.figures.style import save
 

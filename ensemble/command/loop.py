@@ -111,7 +111,7 @@ def execute(args: argparse.Namespace) -> int:
     if args.film is not None:
         with writing.output("--film", args.film):
             loops[0].film(args.film, progress=not args.quiet)
-    print("\n\n".join(map(record.summary, loops)))
+    print("\n\n".join(loop.summary() for loop in loops))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from adhesis.ensemble.outputs import check_output_folder
-from adhesis.ensemble.reporter import following
+from adhesis.ensemble.reporter import bar
 
 EXAMPLES = (
     "adhesis report paper.h5 --to report",
@@ -44,7 +44,7 @@ def execute(args: argparse.Namespace) -> int:
     check_output_folder("--to", args.to, _FILES, inputs)
     from adhesis.ensemble.report.write_report import write_report
 
-    with following("adhesis report") as show:
+    with bar("adhesis report", last=False) as show:
         write_report(
             args.file,
             args.to,

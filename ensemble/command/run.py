@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.command.streams import write_line
-from adhesis.ensemble.errors import InputError, OutputError
+from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import log
 
@@ -125,7 +125,7 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
             _end_job(comm, exit_codes.BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
         return exit_codes.BAD_INPUT if comm.rank == 0 else exit_codes.DONE
     except BaseException as error:
-        if args.dry_run and isinstance(error, (BrokenPipeError, OutputError)):
+        if args.dry_run and isinstance(error, (BrokenPipeError, WriteError)):
             raise
         code, sentence = exit_codes.ended_by(error)
         if sentence:

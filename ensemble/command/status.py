@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print the status; returns 0."""
-    from adhesis.ensemble.results.status import as_text, read_status
+    from adhesis.ensemble.aggregate.status import as_text, read_status
     from adhesis.ensemble.run.lock import holder
 
     if args.watch:
@@ -54,7 +54,7 @@ def _watch(path: Path | str, interval: float) -> int:
     from rich.console import Console
     from rich.live import Live
 
-    from adhesis.ensemble.results.status import as_text, read_status
+    from adhesis.ensemble.aggregate.status import as_text, read_status
     from adhesis.ensemble.run.lock import holder
 
     live = Live(console=Console(highlight=False, markup=False), auto_refresh=False)

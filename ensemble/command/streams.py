@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from adhesis.ensemble.errors import OutputError
+from adhesis.ensemble.errors import WriteError, reason
 
 
 class _Stdout(io.FileIO):
@@ -31,7 +31,7 @@ class _Stdout(io.FileIO):
             raise
         except OSError as error:
             self._failed = True
-            raise OutputError(error.strerror or str(error)) from None
+            raise WriteError(f"stdout could not be written: {reason(error)}") from None
 
 
 class _Stderr(io.FileIO):
@@ -61,7 +61,7 @@ def standard_streams() -> Iterator[None]:
         yield
     finally:
         for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OutputError, OSError, ValueError):
+            with contextlib.suppress(WriteError, OSError, ValueError):
                 stream.flush()
         sys.stdout, sys.stderr = before
 

@@ -17,22 +17,23 @@ from adhesis.ensemble.quantities import (
     read_words,
     words_of,
 )
-from adhesis.ensemble.reporter import StatusLine
+from adhesis.ensemble.reporter import Display
 from adhesis.ensemble.trace.answer import (
     FIGURE_FILES,
     FILES,
+    Answer,
     NoAnswer,
     check,
     document,
     make_cycle,
     run_plan,
 )
+from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
+from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Plan, make_plan
 from adhesis.solver.model.half_space import HalfSpace
-
-_SECONDS_BETWEEN_LINES = 10.0
 
 
 def execute(args: argparse.Namespace) -> int:
@@ -66,8 +67,7 @@ def execute(args: argparse.Namespace) -> int:
     if args.plan:
         return 0
     try:
-        progress = None if args.quiet else _Progress(plan, control.is_load)
-        answer = run_plan(prepared, cycle, plan, progress)
+        answer = _run(prepared, cycle, plan, args.quiet)
     except NoAnswer as error:
         print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
@@ -91,39 +91,31 @@ def execute(args: argparse.Namespace) -> int:
     return 0
 
 
-class _Progress:
-    """Lines on stderr: loops done, what is running, time left; none is longer silent than 10 s."""
+def _run(prepared: Prepared, cycle: Cycle, plan: Plan, quiet: bool) -> Answer:
+    """Run the plan, with lines on stderr: loops done, what is running, time left."""
+    if quiet:
+        return run_plan(prepared, cycle, plan, None)
+    loops: Loops | None = None
 
-    def __init__(self, plan: Plan, load: bool) -> None:
-        self.plan, self.load = plan, load
-        self.line = StatusLine(_SECONDS_BETWEEN_LINES)
+    def watch(found: Loops) -> None:
+        nonlocal loops
+        loops = found
 
-    def __call__(self, loops: Loops) -> None:
-        finished = not loops.running and not loops.waiting
-        self.line.show(lambda: self._text(loops, finished), last=finished)
+    load = cycle.control.is_load
+    with Display(lambda seconds: _progress(loops, seconds, load), last=True):
+        return run_plan(prepared, cycle, plan, watch)
 
-    def _text(self, loops: Loops, finished: bool) -> str:
-        running = ", ".join(
-            f"{name} ({branch}, {drive_text(drive, self.load)})"
-            for name, (_, branch, drive) in loops.running.items()
-        )
-        left = self._left(loops)
-        line = f"{len(loops.done)} of {len(self.plan.runs)} loops"
-        if running:
-            line += f"; running {running}"
-        line += f"; {self.line.seconds:.0f} s so far"
-        return line + (f", about {duration(left)} left" if loops.done and not finished else "")
 
-    def _left(self, loops: Loops) -> float:
-        """Expected wall seconds, corrected by what the loops have taken so far."""
-        expected = self.plan.seconds
-        running = {name: seconds for name, (seconds, _, _) in loops.running.items()}
-        ended = list(loops.took)[1:]  # the first one loads what the processes share
-        predicted = sum(expected[name] for name in ended)
-        ratio = sum(loops.took[name] for name in ended) / predicted if predicted > 0 else 1.0
-        rest = [
-            max(ratio * expected[name] - seconds, 0.25 * seconds)
-            for name, seconds in running.items()
-        ]
-        waiting = sum(ratio * expected[name] for name in loops.waiting)
-        return max([(waiting + sum(rest)) / max(loops.processes, 1), *rest])
+def _progress(loops: Loops | None, seconds: float, load: bool) -> str:
+    """Return how far the loops of a trace are, as a line."""
+    if loops is None:
+        return "starting"
+    running = ", ".join(
+        f"{name} ({branch}, {drive_text(drive, load)})"
+        for name, (_, branch, drive) in loops.running.items()
+    )
+    parts = [f"{len(loops.done)} of {loops.count} loops"]
+    parts += [f"running {running}"] if running else []
+    parts.append(f"{seconds:.0f} s so far")
+    left = loops.seconds_left if loops.running or loops.waiting else None
+    return "; ".join(parts) + ("" if left is None else f", about {duration(left)} left")

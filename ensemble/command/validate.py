@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
-from adhesis.ensemble.reporter import following
 
 if TYPE_CHECKING:
     from adhesis.solver.validate.claims import Row
@@ -43,29 +42,12 @@ def execute(args: argparse.Namespace) -> int:
     for name in args.method or ():
         if name not in METHODS:
             raise InputError(f"--method is {name!r}: it must be one of {', '.join(METHODS)}")
-    lines = not args.json and not sys.stdout.isatty()
-    judged: list[Row] = []
-    with following("adhesis validate") as show:
-
-        def follow(row: Row) -> None:
-            judged.append(row)
-            show(None, None, f"adhesis validate: {len(judged)} claims judged")
-            if lines:
-                print(_line(row), flush=True)
-
-        rows = validate(names, on_row=follow)
+    stream = sys.stderr if args.json else sys.stdout
+    rows = validate(names, on_row=lambda row: print(_line(row), file=stream, flush=True))
+    failed = [row for row in rows if not row.passed]
     if args.json:
         print(json.dumps([_record(row) for row in rows], indent=1, allow_nan=False))
-    elif not lines:
-        from rich.console import Console
-
-        from adhesis.ensemble.report.tables.table import rich_table
-
-        title = "Methods against exact references"
-        headings = ("claim", "method", "resolution", "error", "bound", "", "note")
-        Console().print(rich_table(title, headings, map(_cells, rows), slice(3, 5)))
-    failed = [row for row in rows if not row.passed]
-    if not args.json:
+    else:
         print(f"{len(rows) - len(failed)} of {len(rows)} claims hold")
     return SOME_FAILED if failed else DONE
 
@@ -85,9 +67,3 @@ def _line(row: Row) -> str:
         f"{verdict}  {row.error:8.1e} <= {row.bound:7.1e}  {row.method:<5}  {row.claim}"
         f"  [{row.resolution}]{note}"
     )
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    verdict = "[green]ok[/green]" if row.passed else "[bold red]FAIL[/bold red]"
-    error, bound = f"{row.error:.1e}", f"{row.bound:.1e}"
-    return (row.claim, row.method, row.resolution, error, bound, verdict, row.note)

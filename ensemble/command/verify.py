@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print what is damaged; returns 0, or 1 if rows are."""
-    from adhesis.ensemble.results.status import damage_lines, read_status
+    from adhesis.ensemble.aggregate.status import damage_lines, read_status
 
     status = read_status(args.file)
     damaged = status["damaged"]

@@ -9,15 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from adhesis.ensemble.report.figures.style import (
-    LINE_OF_BRANCH,
-    MM,
-    TWO_COLUMNS,
-    colour,
-    drawn_into,
-    new_figure,
-    style,
-)
+from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.loading.loop_result import LoopResult
@@ -34,8 +26,8 @@ def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) ->
     ``ax`` is one Axes for the mean stress, or two for mean stress and contact fraction (TypeError,
     ValueError).
     """
-    with drawn_into(ax):
-        figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
+    with style.drawn_into(ax):
+        figure = style.new_figure(1, 2, style.TWO_COLUMNS, 62 * style.MM)
         _draw(results, figure.given or figure.panels)
         return figure.finish()
 
@@ -63,14 +55,14 @@ def _lines(
         for leg in range(int(results.leg.max()) + 1):
             rows = results.leg == leg
             branch = str(results.branch[rows][0])
-            options = {"color": colour(leg), "ls": LINE_OF_BRANCH[branch]}
+            options = {"color": style.colour(leg), "ls": style.LINE_OF_BRANCH[branch]}
             yield results, rows, options | {"label": f"leg {leg + 1}, {branch}"}
         return
     for k, loop in enumerate(results):
         rows = loop.states("unloading")
-        options = {"color": colour(k), "ls": LINE_OF_BRANCH["unloading"]}
+        options = {"color": style.colour(k), "ls": style.LINE_OF_BRANCH["unloading"]}
         yield loop, rows, options | {"label": f"unloading from {loop.penetration[rows[0]]:.3g}"}
-    options = {"color": "k", "ls": LINE_OF_BRANCH["loading"], "label": "loading"}
+    options = {"color": "k", "ls": style.LINE_OF_BRANCH["loading"], "label": "loading"}
     yield results[-1], results[-1].states("loading"), options
 
 
@@ -82,8 +74,8 @@ def draw_shape(shown: Any) -> Figure | None:
     curves = _curves(shown)
     if not curves:
         return None
-    with style():
-        figure = new_figure(1, 1, TWO_COLUMNS, 48 * MM)
+    with style.style():
+        figure = style.new_figure(1, 1, style.TWO_COLUMNS, 48 * style.MM)
         (axes,) = figure.axes
         for label, x, y in curves:
             axes.plot(1e3 * x, 1e6 * y, lw=0.8, label=label)

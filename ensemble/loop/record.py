@@ -5,7 +5,6 @@ How files are written is in :mod:`adhesis.ensemble.outputs`.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,11 +14,9 @@ import numpy as np
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import whole_file
-from adhesis.ensemble.quantities import in_works_of_adhesion
-from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import LoopState
-from adhesis.solver.loading.path import MinorLoop, PathResult
+from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
 
 
@@ -78,116 +75,6 @@ def _displacement(result: LoopResult | PathResult) -> dict[str, Any]:
         return {}
     far = control.displacement(result.separation, result.mean_stress, h_max)
     return {"displacement": (far / h_max).tolist()}
-
-
-def summary(result: LoopResult | PathResult) -> str:
-    """Return a loop or path in a few lines for the terminal."""
-    return "\n".join(f"{name:<12}{text}" for name, text in summary_rows(result))
-
-
-def summary_rows(result: LoopResult | PathResult) -> list[tuple[str, str]]:
-    """Return the main numbers of a loop or path, each with its name."""
-    problem, profile, half_space = result.problem, result.problem.profile, result.problem.half_space
-    present = np.flatnonzero(profile.coefficients)
-    counts = Counter(jump.kind for jump in result.jumps)
-    kinds = ", ".join(f"{count} {kind}" for kind, count in counts.most_common()) or "none"
-    measure = "" if problem.measure == "arc" else f"{problem.measure} measure, "
-    note = f"; {result.loss_note}" if result.loss_note else ""
-    contact = (
-        f"largest contact fraction {result.contact_fraction.max():.4g}, most patches "
-        f"{result.patches.max()}"
-    )
-    rows = [
-        (
-            "profile",
-            f"period {profile.period:.6g} m, harmonics {present[0]} to {present[-1]}, "
-            f"h_rms {profile.h_rms:.4g} m, h_max {profile.h_max:.4g} m, m2 {profile.m2:.4g}",
-        ),
-        (
-            "contact",
-            f"E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
-            f"work of adhesion {problem.adhesion_text}",
-        ),
-    ]
-    if isinstance(result, PathResult):
-        way = ", ".join(map(str, result.turning_points))
-        out = ", out" if result.ends_out else ""
-        share = in_works_of_adhesion(result.work, problem.work_of_adhesion)
-        stored = f"of which {result.energy_change:.6g} J/m² are stored"
-        rows += [
-            ("path", f"{way}{out} in {result.load_steps} load steps to the largest; {contact}"),
-            ("work", f"{result.work:.6g} J/m²{share}, {stored}{note}"),
-        ]
-    else:
-        share = in_works_of_adhesion(result.loss, problem.work_of_adhesion)
-        rows += [
-            (
-                "cycle",
-                f"{_turn(result)} in {result.load_steps} load steps, detached by "
-                f"{result.pull_off_penetration:.4g} h_max; {contact}",
-            ),
-            (
-                "loss",
-                f"{result.loss:.6g} J/m²{share} (dimensionless {result.loss_dimensionless:.6g})"
-                f"{note}",
-            ),
-        ]
-    rows += [
-        ("friction", result.friction_summary()),
-        ("sticking", result.sticking_note),
-        ("range", result.range_summary()),
-        ("audit", _audit(result)),
-        (
-            "error",
-            f"{result.loss_error:.2g} J/m² (numerical); {counted(result.races, 'jump')} raced, "
-            f"{result.energy_at_stake:.3g} J/m² at stake",
-        ),
-        ("jumps", kinds),
-    ]
-    if isinstance(result, PathResult):
-        rows += [("minor loop", _minor_loop(part)) for part in result.minor_loops]
-    else:
-        rows.append(("pull-off", f"mean tension {result.pull_off_stress + 0.0:.6g} Pa"))
-    rows.append(("method", f"{result.method.name}, {measure}{result.seconds:.1f} s"))
-    return [(name, text) for name, text in rows if text]
-
-
-def _minor_loop(part: MinorLoop) -> str:
-    end = (
-        "comes back to the same state"
-        if part.closes
-        else f"ends {part.stress_change:+.3g} Pa and {part.contact_change:+.3g} A/A0 away"
-    )
-    return (
-        f"{part.start:g}, {part.turn:g}, {part.start:g}: {part.loss:.6g} J/m² "
-        f"(drops {part.loss_from_drops:.6g}), {end}"
-    )
-
-
-def _audit(result: LoopResult | PathResult) -> str:
-    """Return the audit; without adhesion there is no loss that a residual could refer to."""
-    friction = " and the friction between them" if result.problem.pinning > 0 else ""
-    jumps = f"{counted(len(result.jumps), 'jump')}{friction}"
-    drops = f"{result.loss_from_drops:.6g} J/m² in {jumps}"
-    if result.problem.work_of_adhesion == 0:
-        return f"{drops}; without adhesion nothing is lost"
-    return f"{drops}, residual {result.audit_residual:.2e}"
-
-
-def _turn(result: LoopResult) -> str:
-    control = result.problem.control
-    if result.preload is not None:
-        held = "" if control.is_fixed else f"held by {control.stiffness:.4g} Pa/m, "
-        reached = "" if control.is_fixed else f" (penetration {result.max_penetration:.4g} h_max)"
-        return f"{held}turning at {result.turning_text}{reached}"
-    if control.is_load:
-        return f"under a load to {result.turning_point:g} Pa"
-    if control.is_fixed:
-        return f"to penetration {result.max_penetration:g} h_max"
-    return (
-        f"held by {control.stiffness:.4g} Pa/m, far side to {result.turning_point:g} h_max "
-        f"(penetration {result.max_penetration:.4g} h_max)"
-    )
 
 
 def _plain(value: Any) -> Any:

@@ -33,11 +33,10 @@ def _seal(content: bytes) -> bytes:
     return _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
-def read_sealed(path: Path, names: frozenset[str]) -> xr.Dataset:
+def read_sealed(path: Path) -> xr.Dataset:
     """Read a netCDF file that was sealed, as it stands there: nothing is scaled or decoded.
 
-    InputError without its checksum, or if it holds variables or dimensions beside ``names``, or
-    what would be read from another file.
+    InputError without its checksum, or if it holds anything but datasets of its own.
     """
     with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
@@ -58,17 +57,16 @@ def read_sealed(path: Path, names: frozenset[str]) -> xr.Dataset:
             "of it, or compute the loop again"
         )
     with h5py.File(io.BytesIO(content), "r") as file:
-        _check_members(path, file, len(content), names)
-    as_stored: dict[str, Any] = {"mask_and_scale": False, "decode_times": False}
-    as_stored |= {"decode_coords": False, "phony_dims": "sort"}
+        _check_members(path, file, len(content))
+    as_stored: Any = dict.fromkeys(("mask_and_scale", "decode_times", "decode_coords"), False)
     with xr.open_dataset(io.BytesIO(content), engine="h5netcdf", **as_stored) as found:
         return found.load()
 
 
-def _check_members(path: Path, file: h5py.File, size: int, names: frozenset[str]) -> None:
+def _check_members(path: Path, file: h5py.File, size: int) -> None:
     """Refuse what would be read from elsewhere, or is larger than the file, before it is read."""
     for name in file:
-        own = name in names and isinstance(file.get(name, getlink=True), h5py.HardLink)
+        own = isinstance(file.get(name, getlink=True), h5py.HardLink)
         found = file[name] if own else None
         if (
             not isinstance(found, h5py.Dataset)

@@ -12,7 +12,6 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from typing import Any
 
-from adhesis.ensemble.loop.record import summary_rows
 from adhesis.ensemble.quantities import UNITS, drive_text, stress_text
 from adhesis.ensemble.reporter import bar
 from adhesis.solver.loading.loop_result import LoopResult
@@ -76,7 +75,7 @@ def page(shown: Any) -> str:
     from adhesis.ensemble.report.html import picture_of, table_of
 
     if isinstance(shown, LoopResult | PathResult):
-        rows = summary_rows(shown) + [("warning", text) for text in shown.warnings]
+        rows = shown.summary_rows() + [("warning", text) for text in shown.warnings]
         return table_of(rows) + picture_of(plot(shown))
     figure = draw_shape(shown)
     return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
 from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
@@ -16,7 +16,6 @@ from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import (
-    cell_name,
     failed_cells,
     lines_along,
     short_of_preload,
@@ -116,7 +115,7 @@ def _loss(cell: Cell) -> str:
     loss, gamma = cell.estimates["loss"].mean, cell.work_of_adhesion
     beside = [f"{loss / gamma:.3g} γ"] if gamma > 0 else []
     beside.append(f"W~ = {cell.estimates['loss_dimensionless'].mean:.3g}")
-    return f"{1e3 * loss:.3g} mJ/m² ({', '.join(beside)}) at {cell_name(cell)}"
+    return f"{1e3 * loss:.3g} mJ/m² ({', '.join(beside)}) at {cell.name}"
 
 
 def _statistical(data: Aggregate) -> str:
@@ -156,7 +155,7 @@ def _numerical(data: Aggregate) -> str:
 
 def precision(data: Aggregate) -> list[str]:
     """Report the cells that have met the precision of ``[stop]``; none without ``[stop]``."""
-    known = [(cell_name(cell), cell.precision) for cell in data.cells]
+    known = [(cell.name, cell.precision) for cell in data.cells]
     cells = [(name, found) for name, found in known if found is not None]
     if not cells:
         return []
@@ -182,14 +181,14 @@ def missing(data: Aggregate) -> list[str]:
     if data.failed:
         why = f" First reason: {data.failures[0][1]}." if data.failures else ""
         out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.{why}")
-    if empty := [cell_name(cell) for cell in data.cells if not cell.done and cell.pending]:
+    if empty := [cell.name for cell in data.cells if not cell.done and cell.pending]:
         out.append(f"No task is finished yet for {_listed(empty)}.")
-    if failed := [cell_name(cell) for cell in failed_cells(data.cells)]:
+    if failed := [cell.name for cell in failed_cells(data.cells)]:
         out.append(
             f"WARNING: all tasks failed for {_listed(failed)}: figures and averages lack "
             f"{'this cell' if len(failed) == 1 else 'these cells'}."
         )
-    if few := [cell_name(cell) for cell in data.cells if cell.done == 1]:
+    if few := [cell.name for cell in data.cells if cell.done == 1]:
         out.append(f"Only one realisation, hence no spread, for {_listed(few)}.")
     return out
 
@@ -252,7 +251,7 @@ def quality(data: Aggregate) -> list[str]:
     if data.campaign.cycle.preload is not None:
         out += _preload(data)
     slopes = [(cell, np.sqrt(cell.estimates["m2"].mean)) for cell in data.cells if cell.done]
-    if steep := [cell_name(cell) for cell, slope in slopes if slope > STEEP]:
+    if steep := [cell.name for cell, slope in slopes if slope > STEEP]:
         out.append(
             f"WARNING: the root mean square slope exceeds {STEEP:g} for {_listed(steep)}: linear "
             "elasticity of small slopes, on which everything here rests, is doubtful there."
@@ -283,7 +282,7 @@ def _preload(data: Aggregate) -> list[str]:
         # of the load steps, all that the file holds
         reached = [highest_stress(results.column("loading_mean_stress", rows)) for rows in lost]
     listing = [
-        f"{count} at {cell_name(cell)} ({most_reached(highest)})"
+        f"{count} at {cell.name} ({most_reached(highest)})"
         for (count, cell), highest in zip(short, reached, strict=True)
     ]
     return [
@@ -304,30 +303,24 @@ def _limit(data: Aggregate) -> list[str]:
         low, cell = min(found, key=lambda entry: entry[0])
         out.append(
             f"The zero-range limit holds for ranges of adhesion well below {1e9 * low:.3g} nm: the "
-            f"least {ANY_RANGE} of all loops, at {cell_name(cell)}."
+            f"least {ANY_RANGE} of all loops, at {cell.name}."
         )
     beyond = [(count, cell) for cell in data.cells if (count := int(cell.beyond_zero_range.sum()))]
     if beyond:
         count = sum(number for number, _ in beyond)
         out.append(
             f"WARNING: {count} of {data.done} losses are doubtful, for {why_beyond(opens)}: "
-            f"{_listed([cell_name(cell) for _, cell in beyond])}."
+            f"{_listed([cell.name for _, cell in beyond])}."
         )
     return out
 
 
 def doubts(data: Aggregate) -> list[str]:
     """Loops whose own checks say that their loss is off by a share that counts, worst first."""
-    found = []
-    for cell in data.cells:
-        loss = cell.values["loss"]
-        audit = np.abs(cell.values["audit_residual"])
-        error = cell.values["loss_error"]
-        for k in np.flatnonzero(cell.doubtful):
-            share = max(audit[k], error[k] / abs(loss[k]) if loss[k] else np.inf)
-            text = f"row {cell.rows[k]}, {cell_name(cell)} ({percent(share)})"
-            found.append((-share, text))
-    return [text for _, text in sorted(found)]
+    return [
+        f"row {cell.rows[k]}, {cell.name} ({percent(cell.doubt[k])})"
+        for cell, k in doubtful_loops(data.cells)
+    ]
 
 
 def _table_1(data: Aggregate) -> list[str]:
@@ -451,10 +444,10 @@ def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:
     if not ratios:
         return []
     where = "At equal load, on unloading up to the largest tension, the contact is"
-    if below := [cell_name(cell) for cell, ratio in ratios if ratio < 1]:
+    if below := [cell.name for cell, ratio in ratios if ratio < 1]:
         return [f"{where} not everywhere larger than on loading: {_listed(below)}."]
     least = min(ratio for _, ratio in ratios)
-    apart = [cell_name(cell) for cell in data.cells if cell.done and area_ratio(cell) is None]
+    apart = [cell.name for cell in data.cells if cell.done and area_ratio(cell) is None]
     rest = f" (no load in common away from the turning point: {_listed(apart)})" if apart else ""
     says = "; the paper says the same" if of_paper else ""
     return [
@@ -473,7 +466,7 @@ def _spectrum(data: Aggregate) -> list[str]:
         slope, error = fitted_slope(cell.plan, cell.fields.psd_displacement[0, -1])
         if not np.isnan(slope):
             fit = f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f}"
-            parts.append(f"{fit} at {cell_name(cell)}")
+            parts.append(f"{fit} at {cell.name}")
     if not parts:
         return []
     depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}

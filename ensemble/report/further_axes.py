@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-import numpy as np
-
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.campaign.tasks import name_at, place
+from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.quantities import common_unit, gamma_text, with_unit
 
 _LABELS = {
@@ -34,11 +32,6 @@ _LABELS = {
     "stripe_amplitude": r"amplitude $\varepsilon$ of the stripes",
     "stripe_phase": r"phase $\varphi$ of the stripes",
 }
-
-
-def cell_name(cell: Cell) -> str:
-    """Return "H = 0.8, γ = 0.04 J/m²", and where the cell stands on further axes."""
-    return name_at(cell.hurst, cell.work_of_adhesion, cell.others)
 
 
 def axis_label(axis: Axis) -> tuple[str, float]:
@@ -90,14 +83,7 @@ def failed_cells(cells: Sequence[Cell]) -> list[Cell]:
 
 def short_of_preload(cells: Sequence[Cell]) -> list[tuple[int, Cell]]:
     """Return the cells with loops that did not reach their preload, and how many these are."""
-    return [(count, cell) for cell in cells if (count := loops_short_of_preload(cell))]
-
-
-def loops_short_of_preload(cell: Cell) -> int:
-    """Return how many loops of a cell turned before their preload was reached."""
-    if cell.campaign.cycle.preload is None:
-        return 0
-    return int(np.sum(cell.values["preload_reached"] == 0))
+    return [(count, cell) for cell in cells if (count := cell.short_of_preload)]
 
 
 def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:

@@ -65,7 +65,6 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
             "The same realisations of both campaigns, profile by profile.",
             loss_tables.companions(data).markdown(),
             *_bullets(findings.readings(data)),
-            *show("companions"),
         ]
     out += ["## Loops", *show("loops")]
     if figures.get("fields"):

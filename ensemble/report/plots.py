@@ -10,33 +10,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from adhesis.ensemble.campaign.axes import Axis
     from adhesis.ensemble.report.figures.style import PublishedFigure
-
-
-def _function(name: str) -> Callable[[Aggregate], PublishedFigure]:
-    """Return the function that draws a figure; matplotlib is loaded with it."""
-    from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
-
-    modules = (loops, loss_figures, shapes_and_spectra)
-    found: Callable[[Aggregate], PublishedFigure] = next(
-        getattr(module, name) for module in modules if hasattr(module, name)
-    )
-    return found
-
-
-class _Drawing:
-    """Method that draws the figure of its name, and is described by the function that does."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, plots: Plots, owner: type | None = None) -> Callable[..., Figure]:
-        def draw(ax: object = None) -> Figure:
-            return plots._draw(self._name, ax)
-
-        draw.__name__, draw.__doc__ = self._name, _function(self._name).__doc__
-        return draw
 
 
 class Plots:
@@ -50,26 +24,34 @@ class Plots:
     def __init__(self, averages: Callable[[], Aggregate]) -> None:
         self._averages = averages
 
+    def __dir__(self) -> list[str]:
+        from adhesis.ensemble.report.figures.catalogue import ALL
+
+        return [item.draw.__name__ for item in ALL] + ["loss_along"]
+
     def __repr__(self) -> str:
-        names = (name for name in vars(type(self)) if not name.startswith("_"))
-        return f"<Plots: {', '.join(names)}>"
+        return f"<Plots: {', '.join(dir(self))}>"
 
-    def _draw(self, name: str, ax: object, axis: Axis | None = None) -> Figure:
-        """Draw a figure of the cells that are shown, or that of an axis, which has a note itself.
+    def __getattr__(self, name: str) -> Callable[..., Figure]:
+        """Return the method of a figure of the catalogue, by the name of the function."""
+        if name.startswith("_") or name not in dir(self):
+            raise AttributeError(name)
+        from adhesis.ensemble.report.figures.catalogue import ALL
 
-        Each method calls this alone, so that a warning is of the line that calls the method.
-        """
-        from adhesis.ensemble.report.figures.along import along
+        item = next(item for item in ALL if item.draw.__name__ == name)
+
+        def draw(ax: object = None) -> Figure:
+            return self._draw(item.of, ax)
+
+        draw.__name__, draw.__doc__ = name, item.draw.__doc__
+        return draw
+
+    def _draw(self, function: Callable[[Aggregate], PublishedFigure], ax: object) -> Figure:
+        """Draw a figure; each method calls this alone, so that a warning is of the user's line."""
         from adhesis.ensemble.report.figures.style import drawn_into
-        from adhesis.ensemble.report.further_axes import below, common
 
         with drawn_into(ax):
-            if axis is not None:
-                return along(axis)(self._averages()).finish()
-            shown = self._averages().shown
-            figure = _function(name)(shown)
-            figure.say_below(below(shown.cells, common(shown)))
-            return figure.finish()
+            return function(self._averages()).finish()
 
     def loss_along(self, name: str, ax: object = None) -> Figure:
         """Loss along a further axis of the campaign ("max_penetration"), with intervals.
@@ -79,25 +61,10 @@ class Plots:
         ValueError
             If the campaign has no such axis beside H and γ.
         """
-        from adhesis.ensemble.report.figures.along import with_figure
+        from adhesis.ensemble.report.figures.along import along, with_figure
 
         axes = {axis.name: axis for axis in with_figure(self._averages())}
         if name not in axes:
             known = ", ".join(axes) or "none"
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
-        return self._draw("loss_along", ax, axes[name])
-
-    contact_against_stress = _Drawing()
-    loop_against_penetration = _Drawing()
-    loss_against_hurst = _Drawing()
-    loss_against_slope = _Drawing()
-    loss_against_penetration = _Drawing()
-    loss_by_mechanism = _Drawing()
-    jump_energies = _Drawing()
-    pull_off = _Drawing()
-    shapes = _Drawing()
-    spectra_of_branches = _Drawing()
-    spectra_on_loading = _Drawing()
-    spectra_on_unloading = _Drawing()
-    gap_density = _Drawing()
-    height_density = _Drawing()
+        return self._draw(along(axes[name]), ax)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -29,36 +29,31 @@ def write_report(
     data = aggregate(path, beside)
     directory = Path(directory)
     writing = Writing()
-    with writing.output("the report in", directory):
-        with staged_folder(directory) as folder:
-            drawn = _write_files(data, folder, progress)
-        _remove_other_figures(directory, drawn)
+    with (
+        writing.output("the report in", directory),
+        staged_folder(directory, _older_figures(directory)) as folder,
+    ):
+        _write_files(data, folder, progress)
     writing.finish()
     _print_summary(data, directory, stream or sys.stdout)
     return data
 
 
-def _remove_other_figures(directory: Path, drawn: Collection[str]) -> None:
-    """Remove figures that an earlier report has left and this one does not show."""
+def _older_figures(directory: Path) -> list[str]:
+    """Return the files of all figures that an earlier report has left."""
     from adhesis.ensemble.report.figures.catalogue import ALL
 
+    figures = [*directory.glob("*.png"), *directory.glob("*.pdf")]
     known = {item.name for item in ALL}
-    for path in directory.iterdir():
-        is_figure = path.stem in known or path.stem.startswith("loss_along_")
-        if is_figure and path.suffix in (".png", ".pdf") and path.stem not in drawn:
-            path.unlink()
+    return [f.name for f in figures if f.stem in known or f.stem.startswith("loss_along_")]
 
 
-def _write_files(
-    data: Aggregate, directory: Path, progress: Callable[[str], None]
-) -> Collection[str]:
-    """Write all files; returns the names of the figures."""
+def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], None]) -> None:
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
     from adhesis.ensemble.report.curves_dataset import curves_dataset
     from adhesis.ensemble.report.figures.catalogue import sections
     from adhesis.ensemble.report.figures.style import save, style
-    from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
     from adhesis.ensemble.report.tables import loss_tables, mechanisms
@@ -82,15 +77,12 @@ def _write_files(
     for number, item in enumerate(items, 1):
         progress(f"figure {number} of {len(items)}, {item.name}")
         with style():
-            figure = item.draw(data if item.whole else data.shown)
-            if not item.whole:
-                figure.say_below(below(data.shown.cells, common(data.shown)))
+            figure = item.of(data)
         save(figure, directory / item.name)
     progress("pages")
     page = write_page(data, figures)
     (directory / "report.md").write_text(page, encoding="utf-8")
     (directory / "report.html").write_text(html_page(page, directory), encoding="utf-8")
-    return [item.name for item in items]
 
 
 def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:

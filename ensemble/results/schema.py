@@ -40,13 +40,6 @@ DAMAGED = 4
 ERROR_LENGTH = 512
 ORIGIN_LENGTH = 160
 
-# Root attributes that are read.
-ROOT_ATTRIBUTES = (
-    *("file_type", "file_version", "Conventions", "title", "campaign", "seed", "part"),
-    *("created", "laid_out", "adhesis_version", "commit", "python", "numpy", "scipy"),
-    *("kernels", "mpi", "hdf5", "fftw", "processor"),
-)
-
 
 def _task(name: str, dtype: str, unit: str, meaning: str, **attributes: object) -> Dataset:
     return Dataset(name, ("task",), dtype, unit, meaning, attributes)

@@ -1,4 +1,1 @@
-"""Run a campaign: session, hand-out to ranks, lock, signals, progress.
-
-Import from its modules; only :mod:`adhesis.ensemble.run.ranks` imports MPI.
-"""
+"""Run a campaign: session, hand-out to ranks, lock, signals, progress."""

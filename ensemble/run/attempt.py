@@ -9,18 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any
 
 from adhesis.ensemble.run.interrupt import in_main_thread, raised_by_handler
 
-
-class StopCheck(Protocol):
-    """Called by a task now and then, with a note on how far it is; it raises to end the task."""
-
-    def __call__(self, note: Any = None) -> None:
-        """Return if the task is to go on."""
-
-
+# Called by a task now and then, perhaps with a note on how far it is; it raises to end the task.
+StopCheck = Callable[..., None]
 Compute = Callable[[int, StopCheck], Any]
 
 # Interval at which a task in progress checks whether to stop, in s.

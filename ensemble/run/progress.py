@@ -8,7 +8,7 @@ from typing import TextIO
 
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.quantities import duration
-from adhesis.ensemble.reporter import StatusLine
+from adhesis.ensemble.reporter import Display
 
 _LINE_INTERVALS = (5.0, 60.0)  # s: at first, and at most
 _LINES_AT_LEAST = 40  # the time between lines is this part of the time so far: 15 s after 10 min
@@ -48,13 +48,14 @@ class Summary:
         return f"{self.done} of {self.total} tasks done{failed}; {now}"
 
 
-def _interval(elapsed: float) -> float:
+def interval(elapsed: float) -> float:
+    """Return the time between two lines of a run, in s, after so many."""
     first, most = _LINE_INTERVALS
     return min(max(first, elapsed / _LINES_AT_LEAST), most)
 
 
-class ProgressLine(StatusLine):
-    """Report the progress of a run, on rank 0, from counts that the run keeps up to date.
+class ProgressLine(Display):
+    """Progress of a run, on rank 0, from counts that the run keeps up to date.
 
     ``time_left`` returns the estimated seconds until the end, or None while nothing is known.
     """
@@ -65,13 +66,9 @@ class ProgressLine(StatusLine):
         time_left: Callable[[], float | None],
         stream: TextIO | None = None,
     ) -> None:
-        super().__init__(_interval, stream, at_once=True)
+        super().__init__(self._line, interval, stream, at_once=True)
         self._counts = counts
         self._time_left = time_left
-
-    def tick(self) -> None:
-        """Report, if it is time to."""
-        self.show(self._text)
 
     def failure(self, what: str, error: str) -> None:
         """Report a failed task that is counted: the first ones each, then only their number."""
@@ -85,17 +82,13 @@ class ProgressLine(StatusLine):
         if self._counts.doubtful <= _MOST_FAILURES_SHOWN:
             self.say(f"doubtful loss: {what}")
 
-    def end(self) -> None:
-        """Show the last state and end the line on a terminal."""
-        self.close(self._text)
-
-    def _text(self) -> str:
+    def _line(self, seconds: float) -> str:
         c = self._counts
         parts = [f"{c.done} of {c.total} tasks done"]
         if c.failed_now:
             parts.append(f"{c.failed_now} failed")
         if c.computed:
-            parts.append(f"{duration(self.seconds)} so far")
+            parts.append(f"{duration(seconds)} so far")
         left = self._time_left()
         if left is not None and c.pending:
             parts.append(f"about {duration(left)} left")

@@ -88,16 +88,17 @@ class Schedule:
             return mean
         return self._groups[group].prior * self._known_seconds / self._known_prior
 
-    def seconds_left(self, in_flight: int, workers: int) -> float | None:
+    def seconds_left(self, in_flight: Iterable[int], workers: int) -> float | None:
         """Return the estimated time in s until so many workers are done; None if nothing is known.
 
         The tasks in flight are half done.
         """
         if not self._known_prior:
             return None
-        mean = self._known_seconds / sum(group.count for group in self._groups.values())
-        waiting = sum(g.waiting * (self.estimate(name) or 0.0) for name, g in self._groups.items())
-        return (waiting + 0.5 * mean * in_flight) / workers
+        left: dict[Hashable, float] = {n: group.waiting for n, group in self._groups.items()}
+        for task in in_flight:
+            left[self._group_of[task]] += 0.5
+        return sum(count * (self.estimate(name) or 0.0) for name, count in left.items()) / workers
 
     def take(self, time_left: float | None = None) -> Unit:
         """Return the next unit; an empty one if none waits or fits into ``time_left`` (s)."""

@@ -201,7 +201,7 @@ class _Session:
                     )
                 )
             else:
-                channel = dispatch.OwnWorker(self._compute_here, lambda outcome: outcome, limits)
+                channel = dispatch.OwnWorker(self._compute, lambda outcome: outcome, limits)
             return self._hand_out(channel, own_rows)
 
     def _hand_out(self, channel: dispatch.Channel, own_rows: bool) -> str | None:
@@ -210,9 +210,9 @@ class _Session:
         def collect(outcome: Outcome) -> None:
             self._count(outcome if own_rows else self._write(outcome), progress, schedule)
 
-        progress = self._progress = ProgressLine(
+        progress = ProgressLine(
             self._counts,
-            lambda: schedule.seconds_left(master.in_flight, len(channel.workers)),
+            lambda: schedule.seconds_left(list(master.notes), len(channel.workers)),
             self.stream,
         )
 
@@ -224,12 +224,10 @@ class _Session:
                 )
 
         master = dispatch.Master(
-            channel, schedule, self._groups, collect, self._limits, progress.tick, halted
+            channel, schedule, self._groups, collect, self._limits, halted=halted
         )
-        try:
+        with progress:
             return master.run()
-        finally:
-            progress.end()
 
     def summary(self, stopped: str | None) -> Summary:
         """Return the counts, and how the run has ended."""
@@ -238,15 +236,6 @@ class _Session:
         summary.stopped = stopped if summary.pending else None
         summary.precisions = () if batches is None else tuple(batches.precisions)
         return summary
-
-    def _compute_here(self, row: int, check: StopCheck) -> Row:
-        """Compute in the process that shows the progress."""
-
-        def check_and_show(note: Any = None) -> None:
-            check(note)
-            self._progress.tick()
-
-        return self._compute(row, check_and_show)
 
     def _write(self, outcome: Outcome) -> Outcome:
         """Write a row; of its numbers the master gets those by which it is judged."""
@@ -282,7 +271,6 @@ class _Session:
             self.writer.mark(spare, needed=False)
             self._counts.total += len(further)
             schedule.add(further)
-        progress.tick()
 
     def _schedule(self) -> Schedule:
         tasks = self.plan.tasks

@@ -462,7 +462,7 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
     """Run a plan; see :func:`loss_of_trace`."""
     started = time.monotonic()
     try:
-        results = Loops(plan.jobs, plan.processes).run(watch)
+        results = Loops(plan.jobs, plan.processes, plan.seconds).run(watch)
     except Unresponsive as error:  # a process of a loop hangs
         raise NoAnswer(f"the loops could not be run to their end: {error}") from error
     main = results.get("answer")

@@ -12,15 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from adhesis.ensemble.quantities import shown_unit
-from adhesis.ensemble.report.figures.style import (
-    LINE_OF_BRANCH,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    new_figure,
-    plain_decades,
-    save,
-    style,
-)
+from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.trace.answer import FIGURES, Answer
 from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.prepare import Prepared
@@ -34,12 +26,12 @@ def draw_all(answer: Answer, folder: Path) -> dict[str, str]:
     """Draw all figures for which the answer has data, as PNG and PDF; return their captions."""
     captions = {}
     builders = (_trace, _spectrum, _loop, _cut_off, _tables)
-    with style():
+    with style.style():
         for stem, build in zip(FIGURES, builders, strict=True):
             built = build(answer)
             if built is not None:
                 figure, captions[stem] = built
-                save(figure, folder / stem)
+                style.save(figure, folder / stem)
     return captions
 
 
@@ -49,7 +41,7 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     level, profile = prepared.level(), prepared.profile()
     x = prepared.start + prepared.step * np.arange(level.size)
     unit_x, in_x = shown_unit("length", prepared.trace.length)
-    figure = new_figure(2, 1, TWO_COLUMNS, 3.3, sharex=True)
+    figure = style.new_figure(2, 1, style.TWO_COLUMNS, 3.3, sharex=True)
     above, below = figure.axes
     unit_z, in_z = shown_unit("height_range", prepared.trace.height_range)
     measured = prepared.step * np.arange(heights.size)
@@ -108,7 +100,7 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
     profile = answer.prepared.profile()
     a = np.abs(profile.coefficients[1:]) ** 2 * profile.period
     q = profile.q0 * np.arange(1, profile.coefficients.size)
-    figure = new_figure(1, 1, ONE_COLUMN * 1.5, 2.8)
+    figure = style.new_figure(1, 1, style.ONE_COLUMN * 1.5, 2.8)
     (axes,) = figure.axes
     axes.loglog(before.wave_number, before.power, color=_GREY, lw=0.9, label="as measured")
     axes.loglog(after.wave_number, after.power, color="k", lw=0.9, label="level")
@@ -125,7 +117,7 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
         ylabel="power $C(q)$ (m³)",
         ylim=(0.3 * low, None),
     )
-    plain_decades([axes])
+    style.plain_decades([axes])
     axes.legend(loc="best")
     return figure, (
         "Power spectrum with Hann's window, averaged over bands, before and after levelling, and "
@@ -136,7 +128,7 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
 
 def draw_loop(answer: Answer) -> Figure:
     """Draw the answer's own loop."""
-    with style():
+    with style.style():
         return _loop(answer)[0]
 
 
@@ -147,11 +139,11 @@ def _loop(answer: Answer) -> tuple[Figure, str]:
     stress = np.array(states["mean_stress"])
     contact = np.array(states["contact_fraction"])
     unit, size = shown_unit("mean_stress", float(np.abs(stress).max()))
-    figure = new_figure(1, 2, TWO_COLUMNS, 2.5)
+    figure = style.new_figure(1, 2, style.TWO_COLUMNS, 2.5)
     left, right = figure.axes
     for name, colour in (("loading", _BLUE), ("unloading", _ORANGE)):
         rows = branch == name
-        line = LINE_OF_BRANCH[name]
+        line = style.LINE_OF_BRANCH[name]
         left.plot(depth[rows], stress[rows] / size, ls=line, color=colour, label=name)
         right.plot(depth[rows], contact[rows], ls=line, color=colour, label=name)
     left.axhline(0, color="0.5", lw=0.5)
@@ -170,7 +162,7 @@ def _cut_off(answer: Answer) -> tuple[Figure, str] | None:
         return None
     rows.sort()
     shortest, loss = np.array(rows).T
-    figure = new_figure(1, 1, ONE_COLUMN * 1.5, 2.6)
+    figure = style.new_figure(1, 1, style.ONE_COLUMN * 1.5, 2.6)
     (axes,) = figure.axes
     axes.semilogx(1e6 * shortest, 1e3 * loss, "o-", color=_BLUE)
     value = answer.loss
@@ -208,7 +200,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
         turns = [(turn / size, row) for turn, row in turns]
     if len(gammas) + len(turns) < 4:
         return None
-    figure = new_figure(3, 2, TWO_COLUMNS, 4.4, sharex="col")
+    figure = style.new_figure(3, 2, style.TWO_COLUMNS, 4.4, sharex="col")
     panels = np.array(figure.axes).reshape(3, 2)
     rows = (
         ("loss", 1e3, "loss (mJ/m²)", answer.loss),

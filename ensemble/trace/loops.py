@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -36,26 +36,41 @@ class _Computing:
 
 
 class Loops:
-    """Loops of a plan, begun in the order of their jobs, in processes; 0 runs them in this process.
+    """Loops of a plan in processes, the longest first; 0 processes run them in this one.
 
-    ``done`` holds the result by job name, the error text of a failed loop; ``took`` wall seconds by
-    name of the finished jobs; ``pids`` the ids of the processes.
+    ``seconds`` are expected, by job name. ``done`` holds the result by job name, the error text of
+    a failed loop; ``pids`` the ids of the processes.
     """
 
-    def __init__(self, jobs: Sequence[Job], processes: int) -> None:
+    def __init__(
+        self, jobs: Sequence[Job], processes: int, seconds: Mapping[str, float] | None = None
+    ) -> None:
         self._jobs = tuple(jobs)
-        self.processes = min(processes, len(self._jobs))
+        self.count = len(self._jobs)
+        self.processes = min(processes, self.count)
         self.done: dict[str, Result | str] = {}
-        self.took: dict[str, float] = {}
         self.pids: list[int] = []
+        expected = seconds or {}
+        tasks = range(self.count)
+        self._groups = {task: task for task in tasks}
+        priors: dict[Hashable, float] = {
+            task: expected.get(self._jobs[task].name, 1.0) for task in tasks
+        }
+        self._schedule = Schedule(tasks, self._groups, priors, dict.fromkeys(tasks, 0))
         self._master: Master | None = None
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimated time to the end, in s; None if nothing is known yet."""
+        in_flight = [] if self._master is None else list(self._master.notes)
+        return self._schedule.seconds_left(in_flight, max(self.processes, 1))
 
     @property
     def running(self) -> dict[str, tuple[float, str, float]]:
         """By job name: seconds so far, and the branch and prescribed value reached."""
         if self._master is None:
             return {}
-        notes = self._master.notes
+        notes = dict(self._master.notes)  # another thread may ask
         return {self._jobs[k].name: note or (0.0, "loading", 0.0) for k, note in notes.items()}
 
     @property
@@ -79,7 +94,6 @@ class Loops:
         def collect(outcome: Outcome) -> None:
             nonlocal last
             name = self._jobs[outcome.task].name
-            self.took[name] = outcome.seconds
             # the solver's own errors are written for users, without their class
             failure = (outcome.error or "").removeprefix("PathError: ")
             self.done[name] = failure or outcome.result
@@ -95,9 +109,6 @@ class Loops:
                 channel = started = Processes(self.processes, computing, report_interval=every)
                 stack.enter_context(started)
                 self.pids = started.pids
-            tasks = range(len(self._jobs))
-            groups = {task: task for task in tasks}
-            schedule = Schedule(tasks, groups, dict.fromkeys(tasks, 1.0), round_of=groups)
-            self._master = Master(channel, schedule, groups, collect, limits, tick)
+            self._master = Master(channel, self._schedule, self._groups, collect, limits, tick)
             self._master.run()
         return self.done

@@ -12,7 +12,6 @@ from adhesis._version import __version__
 from adhesis.ensemble.escape import code_span, markdown, markdown_table, printable
 from adhesis.ensemble.outputs import check_output_folder, staged_folder, write_json
 from adhesis.ensemble.quantities import (
-    in_works_of_adhesion,
     length_text,
     rounded_percent,
     stress_text,
@@ -35,7 +34,11 @@ from adhesis.ensemble.trace.figures import draw_all, draw_loop
 from adhesis.ensemble.trace.variants import TABLES
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.equilibrium_path import friction_text, sticking_text
+from adhesis.solver.loading.equilibrium_path import (
+    friction_text,
+    in_works_of_adhesion,
+    sticking_text,
+)
 
 
 def summary(answer: Answer) -> str:

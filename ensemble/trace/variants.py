@@ -98,11 +98,10 @@ def make_plan(
             cycle.turning_points[0] if point is None else point,
         )
     seconds = {name: expected_seconds(job) for name, job in jobs.items()}
-    order = sorted(jobs, key=lambda name: -seconds[name])  # the longest first, for balance
     wall = max(sum(seconds.values()) / max(processes, 1), max(seconds.values()))
     plan = Plan(
         runs=tuple(runs),
-        jobs=tuple(jobs[name] for name in order),
+        jobs=tuple(jobs.values()),
         seconds=seconds,
         waves=base.highest_harmonic,
         patches=round(patches_of(jobs["answer"])),

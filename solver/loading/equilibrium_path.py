@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from time import process_time
@@ -305,6 +306,82 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return the index of the state before each jump; the next one is that after it."""
         return states_before_jumps(self.jumps, self.branch, self.separation, self.contact_fraction)
 
+    @property
+    def audit_residual(self) -> float:
+        """Work less energy that is lost and stored, relative to the work."""
+        raise NotImplementedError
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to doubt the loss or work, one sentence each."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        """Summarise it for a terminal, with its warnings."""
+        return "\n".join([self.summary(), *(f"WARNING     {text}" for text in self.warnings)])
+
+    def summary(self) -> str:
+        """Return the main numbers in a few lines for a terminal."""
+        return "\n".join(f"{name:<12}{text}" for name, text in self.summary_rows())
+
+    def summary_rows(self) -> list[tuple[str, str]]:
+        """Return the main numbers, each with its name."""
+        problem, profile, half_space = self.problem, self.problem.profile, self.problem.half_space
+        present = np.flatnonzero(profile.coefficients)
+        counts = Counter(jump.kind for jump in self.jumps)
+        measure = "" if problem.measure == "arc" else f"{problem.measure} measure, "
+        contact = (
+            f"largest contact fraction {self.contact_fraction.max():.4g}, most patches "
+            f"{self.patches.max()}"
+        )
+        rows = [
+            (
+                "profile",
+                f"period {profile.period:.6g} m, harmonics {present[0]} to {present[-1]}, "
+                f"h_rms {profile.h_rms:.4g} m, h_max {profile.h_max:.4g} m, m2 {profile.m2:.4g}",
+            ),
+            (
+                "contact",
+                f"E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
+                f"work of adhesion {problem.adhesion_text}",
+            ),
+            *self._rows_of_way(contact),
+            ("friction", self.friction_summary()),
+            ("sticking", self.sticking_note),
+            ("range", self.range_summary()),
+            ("audit", self._audit_text()),
+            (
+                "error",
+                f"{self.loss_error:.2g} J/m² (numerical); {counted(self.races, 'jump')} raced, "
+                f"{self.energy_at_stake:.3g} J/m² at stake",
+            ),
+            ("jumps", ", ".join(f"{n} {kind}" for kind, n in counts.most_common()) or "none"),
+            *self._rows_of_end(),
+            ("method", f"{self.method.name}, {measure}{self.seconds:.1f} s"),
+        ]
+        return [(name, text) for name, text in rows if text]
+
+    def _rows_of_way(self, contact: str) -> list[tuple[str, str]]:
+        """Return the way of a loop or path and what it lost; ``contact`` stands behind the way."""
+        raise NotImplementedError
+
+    def _rows_of_end(self) -> list[tuple[str, str]]:
+        raise NotImplementedError
+
+    def _audit_text(self) -> str:
+        """Return the audit; without adhesion there is no loss that a residual could refer to."""
+        friction = " and the friction between them" if self.problem.pinning > 0 else ""
+        jumps = f"{counted(len(self.jumps), 'jump')}{friction}"
+        drops = f"{self.loss_from_drops:.6g} J/m² in {jumps}"
+        if self.problem.work_of_adhesion == 0:
+            return f"{drops}; without adhesion nothing is lost"
+        return f"{drops}, residual {self.audit_residual:.2e}"
+
+    def _share_and_note(self, lost: float) -> tuple[str, str]:
+        """Return the loss or work in works of adhesion, and its note, each to follow it."""
+        share = in_works_of_adhesion(lost, self.problem.work_of_adhesion)
+        return share, f"; {self.loss_note}" if self.loss_note else ""
+
     def friction_summary(self) -> str:
         """Return in one line what is friction of edges; empty with one work of adhesion."""
         gamma, pattern = self.problem.work_of_adhesion_open, self.problem.pattern
@@ -413,6 +490,11 @@ def friction_text(
         f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²{mean}; "
         f"{lost - friction:.6g} J/m² lost by instability"
     )
+
+
+def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
+    """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
+    return f", {loss / work_of_adhesion:.4g} γ" if work_of_adhesion > 0 else ""
 
 
 def sticking_text(

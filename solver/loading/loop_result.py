@@ -7,7 +7,6 @@ of the energy drops at the jumps are the same energy. They are computed independ
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,12 +128,6 @@ class LoopResult(EquilibriumPath):
         return last - 1 in self.states_before_jumps()
 
     @property
-    def _opening_text(self) -> str:
-        """Work of adhesion at which edges recede, for a message; empty if there is one alone."""
-        found = self.problem.work_of_adhesion_open
-        return "" if found is None else f"γ_open = {found:.4g} J/m², "
-
-    @property
     def _where(self) -> str:
         """Turning point as prescribed, for a message."""
         control, point = self.problem.control, self.turning_point
@@ -238,35 +231,38 @@ class LoopResult(EquilibriumPath):
         """Work spent per largest contact area, in J/m² of contact."""
         return self.work_spent / self.largest_contact_fraction
 
-    def __str__(self) -> str:
-        """Summarise the loop for a terminal: problem, losses, jumps, pull-off, warnings."""
-        profile = self.problem.profile
-        kinds = Counter(jump.kind for jump in self.jumps)
-        several = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
-        turned = f"Δ/h_max up to {self.max_penetration:.4g}"
-        if self.preload is not None:
-            turned = f"turning at {self.turning_text}"
-        return "\n".join(
+    def _rows_of_way(self, contact: str) -> list[tuple[str, str]]:
+        share, note = self._share_and_note(self.loss)
+        return [
             (
-                f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
-                f"period {profile.period:.4g} m",
-                f"loop       γ = {self.problem.adhesion_text}, "
-                f"{self._opening_text}"
-                f"{turned} in {self.load_steps} load steps, "
-                f"method {self.method.name}",
-                *(f"sticking   {text}" for text in (self.sticking_note,) if text),
-                f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
-                f"(W~ = {self.loss_dimensionless:.5g}); "
-                f"sum of drops {self.loss_from_drops:.5g} J/m²"
-                f"{f' ({self.loss_note})' if self.loss_note else ''}",
-                *(f"friction   {text}" for text in (self.friction_summary(),) if text),
-                f"range      {self.range_summary()}",
-                f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
-                f"pull-off   {self.pull_off_stress:.4g} Pa, "
-                f"out of contact at Δ/h_max = {self.pull_off_penetration:.4g}",
-                f"states     {len(self.separation)}, {self.seconds:.2g} s of CPU time",
-                *(f"WARNING    {text}" for text in self.warnings),
-            )
+                "cycle",
+                f"{self._way} in {self.load_steps} load steps, detached by "
+                f"{self.pull_off_penetration:.4g} h_max; {contact}",
+            ),
+            (
+                "loss",
+                f"{self.loss:.6g} J/m²{share} (dimensionless {self.loss_dimensionless:.6g}){note}",
+            ),
+        ]
+
+    def _rows_of_end(self) -> list[tuple[str, str]]:
+        return [("pull-off", f"mean tension {self.pull_off_stress + 0.0:.6g} Pa")]
+
+    @property
+    def _way(self) -> str:
+        """Where it turned, for the summary."""
+        control = self.problem.control
+        if self.preload is not None:
+            held = "" if control.is_fixed else f"held by {control.stiffness:.4g} Pa/m, "
+            depth = "" if control.is_fixed else f" (penetration {self.max_penetration:.4g} h_max)"
+            return f"{held}turning at {self.turning_text}{depth}"
+        if control.is_load:
+            return f"under a load to {self.turning_point:g} Pa"
+        if control.is_fixed:
+            return f"to penetration {self.max_penetration:g} h_max"
+        return (
+            f"held by {control.stiffness:.4g} Pa/m, far side to {self.turning_point:g} h_max "
+            f"(penetration {self.max_penetration:.4g} h_max)"
         )
 
     def on_axis(self, branch: Branch, values: Array) -> Array:

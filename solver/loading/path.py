@@ -89,6 +89,17 @@ class MinorLoop(NotebookDisplay):
         """Work less change of energy and drops, in J/m²."""
         return self.loss - self.energy_change - self.loss_from_drops
 
+    def __str__(self) -> str:
+        end = (
+            "comes back to the same state"
+            if self.closes
+            else f"ends {self.stress_change:+.3g} Pa and {self.contact_change:+.3g} A/A0 away"
+        )
+        return (
+            f"{self.start:g}, {self.turn:g}, {self.start:g}: {self.loss:.6g} J/m² "
+            f"(drops {self.loss_from_drops:.6g}), {end}"
+        )
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PathResult(EquilibriumPath):
@@ -143,6 +154,18 @@ class PathResult(EquilibriumPath):
             f"least_range={self.least_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
             f"{counted(len(self.minor_loops), 'minor loop')})"
         )
+
+    def _rows_of_way(self, contact: str) -> list[tuple[str, str]]:
+        way = ", ".join([*map(str, self.turning_points), *(["out"] if self.ends_out else [])])
+        share, note = self._share_and_note(self.work)
+        stored = f"of which {self.energy_change:.6g} J/m² are stored"
+        return [
+            ("path", f"{way} in {self.load_steps} load steps to the largest; {contact}"),
+            ("work", f"{self.work:.6g} J/m²{share}, {stored}{note}"),
+        ]
+
+    def _rows_of_end(self) -> list[tuple[str, str]]:
+        return [("minor loop", str(part)) for part in self.minor_loops]
 
     @property
     def warnings(self) -> tuple[str, ...]:

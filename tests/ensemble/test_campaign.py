@@ -94,9 +94,9 @@ def test_what_breaks_the_rule_of_a_key_is_named_with_it(key):
 # Keys that take the place of the campaign's, or are left out where no value follows; what is said.
 REFUSED = r"""
 # heights and period in different units: set up, such a profile would fill the memory
-h_rms = 1.0 -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
+h_rms = "1 m" -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
 h_rms = 1e-18 -> [profile] h_rms is 1e-18 with period 0.001, so the rms slope is
-h_rms = [1e-6, 1.0] -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
+h_rms = [1e-6, "1 m"] -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
 period = [1e-3, 1e-9] -> [profile] h_rms is 1e-06 with period 1e-09, so the rms slope is
 ratio = 50000; h_rms = 1e-3 -> [profile] h_rms is 0.001 with period 0.001, so the rms
 ratio = 50000; h_rms = 1e-9; nodes_per_wave = 100000 ->

@@ -161,7 +161,7 @@ def test_the_longest_tasks_go_first_once_they_are_known():
     assert schedule.estimate("new") == pytest.approx(10 / 5)
     assert schedule.take(time_left=5.0) == (4,)
     assert schedule.take(time_left=0.5) == ()
-    assert schedule.seconds_left(0, 1) == pytest.approx(10.0)
+    assert schedule.seconds_left((), 1) == pytest.approx(10.0)
     assert [schedule.take(), schedule.take(), schedule.take()] == [(3,), (1,), ()]
 
 
@@ -169,10 +169,10 @@ def test_times_of_an_earlier_run_count_as_often_as_they_were_measured():
     """From them the time of a group of which nothing is known is estimated, by its prior."""
     groups = {0: "short", 1: "long"}
     schedule = Schedule([0, 1], groups, {"short": 1.0, "long": 3.0}, {0: 0, 1: 0})
-    assert schedule.seconds_left(0, 1) is None
+    assert schedule.seconds_left((), 1) is None
     schedule.measured("short", 40.0, 4)
     assert schedule.estimate("long") == 30.0
-    assert schedule.seconds_left(0, 1) == 40.0
+    assert schedule.seconds_left((), 1) == 40.0
     schedule.measured("short", 10.0)
     assert schedule.estimate("long") == 30.0
 

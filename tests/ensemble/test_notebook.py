@@ -36,10 +36,10 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.loop import saved
 from adhesis.ensemble.quantities import with_error
 from adhesis.ensemble.report import findings
-from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace

@@ -9,6 +9,7 @@ import shutil
 import numpy as np
 import pytest
 
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.compare import Changes, compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.precision import (
@@ -25,7 +26,6 @@ from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
-from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.run.session import Options, run_campaign
 from benchmarks.precision_coverage import cells_of_the_study, of_the_study
 from tests.support import synthetic_results

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -25,7 +24,7 @@ from adhesis import (
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.command.trace import _Progress
+from adhesis.ensemble.command.trace import _progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
@@ -110,11 +109,9 @@ def test_the_way_under_a_weight_has_a_unit(monkeypatch, tmp_path, capsys):
     assert re.search(r"unloading p̄ -[\d.]+ k?Pa of 500 Pa  A/A0", last)
     monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
     loops = Loops((), 1)
-    plan = SimpleNamespace(runs=(), seconds={"answer": 2.0})
-    text = _Progress(plan, True)._text(loops, False)
+    text = _progress(loops, 1.0, True)
     assert "running answer (unloading, p̄ -34 kPa);" in text
-    text = _Progress(plan, False)._text(loops, False)
-    assert "(unloading, Δ/h_max -3.4e+04)" in text
+    assert "(unloading, Δ/h_max -3.4e+04)" in _progress(loops, 1.0, False)
 
 
 def test_a_trace_doubts_a_fall_and_takes_shares_of_the_drops_before_it():

@@ -123,9 +123,8 @@ def test_lengths_of_a_campaign_may_have_units() -> None:
     assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
 
 
-def test_a_campaign_file_is_asked_for_units_and_the_text_in_a_results_file_is_not(tmp_path):
-    """What is computed stays readable. Of the file: test_campaign.py."""
-    assert parse_campaign(campaign_text(period="1000")).tasks()
+def test_a_number_that_is_asked_about_is_taken_with_its_unit(tmp_path):
+    """The question: test_campaign.py."""
     text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
     (tmp_path / "c.toml").write_text(text)
     assert load_campaign(tmp_path / "c.toml").sweep.work_of_adhesion == (40.0,)

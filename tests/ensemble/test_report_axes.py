@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.catalogue import sections
@@ -22,7 +23,6 @@ from adhesis.ensemble.report.tables.loss_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import FAILED
-from adhesis.ensemble.results.status import as_text, read_status
 from tests.support.synthetic_results import campaign, rows, write
 
 TOPS = (0.5, 0.7, 0.9)

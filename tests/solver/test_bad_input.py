@@ -41,7 +41,6 @@ from adhesis import (
     single_wave,
 )
 from adhesis.ensemble.errors import naming_options
-from adhesis.ensemble.loop.record import summary
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, real, shown, whole
@@ -580,9 +579,9 @@ def test_one_is_not_several() -> None:
     assert "2 jumps, 0 warnings" in repr(one_loop())
     single = replace(one_loop(), jumps=one_loop().jumps[:1])
     assert ", 1 jump, " in repr(single)
-    assert "J/m² in 1 jump, residual" in summary(single)
+    assert "J/m² in 1 jump, residual" in single.summary()
     one_left = replace(one_path(), jumps=one_path().jumps[:1])
-    assert "J/m² in 1 jump, residual" in summary(one_left)
+    assert "J/m² in 1 jump, residual" in one_left.summary()
 
 
 def test_a_command_is_answered_in_its_own_words() -> None:

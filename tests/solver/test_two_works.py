@@ -166,7 +166,7 @@ def test_a_loop_says_how_much_is_friction():
     text = f"{loop.friction:.6g} J/m² at edges, which recede at 0.002 J/m²; "
     text += f"{loop.loss - loop.friction:.6g} J/m² lost by instability"
     assert loop.friction_summary() == text
-    assert f"friction   {text}" in str(loop)
+    assert f"friction    {text}" in str(loop)
 
 
 def test_auto_takes_sharp_for_two_works():

@@ -177,8 +177,8 @@ cycle = { max_penetration = 0.6, load_steps = 8, unloading_until = -3 }
 
 def campaign() -> Once:
     """Return a campaign in this process; its file must be sound and have no failed task."""
+    from adhesis.ensemble.aggregate.status import read_status
     from adhesis.ensemble.campaign.file import parse_campaign
-    from adhesis.ensemble.results.status import read_status
     from adhesis.ensemble.run.session import run_campaign
 
     read = parse_campaign(CAMPAIGN)

@@ -18,7 +18,7 @@ from adhesis.ensemble.report.figures.shapes_and_spectra import (
     shown_penetrations,
 )
 from adhesis.ensemble.report.figures.style import PublishedFigure
-from adhesis.ensemble.report.further_axes import together
+from adhesis.ensemble.report.further_axes import below, common, together
 from adhesis.ensemble.report.paper import PaperFigure
 
 
@@ -38,6 +38,14 @@ class Illustration:
     whole: bool = False  # whether it draws all cells, and not those of :attr:`Aggregate.shown`
     # Returns whether there is something to see: more than one point, or fields
     is_worth: Callable[[Aggregate], bool] = lambda data: True
+
+    def of(self, data: Aggregate) -> PublishedFigure:
+        """Draw it; below the panels stands which cells are shown."""
+        if self.whole:
+            return self.draw(data)
+        figure = self.draw(data.shown)
+        figure.say_below(below(data.shown.cells, common(data.shown)))
+        return figure
 
 
 def _several(name: str) -> Callable[[Aggregate], bool]:
@@ -194,19 +202,7 @@ MECHANISMS = (
         is_worth=_several("work_of_adhesion"),
     ),
 )
-PENETRATIONS = (
-    Illustration(
-        "loss_against_max_penetration",
-        "Loss against the largest penetration",
-        "This campaign and those beside it that differ in max_penetration: means with 95 % "
-        "intervals over the realisations that all of them have finished. The curves are moved "
-        "apart a little.",
-        loss_figures.loss_against_penetration,
-        is_worth=lambda data: bool(loss_figures.of_penetration(data)),
-    ),
-)
-
-ALL = (*LOOPS, *LOSSES, *FIELDS, *MECHANISMS, *PENETRATIONS)
+ALL = (*LOOPS, *LOSSES, *FIELDS, *MECHANISMS)
 
 
 def sections(data: Aggregate) -> dict[str, list[Illustration]]:
@@ -218,7 +214,6 @@ def sections(data: Aggregate) -> dict[str, list[Illustration]]:
         "axes": tuple(_along_axis(data, axis) for axis in with_figure(data)),
         "mechanisms": MECHANISMS,
         "fields": FIELDS,
-        "companions": PENETRATIONS,
     }
     return {
         name: [item for item in items if item.is_worth(data if item.whole else data.shown)]

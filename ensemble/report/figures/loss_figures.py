@@ -12,14 +12,11 @@ from matplotlib.markers import CARETDOWN
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
-from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE, SMALL
-from adhesis.ensemble.interval import Estimate, estimates
+from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.findings import typical_cell
-from adhesis.ensemble.report.further_axes import loops_short_of_preload
 from adhesis.ensemble.report.tables.loss_tables import papers_loss
 from adhesis.solver.model.profile import Array
 
@@ -123,70 +120,6 @@ def _star_handle(data: Aggregate) -> list[Line2D]:
     if all(papers_loss(cell) is None for cell in data.cells if cell.done):
         return []
     return [style.key("paper", **_STAR)]
-
-
-def of_penetration(data: Aggregate) -> list[Companion]:
-    """Campaigns beside this one that differ in the largest penetration."""
-    return [companion for companion in data.companions if companion.kind == "penetration"]
-
-
-def loss_against_penetration(data: Aggregate) -> style.PublishedFigure:
-    """Loss against the largest penetration with intervals, from the realisations that all share.
-
-    One curve for each γ at the middle H; or for each H, if the campaigns have one γ in common.
-    """
-    figure = style.new_figure(1, 1, style.ONE_COLUMN, 65 * style.MM)
-    axes, (_, quantity, unit) = figure.panels[0], loss_quantity(data)
-    typical = typical_cell(data)
-    assert typical is not None  # an aggregate has finished tasks
-    curves = [
-        (k, style.gamma_label(gamma), found)
-        for k, gamma in style.shown_gammas(data)
-        if len(found := _by_penetration(data, typical.hurst, gamma)) > 1
-    ]
-    title = f"H = {typical.hurst:g}"
-    if len(curves) < 2:
-        common = [
-            gamma
-            for gamma in data.works_of_adhesion
-            if any(len(_by_penetration(data, hurst, gamma)) > 1 for hurst in data.hursts)
-        ]
-        gamma = common[len(common) // 2] if common else typical.work_of_adhesion
-        title = style.gamma_label(gamma)
-        curves = [
-            (k, f"H = {hurst:g}", _by_penetration(data, hurst, gamma))
-            for k, hurst in enumerate(style.spread_out(data.hursts, style.MOST_CURVES))
-        ]
-        curves = [curve for curve in curves if curve[2]]
-    tops = [top for _, _, found in curves for top in found]
-    apart = 0.012 * (max(tops, default=1.0) - min(tops, default=0.0))
-    for place, (k, label, found) in enumerate(curves):
-        offset = (place - (len(curves) - 1) / 2) * apart
-        x, losses = np.array(list(found)), list(found.values())
-        errorbar(axes, x, losses, k, label, offset=offset, unit=unit)
-    figure.label(r"largest penetration $\Delta_\mathrm{max}/h_\mathrm{max}$", quantity)
-    axes.set_ylim(bottom=0)
-    style.label_panel(axes, title)
-    figure.legend_above(axes.get_legend_handles_labels()[0], len(curves) or 1)
-    return figure
-
-
-def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, Estimate]:
-    """Loss of a cell by largest penetration, ascending, over the realisations of all campaigns."""
-    here = data.cell(hurst, gamma)
-    if here is None:
-        return {}
-    cells: dict[float, Cell | None] = {here.campaign.cycle.turning_point: here}
-    for companion in of_penetration(data):
-        cells[companion.campaign.cycle.turning_point] = companion.like(here)
-    there = {top: cell for top, cell in sorted(cells.items()) if cell is not None and cell.done}
-    seeds = [set(cell.seed.tolist()) for cell in there.values()]
-    shared = list(set.intersection(*seeds)) if seeds else []
-    if not shared:
-        return {}
-    name = loss_quantity(data)[0]
-    losses = [cell.values[name][np.isin(cell.seed, shared)] for cell in there.values()]
-    return dict(zip(there, estimates(np.array(losses)), strict=True))
 
 
 def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
@@ -362,7 +295,7 @@ def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
 
 def hollow_of(cells: Sequence[Cell]) -> list[bool]:
     """Return whether loops of each cell failed or were short of their preload."""
-    return [cell.failed > 0 or loops_short_of_preload(cell) > 0 for cell in cells]
+    return [cell.failed > 0 or cell.short_of_preload > 0 for cell in cells]
 
 
 def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:
@@ -370,7 +303,7 @@ def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:
     drawn = [cell for cell in cells if cell.done]
     reasons = {
         "failed": any(cell.failed for cell in drawn),
-        "short of the preload": any(loops_short_of_preload(cell) for cell in drawn),
+        "short of the preload": any(cell.short_of_preload for cell in drawn),
     }
     label = " or ".join(reason for reason, holds in reasons.items() if holds)
     look_of_mark: Any = {"color": "0.3", "marker": "o", "markerfacecolor": "white"}

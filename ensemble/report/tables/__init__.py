@@ -1,4 +1,1 @@
-"""The tables of the report: what a table is, and each table from an aggregate.
-
-Import from its modules.
-"""
+"""The tables of the report: what a table is, and each table from an aggregate."""

@@ -16,7 +16,6 @@ from adhesis.ensemble.aggregate.companions import Companion, LossDifference, dif
 from adhesis.ensemble.interval import interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.further_axes import loops_short_of_preload
 from adhesis.ensemble.report.tables.key import (
     axis_columns,
     estimate,
@@ -124,7 +123,7 @@ def _preload_columns(data: Aggregate) -> tuple[TableColumn, ...]:
     if data.campaign.cycle.preload is None:
         return ()
     name = "short_of_preload"
-    return (TableColumn(name, loops_short_of_preload, "short", plain, only_if_any=True),)
+    return (TableColumn(name, attrgetter(name), "short", plain, only_if_any=True),)
 
 
 def _friction_columns(data: Aggregate) -> tuple[TableColumn, ...]:

@@ -78,8 +78,13 @@ class Table:
         shown = self._shown()
         if stream.isatty():
             from rich.console import Console
+            from rich.table import Table as RichTable
 
-            table = rich_table(self.title, shown[0], shown[1:], slice(None), wrap=True)
+            table = RichTable(title=self.title, title_justify="left")
+            for heading in shown[0]:
+                table.add_column(heading, justify="right")
+            for row in shown[1:]:
+                table.add_row(*row)
             Console(file=stream).print(table)
             return
         widths = [max(len(cell) for cell in column) for column in zip(*shown, strict=True)]
@@ -101,28 +106,6 @@ class Table:
             for row in self.rows
         ]
         return [[column.heading for _, column in kept], *body]
-
-
-def rich_table(
-    title: str,
-    headings: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    numbers: slice,
-    *,
-    wrap: bool = False,
-) -> Any:
-    """Return a table for a terminal; columns of numbers are to the right, and may be wrapped."""
-    from rich.table import Table as RichTable
-
-    table = RichTable(title=title, title_justify="left")
-    to_the_right = range(len(headings))[numbers]
-    for k, heading in enumerate(headings):
-        is_number = k in to_the_right
-        justify: Any = "right" if is_number else "left"
-        table.add_column(heading, justify=justify, no_wrap=is_number and not wrap)
-    for row in rows:
-        table.add_row(*row)
-    return table
 
 
 def make_table(title: str, columns: Sequence[TableColumn], of: Iterable[Any]) -> Table:

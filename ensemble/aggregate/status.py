@@ -16,8 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.precision import precision
-from adhesis.ensemble.campaign.tables import StopTable
+from adhesis.ensemble.aggregate.cells import (
+    Cell,
+    doubtful_loops,
+    loops_beyond_zero_range,
+    read_cells,
+)
+from adhesis.ensemble.campaign.tasks import Tasks
 from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
@@ -25,7 +30,7 @@ from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from adhesis.ensemble.task import doubt
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.zero_range import RANGES, least_range
+from adhesis.solver.loading.zero_range import RANGES
 from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
@@ -48,84 +53,56 @@ def read_status(path: Path | str) -> dict[str, Any]:
     unknown.
     """
     with Results(path) as results:
-        accuracy = results.campaign.solver.accuracy
-        stop = results.campaign.stop
-        opens, cycle = results.campaign.material.opens, results.campaign.cycle
-        axes = ["hurst", "work_of_adhesion"]
-        further = axis_datasets(results.campaign)
-        axes += [dataset.name for dataset in further]
-        units = dict(zip(axes, ["1", "J m-2", *(dataset.unit for dataset in further)], strict=True))
-        state = results.status()
-        cells = results.tasks().by_cell()
-        names = (
-            *dict.fromkeys((*_TASK, *_AVERAGED, *doubt.OF_DOUBT)),
-            *(() if cycle.preload is None else ("preload_reached",)),
-        )
-        column = {name: results.column(name) for name in names}
+        campaign, tasks, state = results.campaign, results.tasks(), results.status()
+        further = axis_datasets(campaign)
+        units = {"hurst": "1", "work_of_adhesion": "J m-2"}
+        units |= {dataset.name: dataset.unit for dataset in further}
+        cells = read_cells(results)
         failed = np.flatnonzero(state == FAILED)
-        errors = results.errors(failed)
+        seconds = results.column("wall_time", failed).tolist()
+        errors = map(one_line, results.errors(failed))
         damaged = results.damaged()
         origins = results.origins()
-    times = column["wall_time"][state == DONE]
+    times = np.concatenate([cell.values["wall_time"] for cell in cells])
     failures = [
-        {
-            **failure,
-            "seconds": float(column["wall_time"][failure["row"]]),
-            "error": one_line(error),
-        }
-        for failure, error in zip(named(column, failed), errors, strict=True)
+        _named(tasks, row) | {"seconds": took, "error": error}
+        for row, took, error in zip(failed.tolist(), seconds, errors, strict=True)
     ]
+    short = sum(cell.short_of_preload for cell in cells)
     return {
         "file": str(path),
         "tasks": len(state),
-        **_counts(state),
-        "damaged": named(column, damaged),
+        **{name: int(np.sum(state == code)) for name, code in _CODES.items()},
+        "damaged": [_named(tasks, row) for row in damaged.tolist()],
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
-        "doubtful": _doubtful(state, column, accuracy),
-        "opens": opens,
-        "under_load": cycle.under_load,
-        "preload_not_reached": (
-            int(np.sum((column["preload_reached"] == 0) & (state == DONE)))
-            if "preload_reached" in column
-            else None
-        ),
-        "beyond_limit": _beyond_limit(state, column),
-        "last_row": os.stat(path).st_mtime if times.size or failures else None,
-        "axes": list(axes),
-        "axis_units": units,
-        "groups": [
-            _group(dict(zip(axes, task.cell, strict=True)), rows, state, column, stop)
-            for task, rows in cells
+        "doubtful": [
+            _named(tasks, int(cell.rows[k])) | _numbers(cell, k, ("audit_residual", "loss_error"))
+            for cell, k in doubtful_loops(cells)
         ],
+        "opens": campaign.material.opens,
+        "under_load": campaign.cycle.under_load,
+        "preload_not_reached": None if campaign.cycle.preload is None else short,
+        "beyond_limit": [
+            _named(tasks, int(cell.rows[k])) | _numbers(cell, k, RANGES)
+            for cell, k in loops_beyond_zero_range(cells)
+        ],
+        "last_row": os.stat(path).st_mtime if times.size or failures else None,
+        "axes": list(units),
+        "axis_units": units,
+        "groups": [dict(zip(units, cell.point, strict=True)) | _group(cell) for cell in cells],
         "failures": failures,
     }
 
 
-def named(
-    column: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], *further: str
-) -> list[dict[str, Any]]:
-    """Return row number and task of some rows, and further numbers; None where not finite."""
-    return [
-        {"row": row, **{name: finite(column[name][row].item()) for name in (*_TASK, *further)}}
-        for row in rows.tolist()
-    ]
+def _named(tasks: Tasks, row: int) -> dict[str, Any]:
+    task = tasks[row]
+    return {"row": row, **{name: getattr(task, name) for name in _TASK}}
 
 
-def _doubtful(
-    state: NDArray[np.uint8], column: dict[str, NDArray[Any]], accuracy: float
-) -> list[dict[str, Any]]:
-    rows = np.flatnonzero(doubt.doubtful(column, accuracy) & (state == DONE))
-    rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
-    return named(column, rows, "loss", "audit_residual", "loss_error")
-
-
-def _beyond_limit(
-    state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
-) -> list[dict[str, Any]]:
-    rows = np.flatnonzero(doubt.beyond_zero_range(column) & (state == DONE))
-    least = least_range(*(column[name][rows] for name in RANGES))
-    return named(column, rows[np.argsort(least, kind="stable")], "loss", *RANGES)
+def _numbers(cell: Cell, k: int, names: Sequence[str]) -> dict[str, float | None]:
+    """Return the loss and further numbers of a loop; None where not finite."""
+    return {name: finite(float(cell.values[name][k])) for name in ("loss", *names)}
 
 
 def _times(times: NDArray[np.float64]) -> dict[str, float]:
@@ -137,33 +114,18 @@ def _times(times: NDArray[np.float64]) -> dict[str, float]:
     }
 
 
-def _counts(state: NDArray[np.uint8]) -> dict[str, int]:
-    return {name: int(np.sum(state == code)) for name, code in _CODES.items()}
-
-
-def _group(
-    point: dict[str, float],
-    rows: NDArray[np.intp],
-    state: NDArray[np.uint8],
-    column: dict[str, NDArray[Any]],
-    stop: StopTable,
-) -> dict[str, Any]:
-    done = rows[state[rows] == DONE]
-    counts = _counts(state[rows])
-    values = np.array([column[name][done] for name in _AVERAGED])
-    seconds, loss, scaled = estimates(values, with_interval=False)
+def _group(cell: Cell) -> dict[str, Any]:
+    values = np.array([cell.values[name] for name in _AVERAGED])
+    seconds, loss, scaled = estimates(values, with_interval=False)  # which loads scipy
     group: dict[str, Any] = {
-        **{name: float(value) for name, value in point.items()},
-        **counts,
+        **{name: getattr(cell, name) for name in _CODES},
         "mean_seconds": finite(seconds.mean),
         "loss": finite(loss.mean),
         "loss_standard_error": finite(loss.sem),
         "loss_dimensionless": finite(scaled.mean),
         "loss_dimensionless_standard_error": finite(scaled.sem),
     }
-    if stop.relative_error is not None:
-        steered, finished = column[stop.quantity][done], not counts["pending"]
-        now = precision(steered, stop.relative_error, stop.quantity, finished=finished)
+    if (now := cell.precision) is not None:
         group |= {
             "quantity": now.quantity,
             "relative_error": finite(now.relative_error),
