@@ -238,11 +238,6 @@ def test_commands_in_the_text_exist(page: Path) -> None:
             assert (ROOT / path).exists(), snippet
 
 
-def test_the_readme_lists_every_command() -> None:
-    listed = re.findall(r"^\| `adhesis (\w+)", (ROOT / "README.md").read_text(), re.MULTILINE)
-    assert sorted(listed) == sorted(COMMANDS)
-
-
 def test_the_reference_of_commands_is_that_of_the_parsers() -> None:
     """``python -m tools.commands`` writes it anew."""
     text = commands_page.PAGE.read_text()

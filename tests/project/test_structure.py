@@ -1,4 +1,4 @@
-"""What a process loads; that what pages and benchmarks name is there.
+"""What a process loads; that what benchmarks import is there.
 
 The rules of imports are contracts of import-linter, in pyproject.toml.
 """
@@ -6,7 +6,6 @@ The rules of imports are contracts of import-linter, in pyproject.toml.
 from __future__ import annotations
 
 import ast
-import re
 from pathlib import Path
 
 import pytest
@@ -62,13 +61,6 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     assert loaded["nothing_to_do"] & numeric == set()
     assert "matplotlib" in loaded["report"]
     assert "mpi4py" not in loaded["report"]
-
-
-def test_every_file_that_the_design_page_names_is_there() -> None:
-    page = (ROOT / "docs" / "design.md").read_text()
-    tops = (ROOT / "adhesis" / "solver", ROOT / "adhesis" / "ensemble")
-    known = {path.name for top in tops for path in top.rglob("*.py")}
-    assert set(re.findall(r"`(\w+\.py)`", page)) - known == set()
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda p: p.stem)
