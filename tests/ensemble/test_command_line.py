@@ -21,7 +21,6 @@ from adhesis.ensemble.errors import RankError
 from adhesis.ensemble.quantities import Quantity
 from adhesis.ensemble.results.layout import create
 from adhesis.solver import checks
-from adhesis.solver.registry import METHOD_NAMES
 from tests.support.campaign_support import environment, write_campaign
 from tests.support.wrong_values import outside
 
@@ -172,13 +171,6 @@ def test_help_ends_with_two_examples_that_are_understood(name, capsys):
         program, command, *words = shlex.split(line)
         assert (program, command) == ("adhesis", name or command)
         parser_of(command).parse(words)
-
-
-def test_help_of_the_methods_names_them_all(capsys):
-    for name in ("loop", "trace"):
-        main([name, "--help"])
-        shown = capsys.readouterr().out
-        assert [m for m in METHOD_NAMES if m not in shown] == []
 
 
 def test_the_package_can_be_run():

@@ -8,7 +8,7 @@ from math import inf, nan
 import pytest
 
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
-from adhesis.ensemble.command.main import COMMANDS, parser_of
+from adhesis.ensemble.command.main import parser_of
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.cycle import turns_of
 from adhesis.ensemble.quantities import (
@@ -79,18 +79,6 @@ def test_heights_of_a_metre_are_asked_about_and_a_nan_is_left_to_its_rule() -> N
     assert HEIGHT.option("10m") == 10.0
     assert HEIGHT.option("nan") != HEIGHT.option("nan")
     assert LENGTH.option("inf") == float("inf")
-
-
-# Options that are numbers, but no quantities.
-NUMBERS = {
-    *("--hurst", "--m2", "--c0", "--poisson"),
-    *("--accuracy", "--field-penetrations", "--stripe-amplitude", "--stripe-phase"),
-}
-
-
-def test_every_option_that_is_a_quantity_takes_a_unit() -> None:
-    actions = [action for name in COMMANDS for action in parser_of(name)._actions]
-    assert {a.option_strings[-1] for a in actions if a.type is float} == NUMBERS
 
 
 @pytest.mark.parametrize("quantity", [*QUANTITIES.values(), HEIGHT], ids=lambda q: q.name)

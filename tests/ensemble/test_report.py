@@ -196,13 +196,6 @@ def test_tables_print_as_plain_lines_without_a_terminal(data):
     assert "failed" not in lines[1]  # nothing has
 
 
-def test_the_largest_tension_is_not_placed_where_contact_is_lost(data):
-    """They are two events of a loop, at two penetrations."""
-    headings = [column.heading for column in mechanism_tables.mechanisms(data).columns]
-    assert "largest tension (kPa)" in headings
-    assert "last contact lost at Δ/h_max" in headings
-
-
 def test_jumps_by_kind_add_up_to_all_drops(data):
     table = mechanism_tables.jumps(data)
     shares = np.zeros(len(data.cells))

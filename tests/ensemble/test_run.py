@@ -58,18 +58,6 @@ def test_a_run_from_nothing_to_done(tmp_path):
         assert file.attrs["seed"] == 5
 
 
-def test_ranks_compute_what_one_process_does(tmp_path):
-    few = {"hurst": "[0.8]"}
-    process, out = run(tmp_path, "--ranks", "3", fake=None, **few)
-    assert process.returncode == 0, process.stderr
-    (tmp_path / "alone").mkdir()
-    alone, expected = run(tmp_path / "alone", fake=None, **few)
-    assert alone.returncode == 0, alone.stderr
-    assert differences(out, expected) == []
-    with h5py.File(out) as file:
-        assert set(file["rank"][:]) == {1, 2}
-
-
 def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_campaign(tmp_path, "mine.toml")
@@ -77,7 +65,7 @@ def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path, monke
     assert (tmp_path / "mine.h5").exists()
 
 
-def test_a_finished_campaign_computes_nothing_again(tmp_path):
+def test_a_finished_campaign_computes_nothing_again_unasked(tmp_path):
     _, out = run(tmp_path)
     before = out.read_bytes()
     log = tmp_path / "log"
@@ -85,6 +73,8 @@ def test_a_finished_campaign_computes_nothing_again(tmp_path):
     assert process.returncode == 0
     assert not log.exists()
     assert out.read_bytes() == before
+    run(tmp_path, *"--redo all --hurst 0.8 --realisation 0".split(), fake=f"log={log}")
+    assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
 
 
 @pytest.fixture(scope="module")
@@ -182,15 +172,6 @@ def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path, whole
     process, _ = run(tmp_path, "--redo", "failed")
     assert process.returncode == 0
     assert differences(out, whole) == []
-
-
-def test_done_tasks_can_be_computed_again_too(tmp_path):
-    run(tmp_path)
-    log = tmp_path / "log"
-    words = ("--redo", "all", "--hurst", "0.8", "--realisation", "0")
-    process, _ = run(tmp_path, *words, fake=f"log={log}")
-    assert process.returncode == 0
-    assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
 
 
 def test_an_interrupted_campaign_has_every_cell_about_as_often(tmp_path):
