@@ -169,6 +169,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path, undrawn
         ("ratio = 100", "ratio = 10"),
         ("young = 1e6", "young = 2e6"),
         ("poisson = 0.5", "poisson = 0.3"),
+        ("poisson = 0.5", "poisson = 0.5\nwork_of_adhesion_open = 1"),
         ("n0 = 10", "n0 = 9"),
         ("h_rms = 1e-6", "h_rms = 2e-6"),
     ):

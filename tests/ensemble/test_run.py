@@ -73,7 +73,8 @@ def test_a_finished_campaign_computes_nothing_again_unasked(tmp_path):
     assert process.returncode == 0
     assert not log.exists()
     assert out.read_bytes() == before
-    run(tmp_path, *"--redo all --hurst 0.8 --realisation 0".split(), fake=f"log={log}")
+    words = ("--redo", "all", "--hurst", "0.8", "--realisation", "0")
+    run(tmp_path, *words, fake=f"log={log}")
     assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
 
 

@@ -309,17 +309,6 @@ def test_a_file_of_another_version_is_refused(path, version, shown):
     assert main(["status", str(path)]) == 2
 
 
-def test_a_disk_that_is_too_small_is_met_before_the_first_task(tmp_path, campaign, monkeypatch):
-    monkeypatch.setattr(schema, "PENDING", 0)
-    full = os.statvfs(tmp_path).f_frsize
-    monkeypatch.setattr(
-        "shutil.disk_usage", lambda _: type("Usage", (), {"free": full, "total": full})
-    )
-    with pytest.raises(InputError, match="and the disk has"):
-        create(tmp_path / "r.h5", campaign)
-    assert not list(tmp_path.iterdir())
-
-
 # ---------------------------------------------------------------- scale and lock
 
 
