@@ -134,6 +134,7 @@ work_of_adhesion_open = 0.08; work_of_adhesion = [0, 0.04] ->
 work_of_adhesion_open = 0.08; strength = 3e9 -> _open and a range or strength: at most one
 work_of_adhesion_open = 0.08; method = "grid" ->
     [solver] method is 'grid' beside a work_of_adhesion_open
+strength = 3e6 -> [solver] method is 'grid' beside a range or strength
 # rules that hold in every cell
 n0 = [1, 2]; ratio = [3, 60000] -> n0 · ratio is 120000
 ratio = [4, 16]; rolloff = [2, 8] -> rolloff is 8
@@ -478,8 +479,3 @@ def test_stripes_that_cannot_be_are_refused_by_file_and_command(keys, message, c
     words = [f"--{key}".replace(" = ", "=").replace("_", "-") for key in keys.splitlines()]
     assert main(["loop", "--hurst", "0.8", "--n0", "2", "--ratio", "4", *words]) == 2
     assert re.search(message, capsys.readouterr().err)
-
-
-def test_a_range_of_adhesion_beside_the_method_grid_is_refused():
-    with pytest.raises(InputError, match=r"\[solver\] method is 'grid' beside a range or strength"):
-        parse_campaign(campaign_text(poisson="0.5\nstrength = 3e6"))

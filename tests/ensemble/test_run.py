@@ -115,6 +115,7 @@ def test_walltime_ends_the_run_in_time(tmp_path):
 def test_growing_computes_exactly_what_is_new(tmp_path):
     _, out = run(tmp_path, realisations="1", hurst="[0.8]")
     with Results(out) as results:
+        created = results.attributes["created"]
         before = [results.column(name).tolist() for name in TIMING]
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}", realisations="3")
@@ -124,6 +125,7 @@ def test_growing_computes_exactly_what_is_new(tmp_path):
     assert set(log.read_text().split()) == new - {"0.8:0.01:0", "0.8:0.04:0"}
     with Results(out) as results:
         assert [results.column(name)[[6, 9]].tolist() for name in TIMING] == before
+        assert results.attributes["created"] == created
     (tmp_path / "whole").mkdir()
     _, whole = run(tmp_path / "whole", realisations="3")
     assert differences(out, whole) == []
