@@ -34,7 +34,7 @@ from adhesis.ensemble.report.figures import (
     selection,
     shapes_and_spectra,
 )
-from adhesis.ensemble.report.figures.catalogue import FIELDS, LOOPS, LOSSES, MECHANISMS
+from adhesis.ensemble.report.figures.catalogue import LOOPS
 from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
@@ -67,6 +67,7 @@ DOT = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
 SAVED = ("fig6_contact_against_stress", "loss_by_mechanism")
+FIGURES: dict[str, Figure] = {}  # those of the report, by name
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +76,7 @@ def report(file) -> Path:
     directory = file.parent / "report"
 
     def written(figure, stem):
+        FIGURES[stem.name] = figure
         if stem.name in SAVED:
             return save(figure, stem)
         for suffix in (".png", ".pdf"):
@@ -448,27 +450,26 @@ def test_densities_are_drawn_as_they_are(data):
         np.testing.assert_array_equal(gaps[:, 0], GAP_BINS[1:-1])
 
 
-def test_every_figure_is_legible_at_column_width_in_colour_and_grey(data, monkeypatch, tmp_path):
+@pytest.mark.usefixtures("report")
+def test_every_figure_is_legible_at_column_width_in_colour_and_grey(monkeypatch, tmp_path):
     monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)  # laid out, but not drawn
-    for item in (*LOOPS, *LOSSES, *MECHANISMS, *FIELDS):
-        with style():
-            figure = item.draw(data)
-        save(figure, tmp_path / item.name)
+    for name, figure in FIGURES.items():
+        save(figure, tmp_path / name)
         width = figure.get_size_inches()[0] * 25.4
         assert width == pytest.approx(85) or width == pytest.approx(175)
         texts = [t for t in figure.findobj(mpl.text.Text) if t.get_text() and t.get_visible()]
-        assert min(t.get_fontsize() for t in texts) >= 4.5, item.name  # indices in formulas
-        assert margin(figure) >= 0, item.name  # nothing is cut off
-        bottom = figure.axes[-1] if item.name != "pull_off_stress" else figure.axes[0]
-        assert bottom.get_xlabel(), item.name
-        assert figure.axes[0].get_ylabel(), item.name
+        assert min(t.get_fontsize() for t in texts) >= 4.5, name  # indices in formulas
+        assert margin(figure) >= 0, name  # nothing is cut off
+        bottom = figure.axes[-1] if name != "pull_off_stress" else figure.axes[0]
+        assert bottom.get_xlabel(), name
+        assert figure.axes[0].get_ylabel(), name
         for axes in figure.axes:
             solid = {}
             for line in axes.lines:
                 if line.get_label().startswith("_") or not line.get_xydata().size:
                     continue
                 looks = (line.get_color(), str(line.get_linestyle()), str(line.get_marker()))
-                assert solid.setdefault(looks, line.get_label()) == line.get_label(), item.name
+                assert solid.setdefault(looks, line.get_label()) == line.get_label(), name
 
 
 def test_drawing_leaves_the_style_of_the_caller_alone(data):
