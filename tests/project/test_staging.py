@@ -312,24 +312,6 @@ def staged(here: Site, disk: str = "disk1") -> Path:
     return next(here.folder.glob(f"{disk}/*/s.h5"), here.folder / "none")
 
 
-def test_a_second_job_touches_nothing_of_the_first(real: Site) -> None:
-    """Both have one disk, or each its own or none; it is submitted twice, or comes too early."""
-    first = real.start(STAGING="disk1")
-    wait_until(lambda: done_rows(staged(real)) == 3)
-    seen = sorted(real.folder.rglob("*"))
-    for disk in ("disk1", "disk2", ""):
-        second = real.start("--patience", "0", STAGING=disk)
-        text, _ = second.communicate(timeout=60)
-        assert second.returncode == 2, text
-        assert "s.h5 is held by another job" in text
-        assert sorted(real.folder.rglob("*")) == seen
-    (real.folder / "free").touch()
-    text, _ = first.communicate(timeout=120)
-    assert first.returncode == 0, text
-    assert done_rows(real.folder / "s.h5") == 40
-    assert not staged(real).exists()
-
-
 def test_rows_of_a_killed_run_come_back(real: Site) -> None:
     first = real.start(STAGING="disk1", LAUNCHER="setsid --wait")
     wait_until(lambda: done_rows(staged(real)) == 3)
