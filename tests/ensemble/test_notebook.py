@@ -114,6 +114,7 @@ def test_every_object_without_a_result_has_a_short_repr():
     )
 
 
+@pytest.mark.parametrize("result", ["to a preload", "under a load", "path"], indirect=True)
 def test_a_notebook_shows_the_main_numbers_and_the_figure(result):
     page = result._repr_html_()
     value = result.work if isinstance(result, PathResult) else result.loss
@@ -365,6 +366,7 @@ NAMES: tuple[Any, ...] = ("a\0.h5", "a\ud800.h5", "")
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("result", ["loop"], indirect=True)
 def test_what_no_file_can_be_called_is_refused(name, campaign, result):
     path = result.save, adhesis.load, adhesis.open, adhesis.read_trace, campaign.run, campaign.price
     for function in (*path, adhesis.Campaign, lambda name: adhesis.open("x.h5", beside=[name])):
