@@ -95,17 +95,7 @@ def margin(figure) -> float:
 
 
 @pytest.fixture
-def drawn(monkeypatch) -> list[str]:
-    """Draw figures, but neither lay them out nor write them; the names of those drawn."""
-    names: list[str] = []
-    monkeypatch.setattr(
-        "adhesis.ensemble.report.figures.style.save", lambda _, stem: names.append(stem.name)
-    )
-    return names
-
-
-@pytest.fixture
-def undrawn(monkeypatch, drawn) -> list[str]:
+def undrawn(monkeypatch, quick_figures) -> list[str]:
     """Draw no figure but those of the list, for tests that read tables and the page alone."""
     wanted: list[str] = []
 
@@ -520,7 +510,9 @@ def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, monkeypatch,
             assert (tmp_path / name).read_bytes() == (report / name).read_bytes(), name
 
 
-def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, capsys, drawn):
+def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(
+    tmp_path, capsys, quick_figures
+):
     plan = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=3)
     values = rows(plan)
     values["status"][:] = [1, 1, 1, 1, 0, 2, 0, 0, 0, 1, 0, 0]
@@ -536,19 +528,19 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, c
         assert "No task is finished yet for H = 0.8, γ = 0.01 J/m²" in text
         assert "Only one realisation" in text
     assert "row 5: the sum diverged" in page
-    assert len(drawn) == 13
+    assert len(quick_figures) == 13
 
 
-def test_one_finished_task_of_one_cell_is_enough(tmp_path, drawn):
+def test_one_finished_task_of_one_cell_is_enough(tmp_path, quick_figures):
     plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=1)
     path = write(tmp_path / "r.h5", plan, rows(plan))
     parts: list[str] = []
     data = write_report(path, tmp_path / "out", io.StringIO(), progress=parts.append)
     assert data.done == 1
     # losses against H, m2 and γ would be single points
-    assert not {"table1_losses", "loss_against_m2", "pull_off_stress"} & set(drawn)
-    assert len(drawn) == 10
-    figures = [f"figure {k} of 10, {name}" for k, name in enumerate(drawn, 1)]
+    assert not {"table1_losses", "loss_against_m2", "pull_off_stress"} & set(quick_figures)
+    assert len(quick_figures) == 10
+    figures = [f"figure {k} of 10, {name}" for k, name in enumerate(quick_figures, 1)]
     assert parts == ["averages", "tables", *figures, "pages"]
 
 
@@ -667,12 +659,12 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
         assert alone[row[:2]][by_steps] == pytest.approx(np.mean(audit * loss))
 
 
-def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, drawn):
+def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, quick_figures):
     lower = companion(
         tmp_path, "lower.h5", 0.5, a=("max_penetration = 0.9", "max_penetration = 0.6")
     )
     data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
-    assert "loss_against_max_penetration" in drawn
+    assert "loss_against_max_penetration" in quick_figures
     with style():
         axes = loss_figures.loss_against_penetration(data).axes[0]
     assert len(axes.containers) == len(GAMMAS)
