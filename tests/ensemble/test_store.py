@@ -120,7 +120,7 @@ def test_rows_come_back_as_they_were_written(path, campaign):
     with Results(path) as results:
         assert results.status().tolist() == [0, 0, 0, DONE, 0, FAILED, 0, 0]
         for column in RESULT_DATASETS:
-            if column.dims[0] == KEPT:  # tests/ensemble/test_fields.py
+            if column.dims[0] == KEPT:  # tests/ensemble/test_task.py
                 continue
             value = np.asarray(result[column.name], column.dtype)
             assert results.column(column.name, slice(3, 4))[0].tobytes() == value.tobytes()

@@ -1,8 +1,8 @@
 """Small synthetic files of instruments, one writer a format, of the same equally spaced heights.
 
 Each takes a path, the step in m and the heights in m (NaN where the format can say so). What each
-makes of the length is the format's own convention: Dektak's extent is n - 1 steps, SDF and Igor tell
-the step, Mitutoyo positions from one step on, Mahr every position.
+makes of the length is the format's own convention: Dektak's extent is n - 1 steps, SDF and Igor
+tell the step, Mitutoyo positions from one step on, Mahr every position.
 """
 
 from __future__ import annotations
