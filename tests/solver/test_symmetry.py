@@ -174,7 +174,7 @@ def test_axes_and_equal_parts_of_a_profile():
     )
 
 
-# ---------------------------------------------------------------------- the arc and the flat measure
+# ---------------------------------------------------------------------- arc and flat measure
 
 PERIOD = 1e-3
 STEEP = Profile(PERIOD, 1e-5 * np.array([0, 1, 0.5j, -0.4, 0.3j, 0.2]))  # rms slope 0.12
