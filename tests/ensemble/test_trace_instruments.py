@@ -42,7 +42,7 @@ def test_every_format_gives_the_same_heights(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "missing"),
     [
-        *((name, np.nan) for name in ("mahr.qep", "row.sdf")),
+        *((name, np.nan) for name in ("mahr.qep", "row.x3p", "row.sdf", "row.sur")),
         ("row.sdf", 1e38),
     ],
 )

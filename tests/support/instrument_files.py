@@ -1,8 +1,8 @@
 """Small synthetic files of instruments, one writer a format, of the same equally spaced heights.
 
 Each takes a path, the step in m and the heights in m (NaN where the format can say so). What each
-makes of the length is the format's own convention: Dektak's extent is n - 1 steps, SDF and Igor
-tell the step, Mitutoyo positions from one step on, Mahr every position.
+makes of the length is the format's own convention: Dektak's extent is n - 1 steps, SDF, SUR and X3P
+tell the step, Igor the step, Mitutoyo positions from one step on, Mahr every position.
 """
 
 from __future__ import annotations
@@ -127,11 +127,39 @@ def netcdf(path: Path, step: float, heights: Array) -> None:
     UniformLineScan(1e6 * heights, 1e6 * n * step, unit="µm").to_netcdf(str(path))
 
 
+def x3p(path: Path, step: float, heights: Array) -> None:
+    """ISO 25178-72, a map of one row."""
+    from SurfaceTopography import Topography
+
+    n = heights.size
+    rows = np.ma.masked_invalid(heights.reshape(n, 1))
+    Topography(rows, (n * step, step), unit="m").to_x3p(str(path))
+
+
 def sdf(path: Path, step: float, heights: Array, rows: int = 1) -> None:
     """ISO 25178-71, binary, 64-bit numbers; every row the same heights."""
     head = b"bISO-1.0" + b"test".ljust(10) + b"010320241030" * 2
     head += struct.pack("<HH4dBBB", heights.size, rows, step, step, 1.0, -1.0, 0, 7, 0)
     path.write_bytes(head + np.tile(heights, (rows, 1)).astype("<f8").tobytes())
+
+
+def sur(path: Path, step: float, heights: Array) -> None:
+    """Digital Surf, a map of one row: whole numbers of 0.1 nm, gaps two below the least."""
+    raw = np.nan_to_num(np.round(heights / 1e-10)).astype("<i4")
+    least, most = int(raw.min()), int(raw.max())
+    raw[np.isnan(heights)] = least - 2
+    unit = [b"mm", b"mm", b"um", b"mm", b"mm", b"um"]
+    head = struct.pack(
+        "<12s4H30s30s5H8xHiiiiIfff",
+        *(b"DIGITAL SURF", 0, 1, 256, 2, b"test", b"test", 0, 0, 0, 1, 0, 32, least, most),
+        *(heights.size, 1, heights.size, 1e3 * step, 1e3 * step, 1e-4),
+    )
+    head += struct.pack("<3s13x3s13x3s13x", b"X", b"Y", b"Z")
+    head += b"".join(u.ljust(16, b"\0") for u in unit)
+    head += struct.pack("<3f", 1.0, 1.0, 1.0) + struct.pack("<3H", 0, 0, 0) + b"\0" * 12
+    head += struct.pack("<7H", 0, 0, 10, 1, 3, 2024, 0) + struct.pack("<f", 0.0) + b"\0" * 10
+    head += struct.pack("<2H", 0, 0) + b"\0" * 128 + struct.pack("<3f", 0, 0, 0) + b"\0" * 34
+    path.write_bytes(head + raw.tobytes())
 
 
 WRITERS = {
@@ -140,5 +168,7 @@ WRITERS = {
     "mitutoyo.xlsx": mitutoyo,
     "igor.ibw": igor,
     "topography.nc": netcdf,
+    "row.x3p": x3p,
     "row.sdf": sdf,
+    "row.sur": sur,
 }
