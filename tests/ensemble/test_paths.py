@@ -79,7 +79,6 @@ NAMED = {
     "a name of a folder too long": 300 * "x" + "/x",
     "a path too long": 2100 * "z/" + "x",
     "a device": "/dev/zero",
-    "a block device": "/dev/loop-none",
 }
 LONG = ("a name too long", "a name of a folder too long", "a path too long")
 OF_READING = (
