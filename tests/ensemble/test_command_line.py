@@ -150,11 +150,8 @@ def test_every_option_refuses_what_it_cannot_read(name, capsys):
             assert f"{option} is '1.5': it must be" in refused(capsys, [name, option, "1.5"])
 
 
-@pytest.mark.parametrize("words", [["speed"], ["--speed"], ["Run"], ["-n", "3"], ["", "run"]])
+@pytest.mark.parametrize("words", [["speed"], ["--speed"], ["Run"], ["-n", "3"]])
 def test_an_unknown_command_is_refused_with_the_list(words, capsys):
-    if words[0] == "":
-        assert main(words) == 0  # as without a word: the overview
-        return
     line = refused(capsys, words)
     assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of new, run, ")
 
