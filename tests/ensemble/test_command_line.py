@@ -150,7 +150,7 @@ def test_every_option_refuses_what_it_cannot_read(name, capsys):
             assert f"{option} is '1.5': it must be" in refused(capsys, [name, option, "1.5"])
 
 
-@pytest.mark.parametrize("words", [["speed"], ["--speed"], ["Run"], ["-n", "3"]])
+@pytest.mark.parametrize("words", [["speed"], ["--vers"], ["Run"], ["stat"], ["-n", "3"]])
 def test_an_unknown_command_is_refused_with_the_list(words, capsys):
     line = refused(capsys, words)
     assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of new, run, ")
@@ -394,8 +394,3 @@ def test_no_option_can_be_abbreviated(name, capsys):
     for option in sorted(short):
         for given in ([option, "1"], [f"{option}=1"]):
             assert given[0] in refused(capsys, [name, *words, *given])
-
-
-def test_the_overview_takes_no_abbreviation_either(capsys):
-    for word in ("--vers", "--he", "stat"):
-        assert f"COMMAND is '{word}'" in refused(capsys, [word])
