@@ -50,7 +50,8 @@ def main() -> int:
         if name == "properties":
             found_nothing = properties(args.seed, share)
         else:
-            words = [sys.executable, programs[name], "--seed", f"{args.seed}", "--seconds", f"{share}"]
+            drawn = ["--seed", str(args.seed), "--seconds", str(share)]
+            words = [sys.executable, programs[name], *drawn]
             found_nothing = subprocess.run(words, check=False).returncode == 0
         if not found_nothing:
             failed.append(name)
