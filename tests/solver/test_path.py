@@ -16,6 +16,7 @@ from adhesis import (
     self_affine_profile,
 )
 from adhesis.solver.loading.loop import LoadingBranch
+from adhesis.solver.loading.path_record import Axis
 from adhesis.solver.sharp.method import SharpMethod
 from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
 from tests.support.exact_wave import ExactWave
@@ -26,6 +27,15 @@ HALF_SPACE = HalfSpace(1e6, 0.0)
 
 def problem_of(work_of_adhesion: float = 0.01, control: Control | None = None) -> Problem:
     return Problem(ROUGH, HALF_SPACE, work_of_adhesion, control or Control())
+
+
+def test_load_steps_of_a_leg_are_multiples_and_marks():
+    axis = Axis(0.9, 3)
+    assert axis.between(0.0, 0.9) == pytest.approx([0.0, 0.3, 0.6, 0.9])
+    assert axis.between(0.9, 0.2) == pytest.approx([0.9, 0.6, 0.3, 0.2])
+    assert axis.between(0.2, 0.8, [0.5, 0.95]) == pytest.approx([0.2, 0.3, 0.5, 0.6, 0.8])
+    assert axis.between(0.0, 0.6 + 1e-12)[-1] == 0.6 + 1e-12  # gives way to the end
+    assert len(axis.between(0.0, 0.6 + 1e-12)) == 3
 
 
 def test_loops_of_one_loading_branch_are_the_separate_loops():
