@@ -230,7 +230,10 @@ FUNCTIONS: dict[tuple[str, ...], dict[str, tuple[Call, str]]] = {
 # A new results file is made through a link, and one that is missing where it is looked at.
 MAKES = ("run c.toml", "merge SOUND --out", "Campaign.price", "Campaign.run")
 # Each reader, writer and maker of folders meets all kinds; whoever calls one of them, some.
-EACH = ("run {}", "run c.toml --out", "status", "loop --heights", "trace", "LOOP --json", "load")
+EACH = (
+    *("run {}", "run c.toml --out", "status", "loop --heights", "trace", "LOOP --json"),
+    *("doctor", "load", "save"),
+)
 SOME = ("pipe", "link to itself", "a name too long")
 CASES = [
     (name, kind)

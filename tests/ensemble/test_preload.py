@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -24,11 +25,13 @@ from adhesis import (
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.command.trace import _Progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.trace.job import Cycle, Job
 from adhesis.ensemble.trace.job import run as compute_job
+from adhesis.ensemble.trace.loops import Loops
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.synthetic_results import campaign, rows, write
@@ -122,6 +125,22 @@ def test_a_surface_that_is_flat_enough_to_stick_says_so(tmp_path, capsys):
     assert f"flat enough to stick: full contact costs {1e3 * full:.3g} mJ/m² of γ = 5 mJ/m²" in line
     _, text, _ = run(tmp_path, capsys, "--preload", "0.5kPa")
     assert "stick" not in text
+
+
+def test_a_mean_stress_that_the_loop_does_not_have_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ("--preload", "100", "--fields", "f.npz", "--field-stresses", "5kPa")
+    assert main([*SCENE, *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--field-stresses: stress is 5000 Pa: on the unloading branch the mean stress in" in line
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_way_of_a_trace_under_a_weight_has_a_unit(monkeypatch):
+    monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
+    plan = SimpleNamespace(runs=(), seconds={"answer": 2.0})
+    for load, text in ((True, "p̄ -34 kPa);"), (False, "Δ/h_max -3.4e+04)")):
+        assert f"(unloading, {text}" in _Progress(plan, load)._text(Loops((), 1), False)
 
 
 def test_fields_are_written_at_mean_stresses(tmp_path, capsys):

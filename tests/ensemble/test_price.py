@@ -196,6 +196,12 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
     assert reported.cells[0].tasks == 0
 
 
+def test_a_part_costs_its_share():
+    campaign = parse_campaign(campaign_text(realisations="10"))
+    shares = [price(campaign, None, Part(k, 4), compute=compute).seconds for k in range(1, 5)]
+    assert sum(shares) == pytest.approx(sum(cost(task) for task in campaign.tasks()))
+
+
 def test_a_dry_run_writes_nothing(tmp_path, monkeypatch):
     path = write_campaign(tmp_path)
     monkeypatch.chdir(tmp_path)
