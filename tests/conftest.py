@@ -29,16 +29,19 @@ settings.load_profile(os.environ.get("ADHESIS_PROPERTIES", "same"))
 
 
 @pytest.fixture
-def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw figures, and write empty files for them: to lay one out and write it takes a second."""
+def quick_figures(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Draw figures, here by name, and write empty files: to lay one out and write it takes long."""
+    figures: dict[str, Any] = {}
 
     def save(figure: object, stem: Path) -> tuple[Path, Path]:
+        figures[stem.name] = figure
         paths = stem.with_suffix(".png"), stem.with_suffix(".pdf")
         for path in paths:
             path.write_bytes(b"")
         return paths
 
     monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", save)
+    return figures
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from adhesis.ensemble import versions
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.doctor import examine as doctor
 from tests.support.campaign_support import run_python
@@ -79,12 +78,3 @@ def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any])
     nested = run_python("-m", "adhesis", "doctor", "--json", **of_a_rank, PMI_RANK="0")
     alone, within = findings["checks"], json.loads(nested.stdout)["checks"]
     assert alone == within
-
-
-def test_a_results_file_tells_the_versions_that_doctor_tells(findings: dict[str, Any]) -> None:
-    written, reported = versions.versions(), findings["versions"]
-    assert written["adhesis_version"] == reported["adhesis"]
-    for name in ("python", "numpy", "scipy", "kernels", "hdf5", "fftw"):
-        assert written[name] == reported[name]
-    (check,) = [check for check in findings["checks"] if check["name"] == "kernels"]
-    assert check["text"] == f"{written['kernels']}, on {written['processor']}"

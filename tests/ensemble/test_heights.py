@@ -146,8 +146,7 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
     "unknown unit": (METRES, {"unit": "furlong"}, "'furlong' is no unit of length"),
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
     "nan": ([*METRES[:5], "nan", *METRES[5:]], {}, "has no finite height on line 6: --heights"),
-    "inf": ([*METRES[:5], "-inf", *METRES[5:]], {}, "has no finite height on line 6"),
-    "overflow": ([*METRES[:5], "1e400", *METRES[5:]], {}, "has no finite height on line 6"),
+    "overflow": ([*METRES[:5], "-1e400", *METRES[5:]], {}, "has no finite height on line 6"),
     "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "has no finite height on line 6"),
     "nan at the beginning": (["1", "nan", *METRES], {}, "has no finite height on line 2"),
     "words within": (

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 import adhesis
 import adhesis.ensemble.command.loop as loop_command
@@ -19,6 +20,7 @@ from adhesis.ensemble.provenance import provenance
 from adhesis.ensemble.quantities import units_of
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
+from tests.support.options import replacing
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
@@ -257,21 +259,6 @@ def test_no_file_appears_if_the_fields_cannot_be_had(wave_file, tmp_path, monkey
     assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
 
 
-def test_self_affine_profile_through_a_real_method(tmp_path, capsys):
-    out = tmp_path / "loop.json"
-    words = ("--hurst", 0.8, "--seed", 3, "--n0", 1, "--ratio", 4, "--load-steps", 4)
-    more = ("--max-penetration", 0.4, "--work-of-adhesion", 0.04, "--accuracy", 0.02)
-    assert run(*words, *more, "--nodes-per-wave", 64, "--json", out, "--quiet") == 0
-    data = json.loads(out.read_text())
-    assert data["h_rms"] == pytest.approx(1e-6, rel=1e-12)
-    assert data["period"] == pytest.approx(2e-3 * np.pi)
-    assert data["method"] == "grid"
-    assert data["loss"] > 0
-    assert data["patches"][-1] == 0
-    assert abs(data["audit_residual"]) < 0.05
-    assert capsys.readouterr().err == ""
-
-
 @pytest.mark.parametrize(
     ("young", "cycle", "code"),
     [
@@ -373,8 +360,10 @@ def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(caps
     assert run(*words) == 0
     (line,) = (t for t in capsys.readouterr().out.splitlines() if t.startswith("defaults"))
     assert "--period 6.2832mm --seed 0 --h-rms 1um --work-of-adhesion 0.04 --poisson 0.5" in line
-    assert run(*words, "--period", "1mm", "--m2", 1e-3) == 0
-    (line,) = (t for t in capsys.readouterr().out.splitlines() if t.startswith("defaults"))
+    assert run(*words, "--period", "1mm", "--m2", 1e-3, "--nodes-per-wave", 16) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (line,) = (t for t in lines if t.startswith("defaults"))
+    assert any(t.startswith("method      grid, ") for t in lines)
     assert "--period" not in line
     assert "--h-rms" not in line
 
@@ -383,3 +372,75 @@ def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(caps
 def test_given_heights_take_no_defaults(wave_file, capsys):
     assert run(*wave_words(wave_file, "--load-steps", 2, "--quiet")) == 0
     assert "defaults" not in capsys.readouterr().out
+
+
+# ---------------------------------------------------------------------- turning points, controls
+
+SCENE = [
+    "loop", "--hurst", "0.8", "--seed", "4", "--period", "1e-3", "--n0", "3", "--ratio", "6",
+    "--work-of-adhesion", "0.01", "--load-steps", "6", "--quiet",
+]  # fmt: skip
+
+
+def rough(tmp_path, capsys, *words: str) -> tuple[dict, str]:
+    """Run a rough loop; returns its document and what is printed."""
+    out = tmp_path / "loop.json"
+    assert main([*SCENE, *words, "--json", str(out)]) == 0
+    return json.loads(out.read_text()), capsys.readouterr().out
+
+
+def test_several_turning_points_are_turns_of_one_document(tmp_path, capsys):
+    figure = tmp_path / "loops.png"
+    document, _ = rough(
+        tmp_path, capsys, "--max-penetration", "0.6,0.3,0.8", "--figure", str(figure)
+    )
+    assert [turn["max_penetration"] for turn in document["turns"]] == [0.3, 0.6, 0.8]
+    losses = [turn["loss"] for turn in document["turns"]]
+    assert losses == sorted(losses)
+    assert document["loss"] == losses[-1]
+    for turn in document["turns"]:
+        assert turn["work_spent"] - turn["work_gained"] == pytest.approx(turn["loss"])
+    assert imread(figure).ndim == 3
+    alone, _ = rough(tmp_path, capsys, "--max-penetration", "0.8")
+    assert "turns" not in alone
+    assert alone["loss"] == pytest.approx(losses[-1], rel=1e-4)
+
+
+def test_a_path_tells_of_its_minor_loops(tmp_path, capsys):
+    document, text = rough(tmp_path, capsys, "--path", "0.8,0.3,0.6,out")
+    (minor,) = document["minor_loops"]
+    assert (minor["start"], minor["turn"]) == (0.3, 0.6)
+    assert document["out"]
+    assert set(document["leg"]) == {0, 1, 2, 3}
+    assert "minor loop  0.3, 0.6, 0.3:" in text
+    stays, _ = rough(tmp_path, capsys, "--path", "0.8,0.3")
+    assert not stays["out"]
+    assert stays["energy_change"] < 0
+
+
+def test_a_stiffness_and_a_load(tmp_path, capsys):
+    fixed, _ = rough(tmp_path, capsys, "--max-penetration", "0.5")
+    soft, text = rough(tmp_path, capsys, "--max-penetration", "0.5", "--stiffness", "1e9")
+    assert fixed["stiffness"] is None
+    assert soft["stiffness"] == 1e9
+    assert soft["loss"] > fixed["loss"]
+    assert max(soft["displacement"]) == pytest.approx(0.5)
+    assert "held by 1e+09 Pa/m" in text
+    load, _ = rough(tmp_path, capsys, "--stiffness", "0", "--max-stress", "500")
+    assert max(load["mean_stress"]) == pytest.approx(500)
+    layer, _ = rough(
+        tmp_path, capsys, "--max-penetration", "0.5", "--poisson", "0.3", "--layer", "1e-3"
+    )
+    assert layer["stiffness"] == pytest.approx(1e6 * 0.7 / (1.3 * 0.4 * 1e-3))
+
+
+def test_a_load_that_runs_away_ends_in_where_it_does(tmp_path, capsys):
+    out = tmp_path / "x.json"
+    words = ["--stiffness", "0", "--max-stress", "100", "--work-of-adhesion", "1"]
+    assert main([*replacing(SCENE, words), "--json", str(out)]) == 1
+    assert capsys.readouterr().err == (
+        "adhesis loop: under a load this surface is drawn into full contact at first touch (γ = 1 "
+        "J/m², E = 1e6 Pa): for a machine that turns at a mean stress give --preload in place of "
+        "--stiffness 0 --max-stress, or prescribe the separation by leaving --stiffness out\n"
+    )
+    assert not out.exists()

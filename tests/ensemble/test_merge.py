@@ -26,7 +26,7 @@ from tests.support.campaign_support import (
 from tests.support.fake_run import fake_engine, fake_result
 from tests.support.synthetic_results import sign
 
-CAMPAIGN = campaign_text(realisations="6")
+CAMPAIGN = campaign_text(realisations="3")
 
 
 def computed(path, part="1/1", text=CAMPAIGN, skip=(), fail=()):
@@ -73,12 +73,12 @@ def test_a_merge_is_resumed_and_grown(tmp_path):
     """Missing parts come later; then the campaign gains realisations, and parts of those."""
     one, two, three = parts(tmp_path, 3)
     out = tmp_path / "all.h5"
-    assert merge([one, three], out).done == 16
-    assert merge([two, one], out).taken == 8
+    assert merge([one, three], out).done == 8
+    assert merge([two, one], out).taken == 4
     assert differences(out, computed(tmp_path / "whole.h5")) == []
-    larger = campaign_text(realisations="8", hurst="[0.7, 0.75, 0.8]")
-    path = write_campaign(tmp_path, realisations="8", hurst="[0.7, 0.75, 0.8]")
-    assert run(path, out).computed == 24
+    larger = campaign_text(realisations="4", hurst="[0.7, 0.75, 0.8]")
+    path = write_campaign(tmp_path, realisations="4", hurst="[0.7, 0.75, 0.8]")
+    assert run(path, out).computed == 12
     assert differences(out, computed(tmp_path / "larger.h5", text=larger)) == []
     # Parts of the smaller campaign still fit into the larger file.
     assert merge([two], out).taken == 0
@@ -88,15 +88,15 @@ def test_rows_stay_sound_when_a_number_of_the_campaign_becomes_an_axis(tmp_path)
     """The file gains a dataset for the axis; what was computed is neither damaged nor lost."""
     out = computed(tmp_path / "all.h5", skip=(2,))
     part = computed(tmp_path / "part.h5")
-    grown = write_campaign(tmp_path, realisations="6", young="[1e6, 2e6]")
-    assert run(grown, out).computed == 25
+    grown = write_campaign(tmp_path, realisations="3", young="[1e6, 2e6]")
+    assert run(grown, out).computed == 13
     with Results(out) as results:
-        assert results.status().tolist() == [DONE] * 48
+        assert results.status().tolist() == [DONE] * 24
     created = tmp_path / "grown.h5"
     create(created, load_campaign(grown))
-    assert merge([part], created).done == 24
+    assert merge([part], created).done == 12
     with Results(created) as results:
-        assert np.bincount(results.status()).tolist() == [24, 24]
+        assert np.bincount(results.status()).tolist() == [12, 12]
 
 
 def test_what_failed_in_one_part_gives_way_to_what_was_done_in_another(tmp_path):
@@ -105,7 +105,7 @@ def test_what_failed_in_one_part_gives_way_to_what_was_done_in_another(tmp_path)
     for order in ([first, second], [second, first]):
         out = tmp_path / f"{order[0].stem}.all.h5"
         merged = merge(order, out)
-        assert (merged.done, merged.failed) == (22, 2)
+        assert (merged.done, merged.failed) == (10, 2)
         with Results(out) as results:
             assert results.status()[[3, 4, 5, 9]].tolist() == [DONE, FAILED, DONE, FAILED]
             task = results.tasks()[3]
@@ -125,12 +125,12 @@ def refused(sources, out) -> str:
 def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tmp_path):
     one, two = parts(tmp_path, 2)
     out = tmp_path / "all.h5"
-    other = computed(tmp_path / "o.h5", "2/2", campaign_text(realisations="6", seed="6"))
+    other = computed(tmp_path / "o.h5", "2/2", campaign_text(realisations="3", seed="6"))
     assert "sweep.seed is 5 here and 6 there" in refused([one, other], out)
     again = computed(tmp_path / "again.h5", "2/2")
-    assert merge([one, two, again], tmp_path / "same.h5").done == 24  # the same bits: no matter
+    assert merge([one, two, again], tmp_path / "same.h5").done == 12  # the same bits: no matter
     with h5py.File(again, "r+") as file:
-        file["unloading_energy"][7, 2] *= 1 + 1e-15
+        file["unloading_energy"][5, 2] *= 1 + 1e-15
     sign(again)
     sentence = refused([one, two, again], out)
     assert "again.h5" in sentence

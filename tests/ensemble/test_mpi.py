@@ -77,6 +77,19 @@ def test_loops_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
     assert differences(tmp_path / "merged.h5", whole) == []
 
 
+def test_ranks_write_a_file_with_a_path_of_any_length(tmp_path, whole):
+    """Open MPI 4.1 has buffers of 256 bytes for a path and what it adds."""
+    folder = tmp_path.joinpath("d" * 120, "e" * 200)
+    folder.mkdir(parents=True)
+    path, out = write_campaign(tmp_path), folder / f"{'n' * 240}.h5"
+    process = adhesis("run", path, "--out", out, ranks=3, fake="")
+    assert process.returncode == 0, process.stderr
+    assert differences(out, whole) == []
+    with Results(out) as results:
+        assert set(results.column("rank").tolist()) <= {1, 2}  # rank 0 only handed out
+    assert [path.name for path in folder.iterdir()] == [out.name]
+
+
 @pytest.mark.parametrize("victim", ["worker", "master", "all"])
 def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
     path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"

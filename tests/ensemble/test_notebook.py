@@ -11,6 +11,7 @@ import json
 import multiprocessing
 import pickle
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
@@ -40,11 +41,13 @@ from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.loop import saved
 from adhesis.ensemble.quantities import with_error
 from adhesis.ensemble.report import findings
+from adhesis.ensemble.results.schema import DONE
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks, views
 from adhesis.solver.loading import loop_result
+from tests.support.campaign_support import campaign_text
 from tests.support.exact_wave import ExactWave
 
 WAVE = single_wave(1e-6, 1e-3)
@@ -111,6 +114,7 @@ def test_every_object_without_a_result_has_a_short_repr():
     )
 
 
+@pytest.mark.parametrize("result", ["to a preload", "under a load", "path"], indirect=True)
 def test_a_notebook_shows_the_main_numbers_and_the_figure(result):
     page = result._repr_html_()
     value = result.work if isinstance(result, PathResult) else result.loss
@@ -362,6 +366,7 @@ NAMES: tuple[Any, ...] = ("a\0.h5", "a\ud800.h5", "")
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("result", ["loop"], indirect=True)
 def test_what_no_file_can_be_called_is_refused(name, campaign, result):
     path = result.save, adhesis.load, adhesis.open, adhesis.read_trace, campaign.run, campaign.price
     for function in (*path, adhesis.Campaign, lambda name: adhesis.open("x.h5", beside=[name])):
@@ -425,6 +430,21 @@ def test_failed_tasks_are_loud(tmp_path):
     assert "yet" not in text
     below = results.plot.contact_against_stress().get_supxlabel()
     assert below == r"missing, as all tasks failed: H = 0.8, $\gamma$ = 1 J/m²"
+
+
+def test_campaigns_run_outside_the_main_thread(tmp_path):
+    """As asyncio.to_thread and servers call them; two at once leave stderr as it was."""
+    small = adhesis.Campaign(campaign_text(realisations="1", hurst="[0.7]"))
+    before = sys.stderr
+
+    async def both() -> list[adhesis.CampaignResults]:
+        runs = (asyncio.to_thread(small.run, tmp_path / f"{i}.h5") for i in range(2))
+        return await asyncio.gather(*runs)
+
+    one, two = asyncio.run(both())
+    assert (one.dataset.status == DONE).all()
+    assert one.dataset.loss.identical(two.dataset.loss)
+    assert sys.stderr is before
 
 
 @pytest.mark.mpi

@@ -14,7 +14,6 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.findings import verdict
-from adhesis.ensemble.report.paper import is_reading
 from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import beyond_zero_range
@@ -60,17 +59,6 @@ def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     line = f"friction    {data['friction']:.6g} J/m² at edges, which recede at 0.08 J/m²; "
     line += f"{data['loss'] - data['friction']:.6g} J/m² lost by instability"
     assert line in capsys.readouterr().out.splitlines()
-
-
-def test_a_path_lists_its_friction(tmp_path, capsys):
-    words = ("--work-of-adhesion-open", 0.08, "--load-steps", 5, "--quiet")
-    out = tmp_path / "path.json"
-    assert run("loop", *ROUGH, "--path", "0.5,0.1,0.5,out", *words, "--json", out) == 0
-    data = json.loads(out.read_text())
-    assert abs(data["audit_residual"]) < 1e-3
-    (part,) = data["minor_loops"]
-    assert abs(part["audit_residual"]) < 1e-3 * data["loss"]
-    assert "\nfriction    " in capsys.readouterr().out
 
 
 # ---------------------------------------------------------------------- trace
@@ -182,20 +170,3 @@ def test_the_report_says_which_part_is_friction(both):
     opened, one = ("\n".join(verdict(data)) for data in both)
     assert "; 25 % is friction of receding edges." in opened
     assert "friction" not in one
-
-
-def test_its_cells_are_not_those_of_the_paper(both):
-    given = text_of(ratio=100, max_penetration=0.9)
-    assert is_reading(parse_campaign(given), [0.8])
-    opened = parse_campaign(
-        given.replace("poisson = 0.5", "poisson = 0.5\nwork_of_adhesion_open = 1")
-    )
-    assert not is_reading(opened, [0.8])
-
-
-def test_results_in_python_have_it_along_an_axis(both):
-    results = adhesis.open(both[0].path)
-    assert results.dataset.work_of_adhesion_open.values.tolist() == [0.05, 0.08]
-    chosen = results.dataset.sel(hurst=0.8, work_of_adhesion=0.04, work_of_adhesion_open=0.08)
-    np.testing.assert_allclose(chosen.friction, 0.25 * chosen.loss)
-    assert results.dataset.friction.units == "J m-2"

@@ -131,8 +131,6 @@ def test_standard_output_is_a_file_of_its_own(capfd: pytest.CaptureFixture[str])
 def test_a_pipe_that_takes_the_place_of_an_output_is_not_waited_for(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    with pytest.raises(InputError, match=r"--json is .*pipe: it is a pipe, not a file to write"):
-        check_outputs({"--json": pipe}, {})
     with pytest.raises(OSError, match="No such device"), whole_file(pipe):
         pass  # without a reader
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)

@@ -102,18 +102,6 @@ def test_the_loss_of_a_weight_says_so(tmp_path, capsys):
     assert "under a weight" not in text
 
 
-def test_the_way_under_a_weight_has_a_unit(monkeypatch, tmp_path, capsys):
-    words = ["--stiffness", "0", "--max-stress", "500", "--json", str(tmp_path / "loop.json")]
-    assert main([word for word in [*SCENE, *words] if word != "--quiet"]) == 0
-    last = capsys.readouterr().err.splitlines()[-1]
-    assert re.search(r"unloading p̄ -[\d.]+ k?Pa of 500 Pa  A/A0", last)
-    monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
-    loops = Loops((), 1)
-    text = _progress(loops, 1.0, True)
-    assert "running answer (unloading, p̄ -34 kPa);" in text
-    assert "(unloading, Δ/h_max -3.4e+04)" in _progress(loops, 1.0, False)
-
-
 def test_a_trace_doubts_a_fall_and_takes_shares_of_the_drops_before_it():
     profile = self_affine_profile(0.8, period=1e-3, n0=3, ratio=6, seed=4, h_rms=1e-6)
     half_space, gamma, stress = HalfSpace(1e6, 0.5), 0.012, 2000.0
@@ -145,6 +133,12 @@ def test_a_mean_stress_that_the_loop_does_not_have_is_refused(tmp_path, monkeypa
     (line,) = capsys.readouterr().err.splitlines()
     assert "--field-stresses: stress is 5000 Pa: on the unloading branch the mean stress in" in line
     assert not list(tmp_path.iterdir())
+
+
+def test_the_way_of_a_trace_under_a_weight_has_a_unit(monkeypatch):
+    monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
+    for load, text in ((True, "p̄ -34 kPa);"), (False, "Δ/h_max -3.4e+04)")):
+        assert f"(unloading, {text}" in _progress(Loops((), 1), 1.0, load)
 
 
 def test_fields_are_written_at_mean_stresses(tmp_path, capsys):

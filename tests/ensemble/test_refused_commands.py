@@ -54,29 +54,19 @@ run c.toml --out p.h5 --part {{x,0/3,4/3,1/0}} -> --part is '{{}}': it must be K
 run c.toml --part 1/2 -> --part needs --out
 run c.toml --redo some -> --redo is 'some'
 run c.toml --hurst 0.7 -> --hurst needs --redo: it chooses the tasks to compute again
-run c.toml --realisation 1 -> --realisation needs --redo
 run c.toml --redo all --hurst {{x,-1,nan}} -> --hurst is '{{}}'
-run c.toml --redo all --realisation {{x,-1,nan}} -> --realisation is '{{}}'
-run c.toml --redo all --work-of-adhesion {{x,20mJ}} -> --work-of-adhesion is '{{}}': it must be
-run c.toml --redo all --work-of-adhesion {{-1,nan}} ->
-    --work-of-adhesion is {{}}: this campaign has no such task
 run c.toml --redo all --work-of-adhesion 40 ->
     --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
 run c.toml --out r.h5 --redo failed --hurst 0.75 ->
     --hurst is 0.75: this campaign has no such task
 run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5
-run c.toml --out r.h5 --redo all --realisation 9 -> only 0, 1
 run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
-status '' -> FILE.h5 is ''
 status text -> is not a results file
 status r.h5 --interval {{x,-1,0,nan,inf,1e9}} -> --interval is '{{}}'
 status r.h5 --watch --json -> --watch and --json
 merge r.h5 -> required: --out
-merge '' --out all.h5 -> PART.h5 is ''
 merge text --out all.h5 -> is not a results file
 merge r.h5 --out none/all.h5 -> no folder
-report r.h5 -> required: --to
-report '' --to out -> FILE.h5 is ''
 report text --to out -> is not a results file
 report r/curves.nc --to r -> curves.nc would be written there over r/curves.nc
 report r/curves.nc --to /proc/x/y -> --to is /proc/x/y: it cannot be written
@@ -87,20 +77,15 @@ BENCH --budget 0 -> --budget is '0': it must be a positive number of seconds
 BENCH --to {{text,text/below}} -> text is not a directory
 BENCH --to /proc/x -> --to is /proc/x: it cannot be written
 doctor --in none -> --in is none: it must be a folder that can be written
-doctor --in text -> --in is text: it must be a folder
 # the profile and the material of a loop
 loop -> no profile is given: give one of --hurst, --heights and --trace
 LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
 LOOP --method magic -> --method is 'magic': it must be one of grid
 LOOP --unit um -> --unit belongs to --trace
-LOOP --exclude 1mm:2mm -> --exclude belongs to --trace
 LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
-LOOP --h-rms 10 -> --h-rms is 10, which would be 10 m: give its unit, as in 10um (10m,
-LOOP --layer 5 -> --layer is 5, which would be 5 m: give its unit
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
 loop --heights none.npy --period 1e-3 -> with --heights the material has to be given
-loop --trace none.csv --young 1e6 -> with --trace the material has to be given
 loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
     --heights needs --period
@@ -122,49 +107,38 @@ LOOP --max-penetration 90% -> --max-penetration is '90%': it must be one or more
 LOOP --max-penetration 0.5,0.5 -> turning points must differ
 LOOP --max-penetration {{0\,5,0\,3\,0\,6}} ->
     --max-penetration is '{{}}': numbers have a decimal point
-LOOP --stiffness 1e9 --max-penetration 1,5 -> --max-penetration is '1,5': numbers have a decimal
 LOOP --stiffness 0 -> needs --max-stress
 LOOP --stiffness 0 --max-stress 2,5kPa -> --max-stress is '2,5kPa': numbers have a decimal point
-LOOP --max-stress 100 -> belongs to load control
 LOOP --max-stress 20kPa -> a weight or a machine? For a weight give --stiffness 0 with
 LOOP --max-stress 20kPa --stiffness 1e9 -> give --preload 20kPa instead
 LOOP --preload 20kPa --stiffness 0 -> For a weight give --max-stress 20kPa with
 LOOP --preload 20kPa --max-stress 1 -> --max-stress and --preload are given
-LOOP --preload 20kPa --path 0.5,0.2 -> --path and --preload are given
 LOOP --preload 20kPa --max-penetration 0.5,0.6 -> beside --preload: it must be one
 LOOP --preload 20bar -> --preload is '20bar': its unit must be one of Pa, kPa
 LOOP --preload 20kPa,2e4 -> --preload is 20kPa,2e4: turning points must differ
 # outputs of a loop
-LOOP --csv directory -> --csv is directory: it is a directory
 LOOP --figure loop.bmp -> --figure is loop.bmp: the name must end in .png
 LOOP --film a.avi -> --film is a.avi: the name must end in .html, .gif or .mp4
 LOOP --film no/a.html -> --film is no/a.html: there is no directory no
 LOOP --film a.html --max-penetration 0.5,0.6 -> --film is given with 2 turning
 LOOP --film a.html --json a.html -> --json and --film are both a.html
-LOOP --film a.html --preload 1.0,2.0 -> give --preload one value
 LOOP --path 0.5,out --fields f.npz -> --fields belongs to one loop
 LOOP --fields f.txt -> must end in .npz
 LOOP --fields f.npz --nodes-per-wave 16 --field-nodes 9 -> 9 nodes are too few: the shortest wave
-WAVE --fields f.npz --field-nodes 1 -> 1 nodes are too few
 WAVE --fields f.npz --field-nodes 1000000000000 ->
     --field-nodes is 1000000000000: with the fields of 8 states it must be at most 8388608
 WAVE --fields f.npz --field-penetrations 0.2 0.6 -> holds 0.6: the loop goes no deeper than 0.5
 LOOP --fields f.npz --field-penetrations 0,5 -> --field-penetrations is '0,5': it must be a
 LOOP --field-penetrations 0.5 -> --field-penetrations needs --fields, the file
-LOOP --preload 1 --field-stresses 1 -> --field-stresses needs --fields
 LOOP --preload 1 --fields f.npz --field-penetrations 0.1 ->
     give --field-stresses, as 5kPa 10kPa, instead
 WAVE --json {{wave.csv,sub/../wave.csv,soft.csv,hard.csv}} ->
     --json is {{}}, the file that --heights reads: it would be overwritten, so give another file
-WAVE --json new.png --figure new.png ->
-    --json and --figure are both new.png: each output needs a file of its own
 WAVE --json sub -> --json is sub: it is a directory
 WAVE --json 'a{chr(0)}b' -> --json is 'a\x00b': it must be the name of a file
 WAVE --json wave.csv/o.json -> there is no directory
 WAVE --json {300 * "x"} -> it cannot be written (File name too long)
 WAVE --figure /proc/f.png -> --figure is /proc/f.png: it cannot be written
-loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --json t.txt ->
-    the file that --trace reads
 # traces
 trace t.txt -> required: --work-of-adhesion, --young, --poisson
 TRACE -> --to is missing: give the directory for the page, or --plan
@@ -172,7 +146,6 @@ TRACE --plan -> states no unit
 TRACE --plan --unit um --columns 3 -> --columns is 3: it must name two of the 2
 TRACE --plan --unit um --columns 2 -> no step with its unit is found in its header: give
 TRACE --plan --unit um --columns x -> --columns is 'x': it must be two whole
-TRACE --plan --unit um --tip-radius 5 -> --tip-radius is 5, which would be 5 m
 TRACE --plan --unit um --tip-radius 5m -> trusted from 50 µm on (what a tip of
 TRACE --plan --unit um --max-stress 5 -> a weight or a machine?
 TRACE --plan --unit um --stiffness 0 -> (--stiffness 0) needs --max-stress
@@ -182,14 +155,9 @@ TRACE --plan --unit um --processes 0 -> --processes is 0
 TRACE --plan --work-of-adhesion {{0\,04,0.02\,0\,04,2\,5mJ/m2}} ->
     --work-of-adhesion is '{{}}': numbers have a decimal point, as in
 TRACE --plan --work-of-adhesion 1.0,1.0 -> is '1.0,1.0': its values must
-TRACE --plan --work-of-adhesion '1;2' -> --work-of-adhesion is '1;2': it must be a
-TRACE --plan --work-of-adhesion 0.04,40 -> --work-of-adhesion is 40, which would be 40 J/m²
 TRACE --plan --work-of-adhesion 20mJ -> --work-of-adhesion is '20mJ': it must be a number in J/m²
 TRACE --plan --unit um --work-of-adhesion=-1 -> --work-of-adhesion is -1
-TRACE --plan --unit um --exclude 1mm -> --exclude is '1mm': it must be two positions with a colon
 TRACE --plan --unit um --exclude 0.1:0.2:0.3mm -> it must be two positions with a colon
-TRACE --plan --unit um --exclude 1,2mm:1,3mm ->
-    --exclude is '1,2mm:1,3mm': a position of it is '1,2mm': it must be a
 TRACE --plan --unit um --exclude 200:300um ->
     a position of it is 200, which would be 200 m: give its unit
 TRACE --plan --unit um --exclude 0.3mm:0.2mm ->

@@ -42,24 +42,6 @@ def data(file):
     return aggregate(file)
 
 
-@pytest.fixture(scope="module")
-def report(file):
-    """The report without its figures, each of which takes a second."""
-    patch = pytest.MonkeyPatch()
-    drawn: list[str] = []
-
-    def note(_, stem):
-        drawn.append(stem.name)
-        for suffix in (".png", ".pdf"):
-            stem.with_suffix(suffix).write_bytes(b"")
-
-    patch.setattr("adhesis.ensemble.report.figures.style.save", note)
-    directory = file.parent / "report"
-    write_report(file, directory, io.StringIO())
-    patch.undo()
-    return directory, drawn
-
-
 def test_a_cell_is_one_point_on_all_axes(file, data):
     assert len(data.cells) == 2 * 2 * 2 * 3
     with xarray.open_dataset(file, engine="h5netcdf", phony_dims="sort") as raw:
@@ -100,8 +82,9 @@ def test_the_papers_cells_alone_stand_beside_the_paper(data):
     assert found == {(("ratio", 100), ("max_penetration", 0.9))}
 
 
-def test_tables_curves_and_page_have_every_axis(report, data):
-    directory, drawn = report
+def test_tables_curves_and_page_have_every_axis(file, data, tmp_path, quick_figures):
+    directory = tmp_path / "report"
+    write_report(file, directory, io.StringIO())
     for name in ("losses", "growth", "jumps", "slopes"):
         with (directory / f"{name}.csv").open(encoding="utf-8") as stream:
             table = list(csv.DictReader(stream))
@@ -115,7 +98,7 @@ def test_tables_curves_and_page_have_every_axis(report, data):
             mean = curves.loading_contact_fraction_mean.sel(**at, **dict(cell.others))
             np.testing.assert_array_equal(mean, cell.curves["loading_contact_fraction"].mean)
         assert "max_penetration" in curves.loading_penetration.attrs["long_name"]
-    assert {"loss_along_ratio", "loss_along_max_penetration"} < set(drawn)
+    assert {"loss_along_ratio", "loss_along_max_penetration"} < set(quick_figures)
     page = (directory / "report.md").read_text(encoding="utf-8")
     assert "show the cells at ratio = 100, max_penetration = 0.9" in page
     assert "Along max_penetration from 0.5 to 0.9 the mean loss in J/m²" in page
@@ -267,16 +250,9 @@ def test_a_mean_without_the_loops_that_failed_is_hollow(with_failures):
     assert "line" not in item.caption.lower()  # two points are not joined
 
 
-def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, monkeypatch):
-    notes = {}
-
-    def note(figure, stem):
-        notes[stem.name] = figure.get_supxlabel()
-        for suffix in (".png", ".pdf"):
-            stem.with_suffix(suffix).write_bytes(b"")
-
-    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", note)
+def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, quick_figures):
     write_report(with_failures, tmp_path / "report", io.StringIO())
+    notes = {name: figure.get_supxlabel() for name, figure in quick_figures.items()}
     for name in ("fig7_loop_against_penetration", "loss_by_mechanism", "jump_energies"):
         assert notes[name] == r"ratio = 100, $h_\mathrm{rms}$ = 1 µm"
     assert "failed" in notes["loss_along_ratio"]

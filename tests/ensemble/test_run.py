@@ -58,18 +58,6 @@ def test_a_run_from_nothing_to_done(tmp_path):
         assert file.attrs["seed"] == 5
 
 
-def test_ranks_compute_what_one_process_does(tmp_path):
-    few = {"hurst": "[0.8]"}
-    process, out = run(tmp_path, "--ranks", "3", fake=None, **few)
-    assert process.returncode == 0, process.stderr
-    (tmp_path / "alone").mkdir()
-    alone, expected = run(tmp_path / "alone", fake=None, **few)
-    assert alone.returncode == 0, alone.stderr
-    assert differences(out, expected) == []
-    with h5py.File(out) as file:
-        assert set(file["rank"][:]) == {1, 2}
-
-
 def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_campaign(tmp_path, "mine.toml")
@@ -77,7 +65,7 @@ def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path, monke
     assert (tmp_path / "mine.h5").exists()
 
 
-def test_a_finished_campaign_computes_nothing_again(tmp_path):
+def test_a_finished_campaign_computes_nothing_again_unasked(tmp_path):
     _, out = run(tmp_path)
     before = out.read_bytes()
     log = tmp_path / "log"
@@ -85,6 +73,9 @@ def test_a_finished_campaign_computes_nothing_again(tmp_path):
     assert process.returncode == 0
     assert not log.exists()
     assert out.read_bytes() == before
+    words = ("--redo", "all", "--hurst", "0.8", "--realisation", "0")
+    run(tmp_path, *words, fake=f"log={log}")
+    assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
 
 
 @pytest.fixture(scope="module")
@@ -124,6 +115,7 @@ def test_walltime_ends_the_run_in_time(tmp_path):
 def test_growing_computes_exactly_what_is_new(tmp_path):
     _, out = run(tmp_path, realisations="1", hurst="[0.8]")
     with Results(out) as results:
+        created = results.attributes["created"]
         before = [results.column(name).tolist() for name in TIMING]
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}", realisations="3")
@@ -133,6 +125,7 @@ def test_growing_computes_exactly_what_is_new(tmp_path):
     assert set(log.read_text().split()) == new - {"0.8:0.01:0", "0.8:0.04:0"}
     with Results(out) as results:
         assert [results.column(name)[[6, 9]].tolist() for name in TIMING] == before
+        assert results.attributes["created"] == created
     (tmp_path / "whole").mkdir()
     _, whole = run(tmp_path / "whole", realisations="3")
     assert differences(out, whole) == []
@@ -170,6 +163,12 @@ def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path, whole
     assert process.returncode == 1
     assert "failed: H = 0.7, γ = 0.01 J/m², realisation 1: FloatingPointError" in process.stderr
     assert "6 of 8 tasks done, 2 failed; 6 computed" in process.stderr
+    text = adhesis_here("status", out).stdout
+    assert "8 tasks, 6 done, 0 pending, 2 failed" in text
+    assert "failed 2×: FloatingPointError: the sum of γ diverged" in text
+    assert "H = 0.7, γ = 0.04 J/m², realisation 1" in text
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
+    assert [g["done"] for g in status["groups"]] == [1, 1, 2, 2]
     # Failures are results: they are not tried again unasked.
     process, _ = run(tmp_path)
     assert process.returncode == 1
@@ -182,15 +181,6 @@ def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path, whole
     process, _ = run(tmp_path, "--redo", "failed")
     assert process.returncode == 0
     assert differences(out, whole) == []
-
-
-def test_done_tasks_can_be_computed_again_too(tmp_path):
-    run(tmp_path)
-    log = tmp_path / "log"
-    words = ("--redo", "all", "--hurst", "0.8", "--realisation", "0")
-    process, _ = run(tmp_path, *words, fake=f"log={log}")
-    assert process.returncode == 0
-    assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
 
 
 def test_an_interrupted_campaign_has_every_cell_about_as_often(tmp_path):
@@ -361,18 +351,6 @@ def test_a_disk_that_fills_while_running(tmp_path):
 
 
 # ---------------------------------------------------------------- status and times
-
-
-def test_status_tells_what_failed_and_why(tmp_path):
-    _, out = run(tmp_path, fake="fail=0.7:*:1")
-    text = adhesis_here("status", out).stdout
-    assert "8 tasks, 6 done, 0 pending, 2 failed" in text
-    assert "failed 2×: FloatingPointError: the sum of γ diverged" in text
-    assert "H = 0.7, γ = 0.04 J/m², realisation 1" in text
-    status = json.loads(adhesis_here("status", out, "--json").stdout)
-    assert [g["done"] for g in status["groups"]] == [1, 1, 2, 2]
-    process = adhesis_here("status", tmp_path / "none.h5")
-    assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
+from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, scales
 from adhesis.ensemble.results.write import DatasetRows, Writer
 from adhesis.ensemble.run import lock as lock_module
 from adhesis.ensemble.run.lock import RunLock, holder
@@ -120,7 +120,7 @@ def test_rows_come_back_as_they_were_written(path, campaign):
     with Results(path) as results:
         assert results.status().tolist() == [0, 0, 0, DONE, 0, FAILED, 0, 0]
         for column in RESULT_DATASETS:
-            if column.dims[0] == KEPT:  # tests/ensemble/test_fields.py
+            if column.dims[0] == KEPT:  # tests/ensemble/test_task.py
                 continue
             value = np.asarray(result[column.name], column.dtype)
             assert results.column(column.name, slice(3, 4))[0].tobytes() == value.tobytes()
@@ -130,32 +130,6 @@ def test_rows_come_back_as_they_were_written(path, campaign):
         assert set(error[12:]) == {"γ"}
         rows = np.array([1, 3, 4, 5])
         np.testing.assert_array_equal(results.column("loss", rows), results.column("loss")[rows])
-
-
-def test_growing_keeps_every_row_in_its_place(path, campaign):
-    with Writer(path) as writer:
-        for row, task in enumerate(campaign.tasks()):
-            writer.write_result(row, fake_result(campaign, task))
-    larger = parse_campaign(campaign_text(hurst="[0.75, 0.7, 0.8]", realisations="3"))
-    with Results(path) as old:
-        created = old.attributes["created"]
-        before = {c.name: old.column(c.name) for c in DATASETS}
-        place = {task: row for row, task in enumerate(old.tasks())}
-        create(path, larger, grown_from=old)
-    with Results(path) as results:
-        assert results.campaign == larger
-        assert list(results.tasks()) == list(larger.tasks())
-        assert results.attributes["created"] == created
-        for row, task in enumerate(results.tasks()):
-            assert results.status()[row] == (DONE if task in place else PENDING)
-        rows = np.array([r for r, t in enumerate(results.tasks()) if t in place])
-        olds = [place[t] for t in results.tasks() if t in place]
-        for column in DATASETS:
-            if column.dims[0] == KEPT:  # tests/ensemble/test_fields.py
-                continue
-            assert (
-                results.column(column.name, rows).tobytes() == before[column.name][olds].tobytes()
-            )
 
 
 @pytest.mark.filterwarnings("error")
@@ -304,17 +278,6 @@ def test_a_file_of_another_version_is_refused(path, version, shown):
     said = refused(path)
     assert f"has file version {shown}, and this adhesis reads version 1: read it with" in said
     assert main(["status", str(path)]) == 2
-
-
-def test_a_disk_that_is_too_small_is_met_before_the_first_task(tmp_path, campaign, monkeypatch):
-    monkeypatch.setattr(schema, "PENDING", 0)
-    full = os.statvfs(tmp_path).f_frsize
-    monkeypatch.setattr(
-        "shutil.disk_usage", lambda _: type("Usage", (), {"free": full, "total": full})
-    )
-    with pytest.raises(InputError, match="and the disk has"):
-        create(tmp_path / "r.h5", campaign)
-    assert not list(tmp_path.iterdir())
 
 
 # ---------------------------------------------------------------- scale and lock

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import os
 import pickle
@@ -37,22 +36,6 @@ def study(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", str(ROOT), ""]))
     yield tmp_path
     assert not sorted(path.name for path in tmp_path.glob("executed-*"))
-
-
-def test_every_start_of_python_is_the_safe_one():
-    """``sys.executable`` stands where the command is made, and in a hint for people."""
-    users = {
-        path.relative_to(ROOT).as_posix()
-        for package in ("adhesis", "adhesis/solver", "adhesis/ensemble")
-        for path in (ROOT / package).rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.Attribute) and node.attr == "executable"
-    }
-    assert users == {
-        "adhesis/ensemble/run/launch.py",
-        "adhesis/ensemble/trace/reading/instrument.py",
-    }
-    assert launch.python("-m", "x") == [sys.executable, "-P", "-m", "x"]
 
 
 def test_the_environment_of_a_process_names_this_package_and_no_working_directory(monkeypatch):

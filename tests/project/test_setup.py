@@ -19,8 +19,6 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parent.parent.parent
-SCRIPTS = sorted([*ROOT.glob("jobs/*.sh"), *ROOT.glob("tools/*.sh"), ROOT / ".ci" / "run"])
-SOURCED = {ROOT / "jobs" / "common.sh", ROOT / "tools" / "mpi.sh", ROOT / "tools" / "parts.sh"}
 # Distribution names that differ from what is imported, and what other packages need to find.
 IMPORTED_AS = {"markdown-it-py": "markdown_it", "surfacetopography": "SurfaceTopography"}
 LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
@@ -38,18 +36,6 @@ def locked(name: str = "requirements.lock") -> dict[str, str]:
     lines = (ROOT / name).read_text().splitlines()
     pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
     return {name.lower().replace("_", "-"): version for name, version in pairs}
-
-
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
-def test_script_is_well_formed(script: Path) -> None:
-    subprocess.run(["bash", "-n", script], check=True)
-    text = script.read_text()
-    assert "\r" not in text
-    if script not in SOURCED:
-        assert text.startswith("#!/")
-        assert os.access(script, os.X_OK)
-    if shutil.which("shellcheck"):
-        subprocess.run(["shellcheck", "-S", "error", "-x", script], cwd=ROOT, check=True)
 
 
 def test_batch_scripts_force_no_rules_on_a_cluster() -> None:

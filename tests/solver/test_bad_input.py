@@ -18,15 +18,10 @@ import pytest
 
 import adhesis
 from adhesis import (
-    ContactState,
     Control,
-    Fields,
     HalfSpace,
     InputError,
-    Jump,
     LoopResult,
-    MinorLoop,
-    Opening,
     PathResult,
     Problem,
     Profile,
@@ -274,8 +269,6 @@ loops([0.5], method='grid') -> TypeError: method is 'grid': it must be a Method;
 path([0.5], method=None) -> TypeError: method is None: it must be a Method; make one with
 loop(progress=3) -> TypeError: progress is 3: it must be a function, or None
 loop(on_state='print') -> TypeError: on_state is 'print': it must be a function, or None
-loop(max_stress=5.0) ->
-    ValueError: a path under a separation or a stiffness turns at max_penetration
 loop(max_penetration=None) ->
     ValueError: a path under a separation or a stiffness turns at max_penetration
 loops(None) -> ValueError: a path under a separation or a stiffness turns at max_penetration
@@ -285,7 +278,6 @@ path([]) -> ValueError: a path needs at least one turning point
 path([0.5, np.nan, 0.6]) ->
     ValueError: turning_points[1] is nan: every turning point must be a finite number
 path([0.3, 0.5]) -> ValueError: the path goes from 0.3 to 0.5: after loading it must unload
-path([0.5, 0.5]) -> ValueError: after loading it must unload
 path([0.5, 0.3, 0.2]) -> ValueError: after unloading it must load
 path([0.5, 0.3]) -> ValueError: omit that turning point
 path([1.2]) -> ValueError: max_penetration is 1.2
@@ -295,7 +287,6 @@ loop(preload=20.0, max_stress=20.0) -> ValueError: preload and max_stress are gi
 loop(method=UNDER_LOAD, max_penetration=None, preload=20.0) -> ValueError: a weight or a machine
 loop(max_penetration=None, max_stress=20.0) -> ValueError: a weight or a machine
 loop(preload=20.0, max_penetration=1.0) -> ValueError: max_penetration is 1.0: it must be
-loops(None, preload=[20.0, 20.0]) -> ValueError: there must be some, all different
 # interfaces
 Problem(WAVE, SOLID, 0.3, measure='projected') ->
     ValueError: measure is 'projected': it must be one of arc, flat
@@ -310,8 +301,6 @@ Problem(WAVE, SOLID, 0.0, work_of_adhesion_open=0.1) ->
     ValueError: it must be left out, as γ is 0
 Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, strength=1000000.0) ->
     ValueError: beside a strength of 1e+06 Pa: give
-Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, adhesion_range=1e-09) ->
-    ValueError: give one of them
 make_method('grid', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0)) ->
     ValueError: method is 'grid' beside a work_of_adhesion_open
 make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), nodes_per_wave=32) ->
@@ -320,14 +309,11 @@ make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), node
 Problem(WAVE.scaled(1000000.0), SOLID, 0.04) ->
     ValueError: rms slope is 4,443: it must be a positive number from 1e-12 to 100; are heights
 Problem(WAVE.scaled(1, 1e-09), SOLID, 0.04) -> ValueError: rms slope is 4.443e6: it must be
-Problem(WAVE.scaled(1e-12), SOLID, 0.04) -> ValueError: rms slope is 4.443e-15: it must be
 # profiles
 profile_from_heights([2.0, 2.0, 2.0], 1.0) -> ValueError: the profile is flat (h_max = 0)
 profile_from_heights([1.0, 2.0], 1.0) -> ValueError: heights hold 2 value(s): at least 3
 profile_from_heights(pd.Series([0, None, 2], dtype='Int64'), 1.0) ->
     ValueError: heights[1] is nan: every height must be a finite number
-profile_from_heights([1.0, np.inf, 2.0], 1.0) ->
-    ValueError: heights[1] is inf: every height must be a finite number
 profile_from_heights([0.0, 1e+200, 0.0], 1.0) -> ValueError: largest height is 1e+200: it must be
 profile_from_heights([0.0, 1e-200, 0.0], 1.0) -> ValueError: largest coefficient is 3.3
 profile_from_heights(np.array([1, 2j, 3]), 1.0) ->
@@ -362,8 +348,6 @@ one_loop().save('none/x.nc') -> InputError: path is none/x.nc: there is no direc
 one_loop().film('a.avi') -> InputError: path is a.avi: the name must end in .html,
 one_loop().film(3) -> TypeError: path is 3
 one_loop().film(frames=1) -> ValueError: frames is 1: it must be
-one_loop().film(frames=1001) -> ValueError: frames is 1001: it must be
-one_loop().film(frames=2.5) -> ValueError: frames is 2.5
 one_loop().film(progress=3) -> TypeError: progress is 3
 one_loop().film('none/a.html', frames=2) -> InputError: no directory
 replace(one_loop(), contact_states=()).film() -> ValueError: this result holds no contact states
@@ -396,7 +380,6 @@ prepare_trace(TRACE, tip_radius=np.nan) -> InputError: tip_radius is nan: it mus
 prepare_trace(TRACE, longest_gap=-1) -> InputError: longest_gap is -1: it must be a number from 0
 prepare_trace(TRACE, exclude=[(0.002, 0.001)]) ->
     InputError: exclude holds the range from 2 mm to 1 mm: a range must begin at 0
-prepare_trace(TRACE, exclude=[(-1e-06, 0.001)]) -> InputError: a range must begin at 0 or later
 prepare_trace(TRACE, exclude=[(np.nan, 0.001)]) -> InputError: a range must begin at 0 or later
 prepare_trace(TRACE, exclude=[(0.005, 0.006)]) ->
     InputError: in which there is no height: t.csv reaches from 0 to 1.995 mm
@@ -404,8 +387,6 @@ prepare_trace(TRACE, exclude=[(0.0, 0.00195)]) ->
     InputError: exclude leaves 9 heights of t.csv: at least 32 must be left
 prepare_trace(TRACE, exclude=[(0.0002, 0.0008)]) -> InputError: % of its heights, with what exclude
 prepare_trace(TRACE, exclude='1mm:2mm') -> TypeError: it must hold pairs of positions in m, as in
-prepare_trace(TRACE, exclude=3.0) -> TypeError: it must hold pairs of positions in m, as in
-prepare_trace(TRACE, exclude=[0.001, 0.002]) -> TypeError: it must hold pairs of positions in m
 prepare_trace(TRACE, exclude=[('1mm', '2mm')]) -> TypeError: it must hold pairs of positions in m
 prepare_trace(TRACE, exclude=[(1.0,)]) -> TypeError: it must hold pairs of positions in m, as in
 prepare_trace(TRACE, invert='yes') -> TypeError: invert is 'yes': it must be True or False
@@ -429,7 +410,6 @@ answer(work_of_adhesion=[]) -> ValueError: work_of_adhesion is empty: it must ho
 answer(max_penetration=[0.5, 1.0]) -> ValueError: max_penetration is 1.0: it must be
 answer(method='magic') -> ValueError: method is 'magic': it must be one of
 answer(processes=-1) -> ValueError: processes is -1: it must be a whole number from 0 to 4096
-answer(control=Control(0)) -> ValueError: a path under a load turns at max_stress: give that
 answer(control=Control(0), max_penetration=0.5) ->
     ValueError: a path under a load turns at max_stress: give that, and no max_penetration
 answer(max_stress=500.0) -> ValueError: max_stress is given, but a path under a separation
@@ -440,7 +420,6 @@ answer(watch=1) -> TypeError: watch is 1: it must be a function, or None
 adhesis.open(3) -> TypeError: path is 3: it must be a path
 adhesis.open('a.h5', beside='b.h5') -> TypeError: beside is 'b.h5': it must be a list of paths
 adhesis.open('no such file.h5') -> InputError: no such file.h5
-adhesis.open('no such file.h5') -> ValueError: no such file.h5
 path([0.5, -50.0, 0.6]) -> PathError: contact is lost on the way to -50
 """
 CASES = [
@@ -577,11 +556,6 @@ def test_one_is_not_several() -> None:
     assert [counted(n, "jump") for n in (0, 1, 2)] == ["0 jumps", "1 jump", "2 jumps"]
     assert f"loss={one_loop().loss:.6g} J/m²" in repr(one_loop())
     assert "2 jumps, 0 warnings" in repr(one_loop())
-    single = replace(one_loop(), jumps=one_loop().jumps[:1])
-    assert ", 1 jump, " in repr(single)
-    assert "J/m² in 1 jump, residual" in single.summary()
-    one_left = replace(one_path(), jumps=one_path().jumps[:1])
-    assert "J/m² in 1 jump, residual" in one_left.summary()
 
 
 def test_a_command_is_answered_in_its_own_words() -> None:
@@ -593,6 +567,4 @@ def test_a_command_is_answered_in_its_own_words() -> None:
 
 def test_a_report_of_a_method_is_no_part_of_what_a_loop_found() -> None:
     assert replace(one_loop(), method=MethodReport("other", None), seconds=9.0) == one_loop()
-    assert isinstance(STATES[-1], ContactState)
     assert issubclass(InputError, ValueError)
-    assert {Fields, Jump, MinorLoop, Opening} <= {getattr(adhesis, n) for n in adhesis.__all__}

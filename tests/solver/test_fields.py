@@ -1,4 +1,4 @@
-"""Density of the gap and spectral density, against closed forms and brute force."""
+"""Density of the gap, against closed forms and brute force."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adhesis.solver.method import ContactState, Method, Opening
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import self_affine_profile, single_wave
-from adhesis.solver.observables import gap_shares, spectral_density
+from adhesis.solver.observables import gap_shares
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
 
@@ -117,11 +117,3 @@ def test_shares_of_a_square_root_are_exact_between_few_points():
     expected, _ = np.histogram(middle, bins, weights=np.diff(place) / 4)
     np.testing.assert_allclose(shares, expected, rtol=1e-4)
     assert shares.sum() == pytest.approx(0.5, rel=1e-14)
-
-
-def test_spectral_density_holds_the_mean_square():
-    values = np.random.default_rng(1).standard_normal(256)
-    values -= values.mean()
-    density = spectral_density(values, PERIOD)
-    q0 = 2 * np.pi / PERIOD
-    assert q0 * (2 * density[1:-1].sum() + density[-1]) == pytest.approx(np.mean(values**2))

@@ -1,15 +1,14 @@
-"""Scenes far from the ordinary, as `make fuzz` draws them; that the judge sees what is wrong."""
+"""Scenes far from the ordinary, as `make fuzz` draws them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from adhesis import Control, LoopResult, run_loop
+from adhesis import Control, run_loop
 from adhesis.solver.sharp.method import SharpMethod
-from tools.hostile import draw, independent_clearance, judge
+from tools.hostile import draw, judge
 
 
 @pytest.mark.parametrize("number", [2, 3, 4, 7])
@@ -28,12 +27,6 @@ def test_tension_above_the_strength_is_stated(number, flagged):
     assert found["wrong"] == []
     assert found["openings"] > 0
     assert found["flagged"] == (found["excess"] > 1.01) == flagged
-
-
-def test_tension_above_the_strength_without_a_doubt_is_wrong(monkeypatch):
-    monkeypatch.setattr(LoopResult, "warnings", ())
-    wrong = judge(draw(41270, 21, strength=True), 22)["wrong"]
-    assert any("strengths without a doubt" in text for text in wrong)
 
 
 @pytest.mark.parametrize(
@@ -70,19 +63,3 @@ def test_an_edge_that_leaps_to_and_fro_over_a_minimum_comes_to_rest():
         for accuracy in (scene.accuracy, 0.1 * scene.accuracy)
     ]
     assert abs(loops[0].loss - loops[1].loss) < loops[0].loss_error
-
-
-def test_an_overlap_is_seen_without_the_method():
-    """Edges held, a state that is pressed down by a tenth of h_max overlaps."""
-    scene = draw(5, 2)
-    problem = scene.problem()
-    method = SharpMethod(problem)
-    states = []
-    run_loop(
-        method, max_penetration=0.3, load_steps=4, on_state=lambda _, state: states.append(state)
-    )
-    h_max = problem.profile.h_max
-    state = max(states, key=lambda s: (s.patches > 0) * np.diff(s.edges, axis=1).sum())
-    assert independent_clearance(method, state) >= 0
-    down = replace(state, separation=state.separation - 0.5 * h_max)
-    assert independent_clearance(method, down) < -1e-2

@@ -13,13 +13,12 @@ import pytest
 from adhesis.solver._kernels import Running, set_up_response
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.method import Method
-from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.registry import make_method
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 from adhesis.solver.sharp.method import SharpMethod
-from tests.support.scenes import small_problem
+from tests.support.scenes import HALF_SPACE
 from tools.interrupted import Interrupt, interrupted
 
 INTERRUPTS = 8  # of each method
@@ -27,9 +26,10 @@ INTERRUPTS = 8  # of each method
 
 def method(name: str) -> Method:
     if name == "grid":
-        return make_method("grid", small_problem(0.04), nodes_per_wave=8)
+        few = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=3, h_rms=1e-6)
+        return make_method("grid", Problem(few, HALF_SPACE, 0.04), nodes_per_wave=8)
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=1, h_rms=1e-6)
-    return make_method("sharp", Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.04))
+    return make_method("sharp", Problem(profile, HALF_SPACE, 0.04))
 
 
 @pytest.fixture(scope="module", params=["sharp", "grid"])
@@ -59,7 +59,7 @@ def loss(chosen: Method) -> tuple[str, str]:
 def test_a_signal_that_comes_in_a_long_kernel_ends_it(alarm):
     """A descent of many gaps takes seconds; its handler is called between two steps."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, seed=1, h_rms=1e-6)
-    edges = SharpMethod(Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.01)).edges
+    edges = SharpMethod(Problem(profile, HALF_SPACE, 0.01)).edges
     ends = np.linspace(0.1, 6.2, 800).reshape(-1, 2)
     response = set_up_response(ends, 1e-3, None, edges.law, edges.model)
     ended = threading.Event()

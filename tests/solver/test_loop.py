@@ -11,7 +11,6 @@ from adhesis import ContactState, Control, Path, Problem, run_loop, single_wave
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
 from adhesis.solver.model.jump import Jump
-from adhesis.solver.model.profile import Profile
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
 from tests.support.scenes import HALF_SPACE
@@ -184,12 +183,6 @@ def test_a_drop_is_the_difference_of_the_energies_whatever_its_sign():
 def test_a_contact_that_never_detaches_is_reported():
     with pytest.raises(PathError, match="still in contact"):
         run_loop(_Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)
-
-
-def test_exact_wave_refuses_other_profiles():
-    rough = Profile(PERIOD, np.array([0, 1e-9, 1e-9], dtype=complex))
-    with pytest.raises(ValueError, match="harmonic 1"):
-        ExactWave(Problem(rough, HALF_SPACE, 0.0))
 
 
 def test_a_loop_prints_itself_in_a_few_lines():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -11,7 +13,6 @@ from adhesis import (
     HalfSpace,
     PathError,
     Problem,
-    load,
     make_method,
     run_loop,
     run_loops,
@@ -213,7 +214,7 @@ def test_a_state_at_a_mean_stress_has_the_contact_and_the_gap_of_the_closed_form
     assert opening.x[-1] - opening.x[0] == pytest.approx(PERIOD - 2 * a, abs=1e-5 * PERIOD)
 
 
-def test_a_mean_stress_that_a_branch_does_not_have_is_refused(tmp_path):
+def test_a_mean_stress_that_a_branch_does_not_have_is_refused():
     loop = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=10)
     tension = -0.5 * loop.pull_off_stress
     assert loop.at_stress(tension).mean_stress == pytest.approx(tension, rel=1e-8)
@@ -226,13 +227,8 @@ def test_a_mean_stress_that_a_branch_does_not_have_is_refused(tmp_path):
         loop.at_stress(np.nan)
     with pytest.raises(TypeError, match="stress is '10 kPa': it must be a finite number, in Pa"):
         loop.at_stress("10 kPa")
-    loop.save(tmp_path / "loop.nc")
-    again = load(tmp_path / "loop.nc")
-    assert again == loop
-    assert again.preload == PRELOAD
-    assert again.preload_reached
     with pytest.raises(ValueError, match="holds no contact states"):
-        again.at_stress(100.0)
+        replace(loop, contact_states=()).at_stress(100.0)
 
 
 def test_a_closing_drop_that_is_negative_is_doubted():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis import Profile, profile_from_heights, single_wave
+from adhesis import Profile, profile_from_heights
 from adhesis import self_affine_profile as spectral
 
 ROUGH = {"period": 2e-3 * np.pi, "n0": 10, "ratio": 20, "seed": 3}
@@ -119,13 +119,6 @@ def test_given_heights_are_passed_through(n):
     np.testing.assert_allclose(profile.at(x), heights - heights.mean(), atol=1e-19)
     with pytest.raises(ValueError, match="the profile is flat"):
         profile_from_heights(np.full(n, 2e-6), 1e-3)
-
-
-def test_single_wave():
-    wave = single_wave(3e-6, 1e-3)
-    assert wave.h_max == pytest.approx(3e-6, rel=1e-15)
-    assert wave.heights(4)[0] == pytest.approx(3e-6)
-    assert wave.m0 == pytest.approx(4.5e-12)
 
 
 def test_crests_are_the_maxima_of_the_continuous_function(rough):

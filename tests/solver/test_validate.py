@@ -196,13 +196,13 @@ def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
-    """The whole of ``adhesis validate``; of grid, without --slow, a part of the long claims.
+    """The whole of ``adhesis validate``; without --slow a part of the long claims.
 
-    A trough that opens is in test_opening.py, a stiffness and a load in test_control_loops.py, and
-    the audit of a rough loop in test_grid.py.
+    Other α are in test_sharp_path.py, a trough that opens in test_opening.py, a stiffness and a
+    load in test_control_loops.py, audits of rough loops in test_grid.py and test_sharp.py.
     """
     alphas = validation.ALPHAS
-    if name == "grid" and not request.config.getoption("--slow"):
+    if not request.config.getoption("--slow"):
         alphas = (0.05, 0.6)
         monkeypatch.setattr(validation, "ALPHAS", alphas)
         elsewhere = (validation.controls, validation.opening, validation.audit)

@@ -6,7 +6,7 @@ import threading
 import time
 from typing import TextIO
 
-_EVERY = 10.0  # s
+_EVERY = 10.0  # s; the longest time without a line
 
 
 class Waiting:
@@ -18,13 +18,10 @@ class Waiting:
     ----------
     terminal : TextIO
         Where the lines go: a stream of its own, which no test captures.
-    every : float
-        Longest time without a line, in s.
     """
 
-    def __init__(self, terminal: TextIO, every: float = _EVERY) -> None:
+    def __init__(self, terminal: TextIO) -> None:
         self._terminal = terminal
-        self._every = every
         self._begun: dict[str, float] = {}
         self._last = time.monotonic()
         self._ended = threading.Event()
@@ -46,7 +43,7 @@ class Waiting:
     def _watch(self) -> None:
         while not self._ended.wait(1.0):
             now = time.monotonic()
-            if now - self._last < self._every:
+            if now - self._last < _EVERY:
                 continue
             self._last = now
             under_way = [f"{name} ({now - begun:.0f} s)" for name, begun in self._begun.items()]

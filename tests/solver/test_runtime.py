@@ -1,17 +1,16 @@
-"""From Python, without variables of the environment, linear algebra uses one thread."""
+"""What the mechanics ask of the process: one thread of linear algebra, and memory that is kept."""
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController
 
-from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.registry import make_method
+from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.equilibrium.griffith import leaving_step
-from tests.support.scenes import small_problem
 
 
 def threads() -> set[int]:
@@ -40,13 +39,30 @@ def test_modes_at_a_saddle_are_of_one_thread_which_leaves_the_number_as_it_was(m
         assert threads() == {2}
 
 
-def test_two_loops_in_two_threads_have_the_bits_of_one_after_the_other():
+WORK = """
+import resource
+import numpy as np
+from adhesis.solver.runtime.malloc import keep_freed
+KEEP
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(10):
+        arrays = [np.ones(250_000) for _ in range(10)]
+        del arrays
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+faults()
+print(faults())
+"""
 
-    def loss(work_of_adhesion: float) -> str:
-        method = make_method("sharp", small_problem(work_of_adhesion))
-        return run_loop(method, max_penetration=0.8, load_steps=4).loss.hex()
 
-    works = [0.02, 0.03, 0.04, 0.05]
-    expected = [loss(work) for work in works]
-    with ThreadPoolExecutor(2) as pool:
-        assert list(pool.map(loss, works)) == expected
+def faults(keep: bool) -> int:
+    """Pages that ten rounds of twenty megabytes, taken and freed, ask of the system."""
+    work = WORK.replace("KEEP", "keep_freed()" if keep else "")
+    done = subprocess.run([sys.executable, "-c", work], capture_output=True, text=True, check=True)
+    return int(done.stdout)
+
+
+@pytest.mark.skipif(not keep_freed(), reason="the C library is not glibc")
+def test_freed_memory_is_not_asked_for_again() -> None:
+    assert faults(keep=False) > 10_000
+    assert faults(keep=True) < 100
