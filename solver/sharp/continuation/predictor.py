@@ -81,7 +81,7 @@ class Predictor:
         straight: float = most / max(self.fastest, 1e-300)
         if math.isinf(self.fold_distance):
             return straight
-        if self.fold_distance < 0.8 * finest:
+        if self.fold_distance < 0.7 * finest:
             return self.across(finest)
         leading = self._leading
         most = most / abs(leading.gone)
