@@ -56,10 +56,7 @@ OVERLAP = 1e-6
 TRIAL_WIDTHS = 1.25
 """Ratio of the widths of seeds that are tried one after the other, where surfaces attract."""
 BISECTION_AFTER = 3
-"""Trials that find no overlap, one after the other, or of all where many gaps are interpolated, one
-by one: then one is a bisection."""
-TRIAL_FROM_END = 1e-4
-"""Share of an interval within which of its ends no trial is made."""
+"""Trials that find no overlap, one after the other: then one is a bisection."""
 
 # ---------------------------------------------------------------- opening from inside
 
