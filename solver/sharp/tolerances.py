@@ -38,9 +38,7 @@ ENDLESS = 100_000
 RESTS = 20
 """How often a descent may come to rest without a minimum that Newton's iteration finds."""
 OTHER_MINIMUM = 0.01
-"""λ_min. Edges this far apart are those of different minima. Those that a jump moves by less keep
-their motion before it for the next prediction: with 65 and 120 patches that takes 3 and 4 % fewer
-fields."""
+"""λ_min. Edges this far apart are those of different minima."""
 
 # The way off a saddle.
 EQUAL = 1e-3

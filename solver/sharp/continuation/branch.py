@@ -11,8 +11,7 @@ import numpy as np
 from adhesis.solver._kernels import COMPARABLE, STEP_GROWTH, STEP_REDUCTION, shortest_length
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.jump import ComputedJump
-from adhesis.solver.sharp.continuation.predictor import Predictor, carry_previous
+from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -20,7 +19,6 @@ from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
     ORDER_RESOLVED,
-    OTHER_MINIMUM,
     PREDICTED_MOTION,
     QUIET_STRESS,
     STEP_FAR,
@@ -211,9 +209,6 @@ class Branch:
         if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
-        self._passed = [PreviousPoint(point.at, point.rate, point.gaps)]
-        if point.previous is not None:
-            self._passed.insert(0, point.previous)
         self.trail = Trail(point)
         self.finest, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
@@ -256,25 +251,6 @@ class Branch:
     def refine(self, finest: float) -> None:
         """Locate the fold ahead to ``finest``."""
         self.finest = self._longest = finest
-
-    def after_jump(self, jump: ComputedJump) -> Point | None:
-        """Return the point after a jump with one before it, from edges that hardly moved in it.
-
-        That is from the first point of this branch since which no edge has gone further than a step
-        may predict; without one the point has none before it.
-        """
-        before, after = jump.before, jump.point
-        if before is None or after is None:
-            return after
-        longest = PREDICTED_MOTION * self._edges.wave
-        remaining = self._target.at - before.at
-        near = OTHER_MINIMUM * self._edges.wave
-        for earlier in self._passed:
-            if (before.at - earlier.at) * remaining <= 0 or len(earlier.gaps) != len(before.gaps):
-                continue
-            if np.abs(before.gaps - earlier.gaps).max() < longest:
-                return carry_previous(earlier, before, after, near)
-        return after
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
@@ -319,15 +295,15 @@ class Branch:
         )
         self.trail.add(point, closed)
         self.point = point
-        self._passed.append(PreviousPoint(point.at, point.rate, point.gaps))
         self._work_before = (0.0, math.inf)
         if is_output:
             self._output = point
         if point.at != self._target.at:
             # what lies before a kink predicts nothing beyond it
-            self._predictor = Predictor(point.with_previous(None) if self._begins_to_move else point)
+            kink = self._begins_to_move
+            self._predictor = Predictor(point.with_previous(None) if kink else point)
             self._look_for_two_folds()
-            self._longest = STEP_GROWTH * abs(self._free_step if self._begins_to_move else step)
+            self._longest = STEP_GROWTH * abs(self._free_step if kink else step)
         return Accepted(point, is_output, may_touch, remaining)
 
     def _look_for_two_folds(self) -> None:

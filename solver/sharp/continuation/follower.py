@@ -107,7 +107,7 @@ class Follower:
                 jump = self._handle_accepted(history, branch, event, target)
             if jump is not None:
                 history.commit(jump)
-                return jump.at, branch.after_jump(jump)
+                return jump.at, jump.point
         self._remember(history, branch, target.branch)
         return target.at, branch.point
 
