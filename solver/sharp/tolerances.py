@@ -81,6 +81,8 @@ LEFT_BEFORE_FOLD = 0.1
 BEYOND_FOLD = 0.2
 """Of the resolution of a jump: so far beyond a fold there is surely no equilibrium, and so much
 before it is left at least to the next step."""
+TRAPEZOID_FAR = 4.0
+"""Of the allowed error of the trapezoidal rule: a step with more is halved."""
 QUIET_STRESS = 0.05
 """σ~. Smaller mean stresses do not tighten the trapezoidal rule."""
 
@@ -121,9 +123,6 @@ LARGEST_WORK_OF_STEP = 2e-5
 """Accuracy of the loss times γ: the largest value, however strong adhesion is."""
 WORK_RESOLVED = 0.01
 """Resolution of jumps. Over shorter steps the difference is that of the fields."""
-STEP_FAR = 4.0
-"""Of the allowed error of one step's work: where patches open from inside a step with more is
-halved."""
 WORK_STALLED = 0.5
 """Share of the difference of work and energy over a step that a shorter one may leave at most, if
 it is an error of the step: half a step has a sixteenth of it, next to a fold a third."""

@@ -32,7 +32,7 @@ from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
 from adhesis.solver.sharp.continuation.branch import Branch
 from adhesis.solver.sharp.equilibrium.griffith import imbalance
-from adhesis.solver.sharp.tolerances import STEP_FAR
+from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
 
 PERIOD = 2e-3
 # Two troughs, of which the one at x = λ/2 is the shallower.
@@ -154,7 +154,7 @@ def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
     for at in (1.0, 0.5):
         Branch._work_error(branch, start, SimpleNamespace(at=at))
     branch._work_before = (0.0, math.inf)  # the step was accepted
-    assert Branch._work_error(branch, start, SimpleNamespace(at=2.0)) == STEP_FAR
+    assert Branch._work_error(branch, start, SimpleNamespace(at=2.0)) == TRAPEZOID_FAR
 
 
 def test_work_and_energy_agree_between_openings():

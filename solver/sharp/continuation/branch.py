@@ -21,7 +21,7 @@ from adhesis.solver.sharp.tolerances import (
     ORDER_RESOLVED,
     PREDICTED_MOTION,
     QUIET_STRESS,
-    STEP_FAR,
+    TRAPEZOID_FAR,
     WORK_RESOLVED,
     WORK_STALLED,
 )
@@ -228,10 +228,9 @@ class Branch:
             reached = correct(self._edges, self._predictor, at)
             if reached is not None:
                 error = self._error(self._output, reached)
-                compared = self._imbalance is not None and abs(step) > 2 * self._resolution.finest
-                if not compared or error <= STEP_FAR:
+                if error <= TRAPEZOID_FAR or abs(step) <= 2 * self._resolution.finest:
                     return self._accept(reached, step, error)
-                # between two folds a branch may bend more sharply than jumps are located
+                # a branch may bend more sharply than jumps are located
                 self._longest = 0.5 * abs(step)
                 self.finest = min(self.finest, self._longest)
             elif abs(step) <= self.finest:
@@ -365,7 +364,7 @@ class Branch:
         self._work_before = span, error
         if span < longer and error > WORK_STALLED * larger:
             self._work_of_fields = max(error, self._work_of_fields)
-        return min(error, STEP_FAR) if error <= self._work_of_fields else error
+        return min(error, TRAPEZOID_FAR) if error <= self._work_of_fields else error
 
 
 def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | None:
