@@ -508,22 +508,6 @@ void bind_nucleation(nb::module_& m) {
       "Find the minima of the gaps of a field that may have closed.\n\n"
       "Returns the least clearance of the other gaps, the number of these, their minima "
       "(positions, openings, curvatures, rims and clearances), and the updated searched gaps.");
-  m.def(
-      "clearance_left",
-      [](const Field& field, const Searched& searched, const SearchLengths& lengths) {
-        return clearance_left(field, searched.gaps, lengths).clearance;
-      },
-      "field"_a, "searched"_a, "lengths"_a, "Bound the clearance left in each gap from below.");
-  m.def(
-      "least_clearances",
-      [](const Field& field, const Integers& gaps, const SearchLengths& lengths) {
-        const Vector least = least_clearances(find_minima(field, gaps, lengths.range),
-                                              field.nodes.gap_count(), lengths);
-        Vector out;
-        for (int k : gaps) out.push_back(least[k]);
-        return out;
-      },
-      "field"_a, "gaps"_a, "lengths"_a, Unlocked(), "Find the least clearance of some gaps.");
 }
 
 void bind_predictor(nb::module_& m) {

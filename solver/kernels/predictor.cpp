@@ -46,11 +46,6 @@ double led(double on, double way, const LeadingEdge& leading) {
   const double here = leading.here, fold = leading.fold;
   if (on * std::abs(way) >= leading.fold_distance) return fold;
   double low = 0, high = std::min(fold, 2 * on / here);
-  while (high < fold && polynomial(leading, high) < on) {
-    low = high;
-    high = 2 * high;
-    if (high > PREDICTION_TRUSTED * 2 * on / here) return low;
-  }
   double lead = std::min(on / here, high);
   for (int i = 0; i < std::numeric_limits<double>::digits; ++i) {
     const double value = polynomial(leading, lead) - on;

@@ -38,9 +38,7 @@ ENDLESS = 100_000
 RESTS = 20
 """How often a descent may come to rest without a minimum that Newton's iteration finds."""
 OTHER_MINIMUM = 0.01
-"""λ_min. Edges this far apart are those of different minima. Those that a jump moves by less keep
-their motion before it for the next prediction: with 65 and 120 patches that takes 3 and 4 % fewer
-fields."""
+"""λ_min. Edges this far apart are those of different minima."""
 
 # The way off a saddle.
 EQUAL = 1e-3
@@ -56,10 +54,7 @@ OVERLAP = 1e-6
 TRIAL_WIDTHS = 1.25
 """Ratio of the widths of seeds that are tried one after the other, where surfaces attract."""
 BISECTION_AFTER = 3
-"""Trials that find no overlap, one after the other, or of all where many gaps are interpolated, one
-by one: then one is a bisection."""
-TRIAL_FROM_END = 1e-4
-"""Share of an interval within which of its ends no trial is made."""
+"""Trials that find no overlap, one after the other: then one is a bisection."""
 
 # ---------------------------------------------------------------- opening from inside
 

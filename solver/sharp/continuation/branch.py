@@ -8,12 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver._kernels import COMPARABLE, shortest_length
+from adhesis.solver._kernels import COMPARABLE, STEP_GROWTH, STEP_REDUCTION, shortest_length
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.jump import ComputedJump
-from adhesis.solver.sharp.continuation.predictor import Predictor, carry_previous
-from adhesis.solver.sharp.continuation.step_size import StepSize
+from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -21,7 +19,6 @@ from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
     ORDER_RESOLVED,
-    OTHER_MINIMUM,
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
@@ -191,7 +188,9 @@ class Branch:
         The last accepted point.
     trail : Trail
         Accepted points since the last search for touches.
-    steps : StepSize
+    finest : float
+        Separation to which a jump is located, in d: the smallest step, but across a fold or to the
+        target.
     """
 
     def __init__(
@@ -210,11 +209,8 @@ class Branch:
         if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
-        self._passed = [PreviousPoint(point.at, point.rate, point.gaps)]
-        if point.previous is not None:
-            self._passed.insert(0, point.previous)
         self.trail = Trail(point)
-        self.steps = StepSize(resolution.jump)
+        self.finest, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = Predictor(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
@@ -230,17 +226,17 @@ class Branch:
             left = self._target.at - self.point.at
             at = self._target.at if step == left else self.point.at + step
             reached = correct(self._edges, self._predictor, at)
-            if reached is None:
-                if self.steps.reject(step, self._predictor):
-                    continue
+            if reached is not None:
+                error = self._error(self._output, reached)
+                if error <= TRAPEZOID_FAR or abs(step) <= 2 * self._resolution.finest:
+                    return self._accept(reached, step, error)
+                # a branch may bend more sharply than jumps are located
+                self._longest = 0.5 * abs(step)
+                self.finest = min(self.finest, self._longest)
+            elif abs(step) <= self.finest:
                 return Fold(self.point, at, self._two_folds)
-            examined = self._examine(reached, step)
-            if examined is None:
-                self.steps.halve(step)
-                continue
-            event, closed = examined
-            self._accept(event, closed, step)
-            return event
+            else:
+                self._longest = max(STEP_REDUCTION * abs(step), self.finest)
 
     @property
     def fold_ahead(self) -> tuple[float, float]:
@@ -251,45 +247,27 @@ class Branch:
         fold, beyond = (predictor.point.at + math.copysign(x, way) for x in distances)
         return fold, beyond
 
-    def resolve_folds(self, fold: Fold) -> bool:
-        """Locate a fold more finely if its step crosses a second one; return whether it does."""
-        first, second = self._predictor.fold_distance, self._predictor.other_fold().distance
-        finest = self._resolution.finest
-        if not first < second < abs(fold.at - fold.point.at) or self.steps.finest <= finest:
-            return False
-        between = min(0.5 * (second - first), 0.5 * self.steps.finest)
-        self.steps.refine(max(between, finest))
-        return True
-
-    def after_jump(self, jump: ComputedJump) -> Point | None:
-        """Return the point after a jump with one before it, from edges that hardly moved in it.
-
-        That is from the first point of this branch since which no edge has gone further than a step
-        may predict; without one the point has none before it.
-        """
-        before, after = jump.before, jump.point
-        if before is None or after is None:
-            return after
-        longest = PREDICTED_MOTION * self._edges.wave
-        remaining = self._target.at - before.at
-        near = OTHER_MINIMUM * self._edges.wave
-        for earlier in self._passed:
-            if (before.at - earlier.at) * remaining <= 0 or len(earlier.gaps) != len(before.gaps):
-                continue
-            if np.abs(before.gaps - earlier.gaps).max() < longest:
-                return carry_previous(earlier, before, after, near)
-        return after
+    def refine(self, finest: float) -> None:
+        """Locate the fold ahead to ``finest``."""
+        self.finest = self._longest = finest
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.add(point, self._closing.between(self.point, point, self._target.branch))
         self.point, self._predictor = point, Predictor(point)
-        self.steps.forget_failures()
 
     def _next_step(self) -> float:
+        """Return the next step in d: no edge is predicted to move far, and the target not passed.
+
+        A step that leads across a fold may be shorter than the finest.
+        """
         predictor = self._predictor
         motion = LONGEST_STEP if predictor.way == 0 else PREDICTED_MOTION
-        step = self.steps.next(predictor, self._target.at, motion * self._edges.wave)
+        size = min(self._longest, predictor.reach(motion * self._edges.wave, self.finest))
+        if not predictor.fold_distance < self.finest:
+            size = max(size, self.finest)
+        left = self._target.at - self.point.at
+        step = left if size >= abs(left) else math.copysign(size, left)
         self._free_step, self._begins_to_move = step, False
         return step if self.point.pinned is None else self._step_to_kink(step, self.point.pinned)
 
@@ -298,47 +276,34 @@ class Branch:
 
         The branch has a kink there, and the state on either side belongs to the path.
         """
-        distance, finest = pinned.distance(step), self.steps.finest
+        distance, finest = pinned.distance(step), self.finest
         if not distance < abs(step) + finest:
             return step
         self._begins_to_move = True
         size = distance - finest if distance > 2 * finest else distance + finest
         return step if size >= abs(step) else math.copysign(size, step)
 
-    def _examine(self, reached: Point, step: float) -> tuple[Accepted, float] | None:
-        """Return a point as an accepted one, and how far a gap may have closed on the way.
-
-        None if the step to it is too long for the integral.
-        """
-        error = max(
-            self._trapezoid_error(self._output, reached), self._work_error(self._output, reached)
-        )
+    def _accept(self, reached: Point, step: float, error: float) -> Accepted:
         gaps, smallest = reached.gaps, self._edges.smallest
         remaining = without_small(gaps, smallest) if shortest_length(gaps) < smallest else None
         closed = self._closing.between(self.point, reached, self._target.branch)
         may_touch = self.trail.closed + closed >= self.trail.clearance or remaining is not None
         is_output = error > 1 or reached.at == self._target.at or self._begins_to_move
-        # A step that crossed a fold is not halved.
-        can_halve = abs(step) > 2 * self._resolution.finest and not self.steps.crosses_fold
-        if error > TRAPEZOID_FAR and can_halve:
-            return None
-        previous = PreviousPoint(self.point.at, self.point.rate, self.point.gaps)
-        return Accepted(reached.with_previous(previous), is_output, may_touch, remaining), closed
-
-    def _accept(self, event: Accepted, closed: float, step: float) -> None:
-        self.trail.add(event.point, closed)
-        self.point = event.point
-        self._passed.append(PreviousPoint(event.point.at, event.point.rate, event.point.gaps))
+        point = reached.with_previous(
+            PreviousPoint(self.point.at, self.point.rate, self.point.gaps)
+        )
+        self.trail.add(point, closed)
+        self.point = point
         self._work_before = (0.0, math.inf)
-        if event.is_output:
-            self._output = event.point
-        if event.point.at == self._target.at:
-            return  # no further step is taken
-        # what lies before a kink predicts nothing beyond it
-        known = event.point.with_previous(None) if self._begins_to_move else event.point
-        self._predictor = Predictor(known)
-        self._look_for_two_folds()
-        self.steps.accept(self._free_step if self._begins_to_move else step, self._predictor)
+        if is_output:
+            self._output = point
+        if point.at != self._target.at:
+            # what lies before a kink predicts nothing beyond it
+            kink = self._begins_to_move
+            self._predictor = Predictor(point.with_previous(None) if kink else point)
+            self._look_for_two_folds()
+            self._longest = STEP_GROWTH * abs(self._free_step if kink else step)
+        return Accepted(point, is_output, may_touch, remaining)
 
     def _look_for_two_folds(self) -> None:
         """Note whether two folds ahead are nearer to each other than jumps are located.
@@ -358,6 +323,10 @@ class Branch:
             edges = predictor.leading_edge, other.edge
             ways = tuple(float(np.sign(predictor.point.rate[e] * way)) for e in edges)
             self._two_folds = TwoFolds(edges, ways, predictor.point.at + way, apart)
+
+    def _error(self, output: Point, point: Point) -> float:
+        """Error of the integral since the last output, in units of what is allowed."""
+        return max(self._trapezoid_error(output, point), self._work_error(output, point))
 
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed.

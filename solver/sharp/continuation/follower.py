@@ -107,7 +107,7 @@ class Follower:
                 jump = self._handle_accepted(history, branch, event, target)
             if jump is not None:
                 history.commit(jump)
-                return jump.at, branch.after_jump(jump)
+                return jump.at, jump.point
         self._remember(history, branch, target.branch)
         return target.at, branch.point
 
@@ -169,8 +169,6 @@ class Follower:
         jump = self._nucleation_jump(branch, target)
         if jump is not None:
             return jump
-        if branch.resolve_folds(fold):
-            return None
         touched = self._touch_before_fold(fold)
         if touched is not None:
             ahead, _ = branch.fold_ahead
@@ -182,10 +180,10 @@ class Follower:
                     before = self.states.of_point(fold.point)
                     return replace(touching, states=(before, *touching.states))
         last = history.states[-1] if history.states else None
-        jump, refined = self._fold_jump(last, fold, target, branch.steps.finest)
+        jump, refined = self._fold_jump(last, fold, target, branch.finest)
         after = None if jump is None else jump.point
-        if refined < branch.steps.finest:
-            branch.steps.refine(refined)
+        if refined < branch.finest:
+            branch.refine(refined)
             return None
         goes_on = fold.at != target.at and self._is_near(fold.point, after, DESCENT_HANDS_OVER)
         if goes_on and after is not None:

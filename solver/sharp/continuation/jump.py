@@ -35,8 +35,6 @@ class ComputedJump:
     jump : Jump
     point : Point or None
         The stable point after it; None if no contact is left.
-    before : Point or None
-        The last point of the branch that it ends; None if there was none.
     misplaced : float
         Work in J/m² of nominal area by which it may be wrong, not being at its exact place.
     """
@@ -45,7 +43,6 @@ class ComputedJump:
     states: tuple[ContactState, ...]
     jump: Jump
     point: Point | None
-    before: Point | None
     misplaced: float = 0.0
 
 
@@ -184,7 +181,7 @@ class Jumps:
         if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
             at_stake = 0.0
         jump = self.states.jump(before, after, branch, at_stake, barrier)
-        return ComputedJump(at, (after,), jump, point, known)
+        return ComputedJump(at, (after,), jump, point)
 
     def _at_stake_beyond(
         self, before: ContactState, point: Point | None, orders: Orders

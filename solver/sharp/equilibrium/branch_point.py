@@ -7,11 +7,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from adhesis.solver.model.profile import Array, Integers
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import move_edges, outward
-
-ALL_EDGES = slice(None)
 
 
 class PreviousPoint(NamedTuple):
@@ -102,10 +100,8 @@ class Point:
         point.__dict__[name] = value
         return point
 
-    def fold_displacement(
-        self, change: Array, by_prescribed: Array, edges: Integers | slice = ALL_EDGES
-    ) -> float:
-        """Estimate how far in d the next fold moves when the openings C of given edges change.
+    def fold_displacement(self, change: Array, by_prescribed: Array) -> float:
+        """Estimate how far in d the next fold moves when the openings C change.
 
         At a fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
         vector. Scaled by sqrt(C_e/C_f) it is symmetric, so its left null vector is
@@ -115,11 +111,8 @@ class Point:
         ----------
         change, by_prescribed : array, shape (2L,)
             δC, and ∂C/∂d at fixed edges.
-        edges : int array, optional
-            Those that both are of. The others then follow: a Schur complement has the same null
-            vectors.
         """
-        left = (self.field.opening.ravel() * self.rate)[edges]
+        left = self.field.opening.ravel() * self.rate
         if not left.any():
             return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))

@@ -15,7 +15,6 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from adhesis.solver.model.jump import Branch
-from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -23,7 +22,6 @@ from adhesis.solver.sharp.tolerances import (
     BISECTION_AFTER,
     CLOSING_BY_MOTION,
     LONGEST_STEP,
-    TRIAL_FROM_END,
 )
 
 Seed = TypeVar("Seed")
@@ -68,71 +66,9 @@ class Criterion(Protocol[Seed]):
         """
         ...
 
-    def track_between(self, clear: Point, hit: Point) -> ClearanceInterpolation | None:
-        """Track each value that changes sign between two points by itself, or return None."""
-        ...
-
     def validate_location(self, value: float, at: float) -> None:
         """Raise if a point located at d = ``at`` with this value cannot be used."""
         ...
-
-
-class ClearanceInterpolation:
-    """Interpolation of the clearances of gaps that overlap at one end of a stretch of a branch.
-
-    Parameters
-    ----------
-    clear, hit : float
-        d where all of them are clear, and where all overlap.
-    before, after : array, shape (gaps,)
-        Their clearances there.
-    clearances_of : callable
-        Computes their clearances in another field.
-    """
-
-    def __init__(
-        self,
-        clear: float,
-        hit: float,
-        before: Array,
-        after: Array,
-        clearances_of: Callable[[GapField], Array],
-    ) -> None:
-        self._at = [clear, hit]
-        self._values = [before, after]
-        self._clearances_of = clearances_of
-
-    def record(self, at: float, field: GapField) -> None:
-        """Record the clearances in a field at d = ``at``."""
-        self._at.append(at)
-        self._values.append(self._clearances_of(field))
-
-    def next_trial(self, clear: float, hit: float, wanted: float) -> float:
-        """Return the share of the way from ``clear`` to ``hit`` at which to try next.
-
-        There a gap first has the clearance ``wanted``, by a parabola through the clearances at both
-        ends and at the nearest third d that was recorded.
-        """
-        low, high = self._at.index(clear), self._at.index(hit)
-        way = hit - clear
-        begin, end = self._values[low], self._values[high]
-        sound = (begin > wanted) & (end < wanted) & (begin < np.inf)
-        if not sound.any():
-            return 0.5
-        begin, end = begin[sound], end[sound]
-        slope = end - begin
-        bend = np.zeros(slope.shape)
-        others = [i for i in range(len(self._at)) if i not in (low, high)]
-        if others:
-            third = min(others, key=lambda i: abs(self._at[i] - 0.5 * (clear + hit)))
-            t = (self._at[third] - clear) / way
-            bend = (self._values[third][sound] - begin - slope * t) / (t * (t - 1))
-        # begin + slope t + bend t (t - 1) = wanted: between 0 and 1 there is one root
-        b, c = slope - bend, begin - wanted
-        root = np.sqrt(np.maximum(b * b - 4 * bend * c, 0.0))
-        share = 2 * c / (root - b)
-        first = float(np.where(np.isfinite(share), share, c / -slope).min())
-        return min(max(first, TRIAL_FROM_END), 1 - TRIAL_FROM_END)
 
 
 def secant_share(clear_value: float, hit_value: float, tolerance: float) -> float:
@@ -148,13 +84,7 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
     reach = LONGEST_STEP * edges.wave
 
     def solve(clear: Point, hit: Point, at: float) -> Point | None:
-        gaps = clear.interpolate(hit, at)
-        point = edges.equilibrium(gaps, at, reach, memory=clear.gaps)
-        near = abs(at - clear.at) < abs(hit.at - at)
-        for start in (clear, hit) if near else (hit, clear):
-            if point is None:
-                point = edges.equilibrium(start.extrapolate(at), at, reach, memory=clear.gaps)
-        return point
+        return edges.equilibrium(clear.interpolate(hit, at), at, reach, memory=clear.gaps)
 
     return solve
 
@@ -200,16 +130,13 @@ def locate(
     # Each trial is expensive: the values at both ends show where to begin.
     if low == 0 and clearance > 0:
         clear_value = clearance
-    tracked = criterion.track_between(clear, hit)
     cleared = 0  # trials one after the other that were clear
-    for trials in range(1, sys.float_info.mant_dig + 1):
+    for _ in range(sys.float_info.mant_dig):
         if criterion.is_located(hit_value, abs(clear.at - hit.at) <= resolution):
             break
         share = 0.5
-        if tracked is not None and trials % BISECTION_AFTER:
-            share = tracked.next_trial(clear.at, hit.at, -0.2 * criterion.tolerance)
         # The least value may be that of another candidate than the hit: then a secant creeps.
-        elif tracked is None and np.isfinite(clear_value) and cleared < BISECTION_AFTER:
+        if np.isfinite(clear_value) and cleared < BISECTION_AFTER:
             share = secant_share(clear_value, hit_value, criterion.tolerance)
         trial = clear.at + (hit.at - clear.at) * share
         if trial in (clear.at, hit.at):  # there its value differs by the error of the field
@@ -218,8 +145,6 @@ def locate(
         if point is None:
             break
         value, candidates = criterion.minimum(point.field)
-        if tracked is not None:
-            tracked.record(trial, point.field)
         cleared = cleared + 1 if value > 0 else 0
         if value > 0:
             clear, clear_value = point, value

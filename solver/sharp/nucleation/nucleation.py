@@ -24,8 +24,6 @@ import numpy as np
 from adhesis.solver._kernels import (
     SearchedGaps,
     SearchLengths,
-    clearance_left,
-    least_clearances,
     search,
 )
 from adhesis.solver.crack import (
@@ -37,12 +35,10 @@ from adhesis.solver.crack import (
 )
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
-from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import ClearanceInterpolation
 from adhesis.solver.sharp.tolerances import OVERLAP, TRIAL_WIDTHS
 
 
@@ -209,24 +205,6 @@ class Nucleation:
         """Raise if surfaces overlap at the touch that was located."""
         if value < -self.tolerance - self.range and self.edges.critical > 0:
             raise NoState("surfaces overlap, and no first touch is found", at)
-
-    def _clearance_of(self, field: GapField, indices: Integers) -> Array:
-        """Compute the clearance of each of some gaps."""
-        self.edges.count.openings += len(indices)
-        return least_clearances(field.solution, indices, self._lengths)
-
-    def track_between(self, clear: Point, hit: Point) -> ClearanceInterpolation | None:
-        """Track the gaps that are open at one point and overlap at another."""
-        remaining = clearance_left(hit.field.solution, self.searched, self._lengths)
-        closed = np.flatnonzero(remaining <= 0)
-        after = self._clearance_of(hit.field, closed)
-        closed, after = closed[after < 0], after[after < 0]
-        if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:
-            return None
-        before = self._clearance_of(clear.field, closed)
-        return ClearanceInterpolation(
-            clear.at, hit.at, before, after, lambda field: self._clearance_of(field, closed)
-        )
 
     def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:
         """Return the gaps with a seed patch at each touch."""

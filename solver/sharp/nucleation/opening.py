@@ -24,7 +24,6 @@ from adhesis.solver.crack import (
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
-from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 from adhesis.solver.sharp.gap.ends import with_gaps
@@ -111,9 +110,6 @@ class Openings:
         A maximum may appear with a tension above the strength: then no point of the branch is.
         """
         return near or value > -0.5 * self.tolerance
-
-    def track_between(self, clear: Point, hit: Point) -> None:
-        """Track no maximum by itself."""
 
     def validate_location(self, value: float, at: float) -> None:
         """Accept every point: see :meth:`is_located`."""
