@@ -198,14 +198,14 @@ def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, 
 def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     """The whole of ``adhesis validate``; of grid, without --slow, a part of the long claims.
 
-    A trough that opens is in test_opening.py, a stiffness and a load in test_control_loops.py, and
-    the audit of a rough loop in test_grid.py.
+    A stiffness and a load are in test_control_loops.py, and the audit of a rough loop in
+    test_grid.py.
     """
     alphas = validation.ALPHAS
     if name == "grid" and not request.config.getoption("--slow"):
         alphas = (0.05, 0.6)
         monkeypatch.setattr(validation, "ALPHAS", alphas)
-        elsewhere = (validation.controls, validation.opening, validation.audit)
+        elsewhere = (validation.controls, validation.audit)
         kept = tuple(claim for claim in validation.CLAIMS if claim not in elsewhere)
         monkeypatch.setattr(validation, "CLAIMS", kept)
     code = main(["validate", "--method", name, "--json"])
