@@ -52,6 +52,11 @@ def test_the_exact_method_keeps_every_bound_of_the_wave(judged):
     assert max(row.error for row in drops) < 1e-9  # the difference of the measures: 3e-11
 
 
+def test_a_grid_has_no_claim_about_a_strength(monkeypatch):
+    monkeypatch.setattr(validation, "CLAIMS", (validation.opening,))
+    assert validate(("grid",)) == []  # it refuses a range of adhesion
+
+
 class _Shifted(ExactWave):
     """Edges 1e-4 λ too far out, everything else exact."""
 
@@ -198,14 +203,14 @@ def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, 
 def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     """The whole of ``adhesis validate``; of grid, without --slow, a part of the long claims.
 
-    A stiffness and a load are in test_control_loops.py, and the audit of a rough loop in
-    test_grid.py.
+    A trough that opens is in test_opening.py, a stiffness and a load in test_control_loops.py, and
+    the audit of a rough loop in test_grid.py.
     """
     alphas = validation.ALPHAS
     if name == "grid" and not request.config.getoption("--slow"):
         alphas = (0.05, 0.6)
         monkeypatch.setattr(validation, "ALPHAS", alphas)
-        elsewhere = (validation.controls, validation.audit)
+        elsewhere = (validation.controls, validation.opening, validation.audit)
         kept = tuple(claim for claim in validation.CLAIMS if claim not in elsewhere)
         monkeypatch.setattr(validation, "CLAIMS", kept)
     code = main(["validate", "--method", name, "--json"])
