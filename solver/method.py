@@ -1,4 +1,4 @@
-"""Interface of a method, and the contact states that it returns.
+"""Interface of a method, and what it returns.
 
 A method finds equilibrium contact states of one :class:`~adhesis.solver.model.problem.Problem`. The
 loading path, the energy audit and the catalogue of jumps (:mod:`adhesis.solver.loading.loop`,
@@ -13,14 +13,14 @@ To add a method, subclass :class:`Method` and keep these promises:
     The direction is free: s below the state's separation loads, above it unloads, and at the same
     separation the state only settles (first touch at s = h_max is such a case).
 3.  The path obeys the rules of evolution (docs/methods.md): contact nucleates only where surfaces
-    touch; it grows and recedes by energy descent at fixed separation, never over an energy
-    maximum, never leaping over a neighbouring minimum; inside a patch nothing opens unless the
-    tension reaches a finite strength (``Problem.strength``); gaps may close, patches merge and
-    vanish.
+    touch, or come as near as adhesion reaches (``Problem.attraction_range``); it grows and recedes
+    by energy descent at a fixed prescribed value, never over an energy maximum, never leaping over
+    a neighbouring minimum; inside a patch nothing opens unless the tension reaches a finite
+    strength (``Problem.strength``); gaps may close, patches merge and vanish.
 4.  Where the path jumps, ``follow`` returns the states just before and just after, both at the
     separation of the jump as the method located it, and a :class:`~adhesis.solver.model.jump.Jump`
     whose energy drop is computed from the two energies, not from the load curve. Outside jumps the
-    states are dense enough for the trapezoidal rule.
+    states are dense enough for the rule of :mod:`adhesis.solver.loading.ledger`.
 5.  Same input, same bits: no clocks, no unseeded random numbers, no threads.
 6.  A state is immutable; ``follow`` may be called again from an older state (partial loops).
 7.  Every returned state lies on the path, and surfaces do not overlap in it: no gap is narrower
@@ -82,7 +82,7 @@ class Path(ByValue):
     Attributes
     ----------
     states : tuple of ContactState
-        In the order of the visit, the last one at the prescribed separation.
+        In the order of the visit, the last one at the prescribed value.
     jumps : tuple of Jump
         In the same order.
     error : float

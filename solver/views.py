@@ -82,8 +82,8 @@ class ResultViews(NotebookDisplay):
             states before and after each jump, those with the largest energy drops first, up to
             1000 frames in all.
         progress : bool or callable, optional
-            True shows a bar; a callable is called with the number of frames that are drawn and
-            that of all.
+            True shows a bar on a terminal, and lines elsewhere; a callable is called with the
+            number of frames that are drawn and that of all.
 
         Returns
         -------

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run",
         action="store_true",
-        help="estimate the cost from a minute of pilot loops at most, and write nothing",
+        help="estimate the cost from about a minute of pilot loops, and write nothing",
     )
     parser.add_argument(
         "--part",

@@ -114,7 +114,7 @@ def _rows(shown: Any) -> list[tuple[str, str]]:
 
 @contextmanager
 def progress_bar(top: float, load: bool) -> Iterator[Progress]:
-    """Show a bar on stderr, or in the notebook, while a loop or path is followed.
+    """Show a bar on a terminal, and lines elsewhere, while a loop or path is followed.
 
     It is full at the turning point ``top``; unloading has no end that is known ahead.
     """

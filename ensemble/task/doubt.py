@@ -2,7 +2,8 @@
 
 A loop has two estimates of its error: the audit compares the loop integral with the sum of the
 energy drops, and ``loss_error`` is the estimated numerical error of both. The latter was compared
-with actual errors (docs/methods.md, "Error of the loss"), and is used without a safety factor.
+with actual errors (docs/methods.md, "How far the reported error holds"), and is used without a
+safety factor.
 """
 
 from __future__ import annotations

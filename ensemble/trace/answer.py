@@ -358,7 +358,7 @@ def loss_of_trace(
     processes : int, optional
         Side by side; without it one for each core, 0 for none beside this one.
     progress : bool
-        Whether a bar shows how many of the loops are done, in a terminal or notebook.
+        Whether a bar on a terminal, or lines elsewhere, show how many of the loops are done.
     watch : callable, optional
         Called with the :class:`~adhesis.ensemble.trace.loops.Loops` about once a second.
 

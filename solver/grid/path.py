@@ -14,8 +14,8 @@ from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 
-# Relative error of a loss times the number of nodes in the first equilibrium width on a crest of
-# rms curvature: larger in one of a hundred rough loops (docs/methods.md).
+# Relative error of a drop times the number of nodes in the first equilibrium width on a crest of
+# rms curvature. How often the estimate holds: docs/methods.md, "How far the reported error holds".
 _COARSE = 0.6
 # Drop of a patch that comes or goes, over γ times that width: 0.6 on a parabola, and more where
 # surfaces that touch are flatter than crests are.

@@ -1,7 +1,7 @@
 // Response of one gap and its two edges to the potential of the others.
 //
-// A moving edge leaves a singular opening. The edge's own term follows from
-// the translation of the whole gap through its own loads and the potential of the others.
+// A moving edge leaves a singular opening. The edge's own term follows from the translation of the
+// whole gap through its own loads and the potential of the others.
 #include "response.hpp"
 
 namespace adhesis {

@@ -72,7 +72,7 @@ inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& pa
   return evaluate_series(panels.half_plane[side], theta, panels);
 }
 
-// Compute the moments of S, and with two columns of S', over a gap; see gap_moments.cpp.
+// Compute the moments of S, with two fields also of S', over a gap; see gap_moments.cpp.
 //
 // `s` has `fields` rows and a column for each mode, `ends` both loads of each field:
 // ends[side][field].

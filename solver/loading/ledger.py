@@ -97,7 +97,7 @@ adhesion_energy, edge_friction
         return cls(stored, works, works + lost_load, losses, friction)
 
     def part(self, first: int, stop: int) -> Ledger:
-        """Return the ledger of the states from index ``first`` up to ``stop``."""
+        """Return the ledger of the states from index ``first`` to the one before ``stop``."""
         between = slice(first, stop - 1)
         rest = (self.works, self.displaced, self.losses, self.friction)
         return Ledger(self.stored[first:stop], *(column[between] for column in rest))

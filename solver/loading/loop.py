@@ -48,7 +48,7 @@ def run_loop(
         Equal steps of the loading branch, with a preload up to the latest turning point; unloading
         uses the same step.
     progress : callable or bool, optional
-        True shows a bar, in a terminal or notebook; a function is called as
+        True shows a bar on a terminal, and lines elsewhere; a function is called as
         :data:`adhesis.solver.loading.path_record.Progress` says.
     on_state : callable, optional
         Called with every state of the path, in order (for fields at chosen penetrations).
@@ -249,7 +249,7 @@ def run_loops(
         Equal steps up to the largest, or latest, turning point; unloading branches use the same
         step.
     progress : callable or bool, optional
-        True shows a bar, in a terminal or notebook; a function is called as
+        True shows a bar on a terminal, and lines elsewhere; a function is called as
         :data:`adhesis.solver.loading.path_record.Progress` says.
 
     Returns

@@ -45,7 +45,7 @@ _FARTHEST = 1e7
 def progress_of(
     progress: Progress | bool | None, top: float, control: Control
 ) -> Iterator[Progress | None]:
-    """Return the function to call after each load step: the given one, or for True a bar.
+    """Return the function to call after each load step: the given one, or for True a bar's.
 
     Parameters
     ----------

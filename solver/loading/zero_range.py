@@ -26,8 +26,8 @@ the sum over the jumps in which a patch appears or a gap closes.
 
 A loop of a finite range has earlier touches in it, and its ``touch_range`` is infinite.
 
-So does a jump of loading that lies just beyond the turning point: it comes before it, and the loop
-is that of a deeper one. Within
+A jump of loading that lies just beyond the turning point comes before it likewise, and the loop is
+that of a deeper one. Within
 
     turn_range
 

@@ -27,7 +27,8 @@ class ContactState(ByValue):
     mean_stress : float
         p̄ in Pa, compression positive.
     elastic_energy, adhesion_energy : float
-        ½∫σ(h - s)dx and -γ∫sqrt(1 + h'²)dx over the contact of one period, in J/m.
+        ½∫σ(h - s)dx and -∫γ sqrt(1 + h'²)dx over the contact of one period, in J/m; in the flat
+        measure without the root (:meth:`~adhesis.solver.model.problem.Problem.toughness`).
     contact_fraction : float
         A/A0.
     stiffness : float

@@ -45,7 +45,7 @@ class Control(NotebookDisplay):
     Raises
     ------
     ValueError
-        If the stiffness is negative or NaN.
+        If the stiffness is none of 0, infinity, and 1e-30 to 1e30.
     TypeError
         If it is not a number.
 

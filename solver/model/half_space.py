@@ -59,6 +59,8 @@ class HalfSpace(NotebookDisplay):
         ValueError
             If d is out of its bounds, or ν = 0.5: an incompressible layer that cannot spread is
             rigid.
+        TypeError
+            If d is not a number.
         """
         thickness = real("thickness", thickness, LENGTH)
         nu = self.poisson

@@ -114,12 +114,13 @@ class Problem(ByValue):
     Raises
     ------
     ValueError
-        If γ or the strength is out of bounds, both strength and range are given, or a strength or
-        γ = 0 beside a pattern, the strength is so low that Griffith's crack at that tension is
-        longer than a quarter of the shortest wave, or the rms slope is far beyond small strain, as
-        it is when heights and period have different units.
+        If γ, γ_open, the strength or the range is out of bounds, or the measure is unknown; γ_open
+        is below γ, or positive where γ = 0; both strength and range are given; one of them stands
+        beside a larger γ_open or a pattern; a pattern is given where γ = 0; the strength is so low
+        that Griffith's crack at that tension is longer than a quarter of the shortest wave; or the
+        rms slope is far beyond small strain, as it is when heights and period have different units.
     TypeError
-        If a part is of another class, or γ not a number.
+        If a part is of another class, or a value not a number.
 
     References
     ----------
@@ -223,7 +224,7 @@ class Problem(ByValue):
 
     @property
     def mirror_axes(self) -> Array:
-        """Places x in m about which heights and work of adhesion are mirror images; λ/2 apart."""
+        """Places x in m, from 0 to λ/2, about which heights and work of adhesion are mirrored."""
         axes = self.profile.mirror_axes
         return axes[self.pattern.is_mirrored(self.profile.q0 * axes)] if self.pattern else axes
 

@@ -75,8 +75,6 @@ class Standard:
         Relative error of the elastic solution between given edges.
     loss, loop_integral : float
         Relative error of the loss from the sum of drops, and from the trapezoidal rule.
-    tension : float
-        Share of the strength to which the tension is located at which a patch opens.
     """
 
     accuracy: float
@@ -85,7 +83,6 @@ class Standard:
     stress: float
     loss: float
     loop_integral: float
-    tension: float
 
     @property
     def resolution(self) -> str:
@@ -94,10 +91,8 @@ class Standard:
 
 
 STANDARDS: dict[MethodName, Standard] = {
-    "grid": Standard(
-        1e-4, GRIDS[-1], 1 / GRIDS[-1], 1e-6, loss=5e-3, loop_integral=5e-3, tension=1e-3
-    ),
-    "sharp": Standard(1e-8, None, 1e-6, 1e-9, loss=1e-8, loop_integral=1e-5, tension=2e-5),
+    "grid": Standard(1e-4, GRIDS[-1], 1 / GRIDS[-1], 1e-6, loss=5e-3, loop_integral=5e-3),
+    "sharp": Standard(1e-8, None, 1e-6, 1e-9, loss=1e-8, loop_integral=1e-5),
 }
 METHODS: tuple[MethodName, ...] = tuple(STANDARDS)
 

@@ -52,6 +52,11 @@ def test_the_exact_method_keeps_every_bound_of_the_wave(judged):
     assert max(row.error for row in drops) < 1e-9  # the difference of the measures: 3e-11
 
 
+def test_a_grid_has_no_claim_about_a_strength(monkeypatch):
+    monkeypatch.setattr(validation, "CLAIMS", (validation.opening,))
+    assert validate(("grid",)) == []  # it refuses a range of adhesion
+
+
 class _Shifted(ExactWave):
     """Edges 1e-4 λ too far out, everything else exact."""
 

@@ -11,7 +11,8 @@ from adhesis.ensemble.quantities import length_text
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
 
-# Positions may scatter about equal steps by this share of a step; heights are then interpolated.
+# Positions within this share of a step of equal ones are taken as these. Where they drift further,
+# but no step differs by more than this share, heights are interpolated.
 _UNEVEN = 0.10
 # Positions that are printed in whole multiples of a digit may be rounded: at least so many of their
 # steps differ from the others (one or two are rows left out), the step is at least this share of a
