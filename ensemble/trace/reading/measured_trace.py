@@ -318,6 +318,8 @@ def load_array(source: Source) -> Array:
 
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
+    if checks.carries_unit(values):
+        raise TypeError(f"{name} carries a unit, which would be lost: give plain numbers")
     try:
         array = np.ma.asarray(values)
     except ValueError as error:
