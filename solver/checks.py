@@ -179,8 +179,7 @@ def shown(value: object) -> str:
     """Return the repr of a value on one line, shortened for a message."""
     if isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and np.ma.is_masked(value):
         return "masked"
-    is_scalar = isinstance(value, np.generic | np.ndarray) and value.ndim == 0
-    if is_scalar and not carries_unit(value):
+    if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 and not carries_unit(value):
         value = value.item()
     try:
         text = repr(value)
