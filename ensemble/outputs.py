@@ -225,9 +225,10 @@ def write_new(option: str, path: Path, content: Callable[[], bytes]) -> None:
     check_outputs({option: path}, {})
     if os.path.isfile(path):
         raise InputError(f"{option} is {path}, which exists: give another name")
+    data = content()  # first: a signal while it loads modules leaves no part of a file
     writing = Writing()
     with writing.output(option, path), whole_file(path) as stream:
-        stream.write(content())
+        stream.write(data)
     writing.finish()
     print(f"wrote       {path}")
 
