@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
 _MOST_LINKS = 40  # of a chain, as of Linux
 _NEW_TERMINAL = os.makedev(5, 2)  # /dev/ptmx: opening it makes a terminal
+# Files and folders that are being written, for a signal that ends the process at once.
+_unfinished: set[Path] = set()
 _STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
 
 
@@ -210,6 +212,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
             yield file
         return
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=".writing-")
+    _unfinished.add(Path(name))
     try:
         with os.fdopen(handle, "wb") as file:
             yield file
@@ -218,6 +221,8 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+    finally:
+        _unfinished.discard(Path(name))
 
 
 def write_new(option: str, path: Path, content: Callable[[], bytes]) -> None:
@@ -225,9 +230,10 @@ def write_new(option: str, path: Path, content: Callable[[], bytes]) -> None:
     check_outputs({option: path}, {})
     if os.path.isfile(path):
         raise InputError(f"{option} is {path}, which exists: give another name")
+    data = content()  # first: a signal while it loads modules leaves no part of a file
     writing = Writing()
     with writing.output(option, path), whole_file(path) as stream:
-        stream.write(content())
+        stream.write(data)
     writing.finish()
     print(f"wrote       {path}")
 
@@ -258,6 +264,7 @@ def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(dir=folder, prefix=".writing-"))
+    _unfinished.add(staging)
     spare = os.open(staging, os.O_RDONLY)  # to empty it by, where no more files may be opened
     try:
         yield staging
@@ -269,9 +276,21 @@ def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
     finally:
         os.close(spare)
         with suppress(OSError):  # shutil.rmtree opens several files
-            for path in staging.iterdir():
-                path.unlink()
-            staging.rmdir()
+            _remove_folder(staging)
+        _unfinished.discard(staging)
+
+
+def _remove_folder(folder: Path) -> None:
+    for path in folder.iterdir():
+        path.unlink()
+    folder.rmdir()
+
+
+def remove_unfinished() -> None:
+    """Remove what is being written, before a signal ends the process."""
+    for path in _unfinished:
+        with suppress(OSError):
+            _remove_folder(path) if path.is_dir() else path.unlink()
 
 
 def _umask() -> int:

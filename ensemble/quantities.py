@@ -157,7 +157,7 @@ LENGTH = Quantity(
             "mm": "millimeter millimeters millimetre millimetres",
             "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer",
             "nm": "nanometer nanometers nanometre nanometres",
-            "Å": "a angstrom angstroms ångström",
+            "Å": "a angstrom angstroms ångström angström angstroem",
             "inch": "in inches",
             "mil": "mils thou",
             "µin": "uin uinch µinch microinch microinches",

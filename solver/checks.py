@@ -179,7 +179,7 @@ def shown(value: object) -> str:
     """Return the repr of a value on one line, shortened for a message."""
     if isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and np.ma.is_masked(value):
         return "masked"
-    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+    if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 and not carries_unit(value):
         value = value.item()
     try:
         text = repr(value)
@@ -192,11 +192,21 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
 
 
+def carries_unit(value: object) -> bool:
+    """Return whether a value is a number or array with a unit, which NumPy would drop."""
+    # The attributes of a table are its columns.
+    owner = value if isinstance(value, np.ndarray) else type(value)
+    return hasattr(owner, "units") or hasattr(owner, "unit")
+
+
 def number_of(value: object) -> float | int | None:
     """Convert a real number, NumPy scalars included, to int or float; None for anything else.
 
-    A bool is not a number here. A fraction too large for a float gives NaN.
+    Neither a bool nor an object that carries a unit, as "1 MPa" of astropy or pint, is a number
+    here. A fraction too large for a float gives NaN.
     """
+    if carries_unit(value):
+        return None
     if isinstance(value, np.ndarray):  # np.ma takes time to load, and is not needed for others
         if value.ndim > 0 or np.ma.is_masked(value):
             return None
@@ -332,6 +342,8 @@ def row(
     """
     if isinstance(values, str | bytes | Mapping | set | frozenset) or values is None:
         raise TypeError(_sentence(name, values, "a row of numbers"))
+    if carries_unit(values):
+        raise TypeError(_with_unit(name))
     if not hasattr(values, "__array__") and not isinstance(values, list | tuple):
         if not isinstance(values, Iterable):
             raise TypeError(_sentence(name, values, "a row of numbers"))
@@ -379,6 +391,8 @@ def reals(name: str, values: object) -> NDArray[np.float64]:
     ValueError
         If an entry is masked, or rows differ in length.
     """
+    if carries_unit(values):
+        raise TypeError(_with_unit(name))
     if np.ma.is_masked(values):
         raise ValueError(f"{name} holds masked values: every value must be given")
     try:
@@ -403,6 +417,10 @@ def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np
 
 def _is_bool(value: object) -> TypeGuard[bool | np.bool_]:
     return isinstance(value, bool | np.bool_)
+
+
+def _with_unit(name: str) -> str:
+    return f"{name} carries a unit, which would be lost: convert it to SI units, and give numbers"
 
 
 def _sentence(name: str, value: object, rule: str) -> str:

@@ -21,6 +21,7 @@ from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
+from adhesis.solver.model.pattern import stripes_of
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.registry import check_law, check_nodes
@@ -222,6 +223,7 @@ def _check_together(campaign: Campaign) -> None:
             "[material] gives adhesion_range and strength: at most one of them can be "
             "given, strength = work_of_adhesion/adhesion_range"
         )
+    _check_stripes(campaign)
     pins, solver = _check_open(campaign), campaign.solver
     try:
         check_law(solver.method, solver.nodes_per_wave, pins=pins, has_range=material.opens)
@@ -277,6 +279,18 @@ def _check_together(campaign: Campaign) -> None:
             f"[cycle] unloading_until is {cycle.unloading_until}: with these load steps "
             f"the unloading curve has {length:.6g} values, and at most {_LONGEST_AXIS} are allowed"
         )
+
+
+def _check_stripes(campaign: Campaign) -> None:
+    """Check that stripes have number and amplitude, and adhesion without a range to vary."""
+    material = campaign.material
+    try:
+        pattern = stripes_of(material.stripes, material.stripe_amplitude, material.stripe_phase)
+    except ValueError as error:
+        raise InputError(f"[material] {error}") from None
+    beside = "a strength or range" if material.opens else "a work of adhesion of 0"
+    if pattern is not None and (material.opens or 0 in campaign.sweep.work_of_adhesion):
+        raise InputError(f"[material] stripes is given beside {beside}: leave one of them out")
 
 
 def _check_open(campaign: Campaign) -> bool:

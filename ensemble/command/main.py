@@ -151,6 +151,9 @@ def _interrupts(name: str) -> Iterator[None]:
         nonlocal received
         received = number
         if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f, _ in walk_stack(frame)):
+            outputs = sys.modules.get("adhesis.ensemble.outputs")
+            if outputs is not None:
+                outputs.remove_unfinished()
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
         if number == signal.SIGINT:

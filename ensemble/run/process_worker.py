@@ -59,7 +59,10 @@ def main() -> None:
     incoming = sys.stdin.buffer
     with os.fdopen(os.dup(1), "wb") as outgoing:
         os.dup2(2, 1)  # stdout carries messages alone
-        compute, task_seconds, report_interval = pickle.load(incoming)
+        try:
+            compute, task_seconds, report_interval = pickle.load(incoming)
+        except EOFError:
+            return  # the parent has gone before it sent anything
         limits = Limits(task_seconds=task_seconds, report_interval=report_interval)
         channel = Pipes(int(sys.argv[1]), incoming, outgoing)
         Worker(channel, compute, lambda outcome: outcome, limits).run()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.quantities import length_text, percent
 from adhesis.ensemble.trace.reading.measured_trace import MIN_POINTS, Trace
-from adhesis.ensemble.trace.single_features import Feature, single_features
+from adhesis.ensemble.trace.single_features import Feature, excluding, single_features
 from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, number_of, real, whole
 from adhesis.solver.model.measured_profile import (
     Continuation,
@@ -37,6 +37,9 @@ _LENGTH_OR_NONE = Bounds(0.0, LENGTH.high, unit="m")
 # deviations. More than this share of the heights are no spikes.
 _SIDE, _SPIKE = 4, 10.0
 _MAX_SPIKES = 0.01
+# So many equal heights in a row were not measured, if at most this share of all others are equal to
+# their neighbours: an instrument held or cut them off.
+_HELD, _EQUAL = 5, 0.01
 # Gaps are interpolated up to this length: number of steps, or share of the trace if that is more.
 _GAP_STEPS, _GAP_SHARE = 5, 0.01
 # Share of heights that may be missing in all.
@@ -226,6 +229,7 @@ def prepare_trace(
     heights[excluded] = np.nan
     heights, first = _without_ends(work, heights)
     excluded, start = excluded[first : first + heights.size], first * trace.step
+    _warn_of_held(work, heights, start)
     if not keep_outliers:
         heights = _without_outliers(work, heights)
     filled, gaps = _filled(work, heights, excluded, start, longest_gap)
@@ -334,6 +338,24 @@ def _without_ends(work: _Work, heights: Array) -> tuple[Array, int]:
         described = f"cut off where heights are missing: {lost}"
         work.note("ends", described, points=lost, length=lost * work.trace.step)
     return heights[first:last], first
+
+
+def _warn_of_held(work: _Work, heights: Array, start: float) -> None:
+    """Warn of the longest row of equal heights, where hardly two neighbours are equal elsewhere."""
+    same = np.diff(heights) == 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
+    begins, counts = edges[::2], edges[1::2] - edges[::2] + 1
+    held = counts >= _HELD
+    if not held.any() or (counts[~held] - 1).sum() > _EQUAL * heights.size:
+        return
+    k = int(np.argmax(counts))
+    begin = start + float(begins[k]) * work.trace.step
+    end = begin + float(counts[k] - 1) * work.trace.step
+    work.warnings.append(
+        f"{counts[k]} heights in a row from {length_text(begin)} on are equal, as hardly two "
+        "others are: they may be cut off at the range of the instrument, or held where nothing was "
+        f"measured; if so, leave them out: {excluding(begin, end)}"
+    )
 
 
 def _without_outliers(work: _Work, heights: Array) -> Array:

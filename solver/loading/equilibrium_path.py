@@ -584,9 +584,15 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
 def with_turn_range(result: PathOrLoop, record: Record, started: float) -> PathOrLoop:
     """Return a result with its ``turn_range``, which is sought as far as the other ranges reach.
 
-    ``started`` is the first CPU time of the path, in s.
+    It is zero where jumps lie nearer beyond a turn than their places are known: these may come
+    before it. ``started`` is the first CPU time of the path, in s.
     """
     problem = result.problem
     step = problem.prescribed(0.0) - problem.prescribed(record.axis.step)
     found = turn_range(record.method, record, step, result.lost, result.least_range)
+    # A jump that comes by δ too late changes the loss by δ times its change of the mean stress.
+    at_jumps = np.diff(result.separation) == 0
+    sizes = float(np.abs(np.diff(result.mean_stress))[at_jumps].sum())
+    if problem.control.is_fixed and found * sizes < result.loss_error:
+        found = 0.0
     return replace(result, turn_range=found, seconds=process_time() - started)

@@ -255,6 +255,31 @@ def test_a_signal_while_modules_are_loaded_ends_the_process_as_itself(module, nu
     assert (done.returncode, done.stderr) == (-number, b"")
 
 
+def test_a_signal_while_modules_are_loaded_leaves_no_part_of_an_output(tmp_path):
+    """Figures load modules while a report is written."""
+    code = (
+        "import os, sys\n"
+        "from pathlib import Path\n"
+        "from adhesis.ensemble.command import status\n"
+        "from adhesis.ensemble.command.main import main\n"
+        "from adhesis.ensemble.outputs import staged_folder, whole_file\n"
+        "class Finder:\n"
+        "    def find_spec(name, *_):\n"
+        f"        os.kill(os.getpid(), {int(signal.SIGTERM)})\n"
+        "def execute(args):\n"
+        "    with staged_folder(Path('.')) as staging, whole_file(Path('a.txt')):\n"
+        "        (staging / 'figure.png').touch()\n"
+        "        sys.meta_path.insert(0, Finder)\n"
+        "        import colorsys\n"
+        "status.execute = execute\n"
+        "sys.exit(main(['status', 'r.h5']))\n"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, stderr=subprocess.PIPE, env=environment())
+    assert (done.returncode, done.stderr) == (-signal.SIGTERM, b"")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatch):
     """Python drops what is raised there; a command waits for ever where the signal is lost."""

@@ -17,7 +17,13 @@ from matplotlib.figure import Figure
 import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json
+from adhesis.ensemble.outputs import (
+    check_outputs,
+    staged_folder,
+    whole_file,
+    write_json,
+    write_new,
+)
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.single_wave import SingleWave
@@ -138,6 +144,17 @@ def test_a_pipe_that_takes_the_place_of_an_output_is_not_waited_for(tmp_path: Pa
         pass
     os.close(reader)
     assert pipe.is_fifo()
+
+
+def test_nothing_is_opened_while_the_content_of_a_new_file_is_made(tmp_path: Path) -> None:
+    """A signal that comes while a module is loaded ends the process at once."""
+
+    def content() -> bytes:
+        assert list(tmp_path.iterdir()) == []
+        return b"new"
+
+    write_new("FILE", tmp_path / "a.txt", content)
+    assert (tmp_path / "a.txt").read_bytes() == b"new"
 
 
 def test_staged_files_are_moved_together_or_not_at_all(tmp_path: Path) -> None:

@@ -48,6 +48,7 @@ def put(path: Path, text: str | Iterable[str] | bytes, encoding: str = "utf-8") 
 
 
 Options = dict[str, object]
+Z_UM: Options = {"unit": "um", "step": STEP}
 # Other encodings, delimiters, quotes, blanks and headers: test_trace_variations.py.
 READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
     "quoted, decimal commas": (
@@ -96,6 +97,7 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
     },
     "ruled comments": (["####", "# x", "####", UM, *TWO], {}),
     "a delimiter before": (["\tx (um)\tz (um)", *(f"\t{x}\t{z}" for x, z in PAIRS)], {}),
+    "page breaks": ([f"\f{z}" if k % 60 == 59 else z for k, z in enumerate(ZS)], Z_UM),
 }  # fmt: skip
 
 
@@ -126,6 +128,7 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "-99999.9999", 90: "-99999.9998", 130: "-99999.9997", 131: "-99999.9996"}, 4),
         ({50: "-9999", 51: "-9999", 200: "9999", 201: "9999"}, 4),
         ({50: "-32768", 200: "32767"}, 2),
+        ({50: "0.000", 51: "0.000", 200: "0.000"}, 3),
         ({50: "12.5", 51: "12.5", 52: "12.5", 200: "-13.5", 201: "-13.5", 202: "-13.5"}, 6),
         ({50: "-9.99", 200: "9.99"}, 2),
         ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
@@ -184,7 +187,6 @@ SMD = [
 ]  # fmt: skip
 SDF = ["NumPoints = 400", "Xscale = 5e-07", "Zscale = 1e-6", "*", *ZS, "*", "UserComment = x", "*"]
 BLOCK = ["Roughness profile (um)", *ZS]
-Z_UM: Options = {"unit": "um", "step": STEP}
 REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "two steps": (["Step: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}, "9 nm and 500 nm: give"),
     "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "no step with its unit"),
@@ -202,10 +204,23 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
     "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
+    "brackets for minus": (
+        [f"({k - 200:.3f})" if k > 200 else f"{200 - k:.3f}" for k in PLACE],
+        {"unit": "nm", "step": STEP},
+        r"line 202 .* '\(1\.000\)': it must hold one number",
+    ),
+    "marked rows below": ([*ZS[:300], *(f"B {z}" for z in ZS[300:])], Z_UM, "'B .*in their digits"),
+    "a factor above": (["z =", "", "  1.0e-03 *", "", *ZS], Z_UM, "multiply the numbers by this"),
+    "a raised mark": ([UM, *TWO[:9], f"{TWO[9]}²", *TWO[10:]], {}, "line 11 .* must hold 2 num"),
+    "a multiple in a name": (["x (um),z*1000 (nm)", *TWO], {}, "states no unit"),
+    "a power in a name": (["x (um),1/z (1/nm)", *TWO], {}, "states no unit"),
+    "a column named A": (["x (um),A", *TWO], {}, "unit of the positions alone"),
+    "a resolution": (["Vertical resolution (nm)", "Data", *ZS], {"step": STEP}, "states no unit"),
     "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* must hold 2 num"),
     "a damaged last height": ([*ZS[:-1], "0.5l"], Z_UM, r"line 400 .* has '0\.5l'"),
     "a damaged first row": ([UM, "0.000,-0.5l", *TWO[1:]], {}, "line 2 of .* above the numbers"),
     "SMD": ("\r\n".join(SMD), {}, r"ISO 5436-2 \(SMD\).* export the trace as text"),
+    "SMD without a name": ("\r\n".join(["1 2", "PRF 1", *SMD[2:]]), {}, r"ISO 5436-2 \(SMD\)"),
     "SMD, marked": ("\n".join(SMD).replace("\x03", "#\x03"), Z_UM, r"ISO 5436-2 \(SMD\)"),
     "SMD with zero bytes": ("\0\n".join(SMD).encode(), Z_UM, r"ISO 5436-2 \(SMD\)"),
     "its heights and checksum": ([*ZS, "#\x03", "34582"], Z_UM, "line 401 .* it ends the rows"),
@@ -289,7 +304,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "figures below heights": (["z (um)", *ZS, "", *ZS[:2]], Z_UM, "line 402 .* at most 3 rows"),
     "blocks divided by dashes": (["z (um)", *ZS, "-----", *ZS], Z_UM, "line 402 .* and divides"),
     "a count below two columns": ([UM, *TWO, "400"], {}, "line 402 .* has '400', at the end"),
-    "a last height cut off": ([UM, *TWO[:-1], TWO[-1][:-4]], {}, "line 401 .* or was cut off"),
+    "a last height cut off": ([UM, *TWO[:-1], TWO[-1][:-1]], {}, "line 401 .* or was cut off"),
     "a last exponent cut off": (
         ["x [m] z [m]", *(f"{5e-7 * k:.3e} {z:.9e}" for k, z in enumerate(Z)), "2.000e-04 5.1e-0"],
         {},
@@ -303,12 +318,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a map with positions": (
         [",".join(["", *XS]), *(",".join([str(k), *ZS]) for k in range(3))],
         {"row": 1, "step": STEP, "unit": "um"},
-        "the first row of .* has equal steps, as positions do",
+        "the first row of .* rises or falls throughout, as positions do",
     ),
     "a map with a column of positions": (
-        [",".join([str(k), *ZS[k:], *ZS[:k]]) for k in range(9)],
+        [",".join([f"{-k / 3:.2f}", *ZS[k:], *ZS[:k]]) for k in range(9)],
         {"row": 1, "step": STEP, "unit": "um"},
-        "the first column of .* has equal steps, as positions do",
+        "the first column of .* rises or falls throughout, as positions do",
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
@@ -322,6 +337,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     ),
     "quoted rows": ([f'"{row}"' for row in TWO], {}, "such as '0.000,.*quotes about whole rows"),
     "SDF cut off": (["aISO-1.0", *SDF[:40]], {}, "begins as an instrument's file, .* cut off"),
+    "rounded positions, and a row left out": (
+        [UM, *(f"{1.08 * k:.0f},{z}" for k, z in enumerate(ZS) if k != 200)],
+        {},
+        "whole multiples of 1 µm, 33 of them two apart: they may be rounded, or rows are left out",
+    ),
     "positions rounded beyond use": (
         [f"{0.137 * k:.0f},{z}" for k, z in enumerate(ZS[:40])],
         {"unit": "um"},
@@ -372,6 +392,7 @@ OTHERS = [
     "Interval between lines: 5 um", "Pitch in Y: 5 um", "Step width: 8 um", "Step: 0.5 um/s",
     "Sampling rate: 500 nm", "Step 2 of 3: 0.5 mm", "Vertical increment: 1 nm", "Steps: 400",
     "Spacing parameter S: 4 um", "Average pitch: 3 um", "Interval: 5 s", "Sampling length 0.8 mm",
+    "Spacing (points/um): 2", "Step: ~0.4 um", "X scale: 200 um",
 ]  # fmt: skip
 
 

@@ -52,6 +52,16 @@ def test_a_radius_of_curvature_is_taken_off_and_said() -> None:
     np.testing.assert_allclose(huge.level(), prepared(Z, degree=2).level(), atol=1e-13)
 
 
+def test_heights_that_an_instrument_held_or_cut_off_are_warned_of() -> None:
+    held = Z.copy()
+    held[700:720] = Z[700]
+    for heights in (held, np.minimum(Z, np.sort(Z)[-60])):
+        (warning,) = prepared(heights).warnings
+        assert "heights in a row from" in warning
+    assert "20 heights in a row from 700 µm on" in prepared(held).warnings[0]
+    assert prepared(np.round(Z, 7)).warnings == ()  # of a coarse digit many neighbours are equal
+
+
 def test_a_form_that_stays_by_order_is_warned_of() -> None:
     found = prepared(Z + 3e-6 * PLACE**2, degree=1)
     assert found.degree == 1

@@ -174,6 +174,14 @@ def test_missing_heights_in_memory_are_gaps() -> None:
 
 
 WORDS = FRAME.assign(**{"z (um)": "high"})
+
+
+class WithUnit(np.ndarray):
+    """An array with a unit, as unyt and astropy have them."""
+
+    units = "um"
+
+
 REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {
     "no unit": (BOTH, {}, InputError, "array states no unit"),
     "no step": (Z, {"unit": "m"}, InputError, "array has heights without positions.*give step"),
@@ -181,6 +189,7 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "no such column": (FRAME, {"columns": ["x", "z"]}, InputError, r"columns is 'x': the table ha"),
     "words": (WORDS, {"columns": [1, 2]}, InputError, "the table holds more than numbers"),
     "complex": (1j * Z, {"step": STEP}, InputError, "array holds complex128"),
+    "a unit of its own": (BOTH.view(WithUnit), {"unit": "mm"}, TypeError, "array carries a unit"),
     "a map": (np.zeros((99, 98)), {}, InputError, "array holds 99 × 98 numbers"),
     "a row": (BOTH, {"row": 1}, InputError, "row belongs to files"),
     "a decimal sign": (BOTH, {"decimal": ","}, InputError, "decimal belongs to files"),

@@ -86,7 +86,14 @@ def answer(**change: Any) -> Any:
     return loss_of_trace(prepared, **{"half_space": SOLID, "work_of_adhesion": 0.04} | change)
 
 
+class WithUnit(np.ndarray):
+    """An array with a unit, as unyt and astropy have them."""
+
+    units = "MPa"
+
+
 NOT_NUMBERS: list[Any] = [
+    np.array(1.0).view(WithUnit),
     *(True, np.bool_(False), "1", b"1", None, 1j, {}, object(), np.ma.masked),
     *([1.0], (1.0,), np.array([1.0]), np.array([])),
 ]
@@ -180,6 +187,7 @@ ROWS: list[tuple[Any, type[Exception], str]] = [
     ([0.0, True, 2.0], TypeError, "[1] is True: it must be a real number"),
     (np.array([True, False, True]), TypeError, " holds booleans: every"),
     (np.array(["1", "2", "3"]), TypeError, " holds texts: every"),
+    (np.array([0.0, 0.5]).view(WithUnit), TypeError, " carries a unit, which would be lost"),
     (["0", "1", "2"], TypeError, "[0] is '0': it must be a real number"),
     ([0.0, None, 2.0], TypeError, "[1] is None: it must be a real number"),
     (np.array([0.0, None, 2.0]), TypeError, "[1] is None: it must be a real number"),

@@ -343,15 +343,27 @@ def test_a_turning_point_within_a_nanometre_of_a_jump_is_doubtful():
     assert not beyond_limit(math.inf, *of_loop)
 
 
+def test_a_turn_nearer_to_a_jump_than_its_place_is_known_is_doubtful():
+    """The grid's jumps lie elsewhere by its own error: one may come before a turn at 2 nm."""
+    at = next_touch() - 2e-9 / rough().h_max
+    sharp, grid = (
+        run_loop(method_of(rough(), 1e7, 0.04, name), max_penetration=at, load_steps=20)
+        for name in ("sharp", "grid")
+    )
+    assert sharp.turn_range == pytest.approx(2e-9, rel=1e-6)
+    assert grid.turn_range == 0.0
+    assert any(warning.startswith("turn_range is 0 nm") for warning in grid.warnings)
+
+
 @pytest.mark.parametrize("name", ["sharp", "grid"])
 def test_every_turn_of_a_path_is_followed_beyond(name):
     """The first of two turns lies before the jump, which the second has passed."""
     gamma, jump = 0.04, next_touch()
     method = method_of(rough(), 1e7, gamma, name)
-    way = 10e-9 / method.problem.profile.h_max
+    way = 20e-9 / method.problem.profile.h_max
     path = run_path(method, [jump - way, 0.3, 0.6], load_steps=20)
     # the jump of the grid lies elsewhere by its own error
-    assert path.turn_range == pytest.approx(10e-9, rel=1e-6 if name == "sharp" else 0.5)
+    assert path.turn_range == pytest.approx(20e-9, rel=1e-6 if name == "sharp" else 0.5)
     last = run_path(method, [0.6, 0.3, jump - way], load_steps=20, out=False)
     assert last.turn_range == math.inf  # the gap is closed already
 

@@ -50,6 +50,7 @@ def equal_steps(
         )
         return heights, step * metres, notes
     _refuse_turns(x, place)
+    _refuse_double_steps(name, x, metres)
     return _on_grid(x * metres, heights, place, notes)
 
 
@@ -60,6 +61,20 @@ def _refuse_turns(x: Array, place: Callable[[int], str]) -> None:
         word = "stand still" if steps[back - 1] == 0 else "turn back"
         raise InputError(
             f"the positions {word} at {place(back)}: they must rise or fall throughout"
+        )
+
+
+def _refuse_double_steps(name: str, x: Array, metres: float) -> None:
+    """Refuse whole positions with double steps, which rounding makes, and rows left out do."""
+    digit, steps = _printed_digit(x), np.diff(x)
+    if digit is None or round(float(np.median(steps)) / digit) != 1:
+        return
+    doubles = int(np.sum(np.rint(steps / digit) == 2))
+    if doubles >= _IRREGULAR:
+        raise InputError(
+            f"the positions of {name} are whole multiples of {length_text(digit * metres)}, "
+            f"{doubles} of them two apart: they may be rounded, or rows are left out; save them "
+            "with more decimals, or write the rows that are left out, with NaN"
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from adhesis.ensemble.errors import InputError, parameter
 from adhesis.ensemble.quantities import LENGTH, length_text
@@ -25,13 +25,20 @@ _IN_BRACKETS = re.compile(
     rf"(?:[(\[<{{/=:]|\bin\s)\s*({_one_of(_AMBIGUOUS)})\s*(?=[)\]>}}]|$)", re.IGNORECASE
 )
 
-_X = re.compile(
-    r"\b(x|pos(ition)?s?|lateral|horizontal|distances?|length|lengths|weg|abstand|länge)\b", re.I
-)
-_Z = re.compile(
-    r"\b(z|y|h|heights?|höhe|vertical|depth|profile?|amplitude|deflection|topography|data)\b", re.I
-)
-_BOTH = re.compile(r"\b(units?|einheit(en)?|unité?s?)\b", re.I)
+# Words of a line that states the unit of an axis; of others it is not known what they measure.
+_X = frozenset(
+    ("x", "xunit", "xunits", "pos", "position", "positions", "lateral", "horizontal", "distance",
+     "distances", "length", "lengths", "weg", "abstand", "länge")
+)  # fmt: skip
+_Z = frozenset(
+    ("z", "zunit", "zunits", "y", "yunit", "yunits", "h", "height", "heights", "höhe", "vertical",
+     "depth", "profile", "profil", "amplitude", "deflection", "topography", "data")
+)  # fmt: skip
+_BOTH = frozenset(("unit", "units", "einheit", "einheiten", "unité", "unités"))
+_BESIDE_AXIS = frozenset(
+    ("axis", "achse", "direction", "label", "value", "values", "column", "of", "in", "the", "all",
+     "are")
+)  # fmt: skip
 
 # A number that stands for itself: not that of "X1" or "Ra2".
 _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
@@ -39,7 +46,8 @@ _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
 # names one.
 _VALUE = re.compile(
     rf"(?<![^\W_])(?:\d+|\d*[.,]\d+\s*[(\[]?)\s*({_WORD})(?![^\W_])"
-    rf"|[x×*·]\s*\d+([.,]\d+)?\s*({_WORD})(?![^\W_])|({_WORD})\s*[x×*·]\s*\d"
+    # A factor, a power or a quotient: "x10", "10^3", "z/10", "1/nm", "nm-1".
+    rf"|[×*·⋅^]|\bx\s?10+\b|\b10+\s?x\b|/\s*\d|\d\s*/|\bper\b|({_WORD})-\d"
     rf"|[:=]\s*[+\-]?[.,]?\d|(?:^|[\s;,]){_NUMBER}\s*$",
     re.IGNORECASE,
 )
@@ -49,7 +57,7 @@ _HAS_NUMBER = re.compile(r"(?<![^\W_])\d|[:=]")
 # a "sampling length" is another length. Of two words it has both together.
 _STEP = frozenset(
     ("step", "stepsize", "spacing", "increment", "pitch", "interval", "dx", "δx", "deltax",
-     "xstep", "xspacing", "xpitch", "xincrement", "xscale", "pixelsize", "schrittweite",
+     "xstep", "xspacing", "xpitch", "xincrement", "pixelsize", "schrittweite",
      "punktabstand", "messpunktabstand", "samplinginterval", "sampleinterval", "pointinterval",
      "datainterval", "samplespacing", "sampledistance", "samplingdistance", "pointdistance",
      "messschrittweite", "messschritt", "abtastschritt", "abtastschrittweite", "abtastintervall",
@@ -63,6 +71,8 @@ _BESIDE_STEP = frozenset(
      "de", "d", "mesure", "échantillonnage", "muestreo", "campionamento")
 )  # fmt: skip
 _FIRST_NUMBER = re.compile(_NUMBER, re.IGNORECASE)
+# "about 0.4 um", and points per length.
+_NOT_THE_STEP = re.compile(r"[~≈≤≥±]|<\s*$|\bpoints?\s*/")
 _LENGTH = re.compile(r"[\s,;:=()\[\]<>{}/]*([^\W\d]*)[\s)\]>},;.]*")
 _PER_POINT = re.compile(r"\s*/\s*(px|pixel|pt|pts|point|points|sample|step)\b", re.IGNORECASE)
 
@@ -79,8 +89,6 @@ def parse_units(text: str) -> tuple[str, str]:
 
 def _units_in(text: str) -> list[str]:
     plain = unicodedata.normalize("NFKC", text).replace("_", " ")
-    if plain.strip() != "a" and plain.strip().lower() in _ANY:
-        return [LENGTH.unit_named(plain)]
     names = [match[1] for match in _IN_TEXT.finditer(plain)]
     names += [match[1] for match in _IN_BRACKETS.finditer(plain) if match[1] != "a"]
     return [LENGTH.unit_named(name) for name in names]
@@ -96,7 +104,9 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
         names = [row for row in names if _names_heights(row[0], row is fields[-1])]
     whole = set()
     for row in names:
-        found = [_units_in(field) for field in row]
+        # "m", "in" and "A" without brackets are units in a row of nothing else.
+        is_bare = all(field.lower() in _ANY for field in row) and row not in (("A",), ("a",))
+        found = [[LENGTH.unit_named(f)] if is_bare else _units_in(f) for f in row]
         if all(len(set(units)) == 1 for units in found):
             whole.add(tuple(units[0] for units in found))
     if whole:  # of two that differ it is not known which
@@ -113,11 +123,10 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
         units = set(_units_in(line))
         if len(units) != 1:
             continue
-        plain = re.sub(r"[_\-.]|(?<=[a-z])(?=[A-Z])", " ", line)
-        x, z, both = (bool(name.search(plain)) for name in (_X, _Z, _BOTH))
-        compact = re.search(r"\b([xyz]) ?units?\b", plain.lower())
-        if compact:
-            x, z = compact[1] == "x", compact[1] != "x"
+        words = set(_words(line, units))
+        x, z, both = (bool(words & names) for names in (_X, _Z, _BOTH))
+        if words - _X - _Z - _BOTH - _BESIDE_AXIS:
+            continue
         for place, named in enumerate((x, z)):
             if (named and not (x and z)) or (both and not (x or z)):
                 known[place] |= units
@@ -127,10 +136,9 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
 
 def _names_heights(line: str, is_last: bool) -> bool:
     """Return whether a line above one column names it, and not another length."""
-    plain = line.replace("_", " ")
-    if _Z.search(plain) or _BOTH.search(plain):
-        return True
-    return is_last and not _X.search(plain)
+    words = set(_words(line, _units_in(line)))
+    is_of_heights = words & (_Z | _BOTH) and words <= _Z | _BOTH | _BESIDE_AXIS
+    return bool(is_of_heights) or (is_last and not words & _X)
 
 
 def step_of_header(name: str, header: Sequence[str], decimal: str) -> float | None:
@@ -163,7 +171,7 @@ def _step(text: str, decimal: str) -> float | None:
         return None
     label, rest = text[: number.start()], _PER_POINT.sub("", text[number.end() :])
     unit = _LENGTH.fullmatch(rest)
-    if unit is None:
+    if unit is None or _NOT_THE_STEP.search(label):
         return None
     within = _units_in(label.strip(" :=\t"))
     units = [unit[1]] if unit[1] else within
@@ -177,7 +185,7 @@ def _step(text: str, decimal: str) -> float | None:
     return value * metres if value > 0 else None
 
 
-def _words(label: str, units: Sequence[str]) -> list[str]:
+def _words(label: str, units: Collection[str]) -> list[str]:
     """Return the words of a label in lower case, without its unit."""
     plain = unicodedata.normalize("NFKC", label).replace("∆", "Δ")
     apart = re.sub(r"[_\-.]|(?<=[a-z])(?=[A-Z][a-z])", " ", plain)

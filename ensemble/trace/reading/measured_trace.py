@@ -38,8 +38,8 @@ _LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES = 0.02, 2e-5
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
 # Numbers that differ by less than this share of them are one, but for the last bits.
 _SAME = 1e-9
-# So many equal steps of a row or column of a map are none of heights.
-_NO_CHANCE = 4
+# So many heights of a row or column of a map do not rise or fall throughout by chance.
+_NO_CHANCE = 6
 # Names of a column that counts the points.
 _COUNTS = re.compile(
     r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*"
@@ -318,6 +318,8 @@ def load_array(source: Source) -> Array:
 
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
+    if checks.carries_unit(values):
+        raise TypeError(f"{name} carries a unit, which would be lost: give plain numbers")
     try:
         array = np.ma.asarray(values)
     except ValueError as error:
@@ -483,10 +485,10 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     rows = table.columns.shape[1]
     for what, line in (("row", table.columns[:, 0]), ("column", table.columns[table.filled[0]])):
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
-        if any(map(_has_equal_steps, (line, line[1:]))):
+        if any(map(_may_be_positions, (line, line[1:]))):
             raise InputError(
-                f"the first {what} of {name} has equal steps, as positions do: remove it, and give "
-                f"{parameter('step')}"
+                f"the first {what} of {name} rises or falls throughout, as positions do: remove "
+                f"it, and give {parameter('step')}"
             )
     if not 0 <= row < rows:
         raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {rows - 1}")
@@ -525,12 +527,10 @@ def _scan_line(
     return columns[:, part], lines[part]
 
 
-def _has_equal_steps(line: Array) -> bool:
-    """Return whether numbers rise or fall in equal steps, and are so many that it is no chance."""
+def _may_be_positions(line: Array) -> bool:
+    """Return whether numbers rise or fall throughout, and are so many that it is no chance."""
     steps = np.diff(line)
-    return bool(
-        steps.size >= _NO_CHANCE and steps[0] != 0 and np.ptp(steps) <= 1e-6 * np.abs(steps[0])
-    )
+    return steps.size >= _NO_CHANCE and bool(np.all(steps > 0) or np.all(steps < 0))
 
 
 def _counts_points(x: Array) -> bool:

@@ -45,10 +45,11 @@ def without_codes(heights: Array) -> tuple[Array, str]:
     low, high = _usual(values[~likely])
     away = np.maximum(low - values, values - high)
     far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
-    # Where hardly a height occurs twice, nines that do stand for no height even within the range.
+    # Where hardly a height occurs twice, noughts and nines that do stand for no height even within
+    # the range.
     are_single = float(np.median(times)) == 1.0
     codes = far | (likely & (away > _BEYOND_KNOWN * (high - low)))
-    codes |= nines & repeated & are_single
+    codes |= (nines | (values == 0)) & repeated & are_single
     codes |= nines & np.isin(-values, values[codes])
     if not codes.any():
         return heights, ""

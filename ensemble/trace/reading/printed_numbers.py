@@ -15,7 +15,7 @@ DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|"
 COMMENT = "#%!*"
 _SHOWN = 60  # signs of a line that a message quotes
 _MISSING = frozenset(
-    ("", "nan", "nanind", "inf", "infinity", "bad", "n/a", "na", "#n/a", "null",
+    ("", "nan", "nanind", "inf", "infinity", "bad", "n/a", "na", "#n/a", "#nv", "null",
      "none", "nil", "invalid", "missing", "masked", "void", "nd", "nodata", "nosignal", "over",
      "overrange", "ovr", "under", "overflow", "underflow", "outofrange", "error", "x", "?")
 )  # fmt: skip
@@ -23,6 +23,7 @@ _SIGNS = re.compile(r"[-+*.()\s]")  # about such a word, or as wide as the numbe
 _PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE)  # #NAME?, 1.#INF
 _FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
+_EXPONENT = re.compile(r"(?<=[\d.])\s*[eEdD](?=\s*[+\-]?\d)")
 _QUOTED = re.compile(r'"[^"]*"')
 _GROUPED = re.compile(r"[+\-]?\d{1,3}([ '’_]\d{3})+([.,]\d*)?")
 _WITH_WORD = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eE][+\-]?\d+)?\s*[^\W\d_]+")
@@ -81,6 +82,12 @@ def printed_form(field: str) -> tuple[int, int]:
     mantissa, _, exponent = re.sub("[eEdD]", "e", field).partition("e")
     decimals = re.split(r"[.,]", mantissa)[1:]
     return len(decimals[0]) if decimals else 0, len(exponent.lstrip("+-"))
+
+
+def is_without_words(line: str) -> bool:
+    """Return whether a line holds digits, and no letters but those of exponents."""
+    plain = _EXPONENT.sub("", line)
+    return any(map(str.isdigit, plain)) and not any(map(str.isalpha, plain))
 
 
 def is_grouped(field: str) -> bool:

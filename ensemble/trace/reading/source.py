@@ -47,7 +47,7 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _INSTRUMENT_TEXT = re.compile(rb"[ab]ISO-1\.0|fileformat", re.IGNORECASE)
 # Those that no reader here knows.
 _OTHER_TEXTS = {
-    re.compile(rb"\s*ISO ?5436"): "a profile in the form of ISO 5436-2 (SMD)",
+    re.compile(rb"\s*ISO ?5436|(?s:.*)\nCX [AIM] "): "a profile in the form of ISO 5436-2 (SMD)",
     re.compile(rb"[ab](ISO|BCR)\s*-\s*\d"): "a variant of SDF (ISO 25178-71)",
     re.compile(rb"DSAA\s"): "a grid of Surfer (DSAA)",
 }

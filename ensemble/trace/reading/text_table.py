@@ -29,6 +29,7 @@ from adhesis.ensemble.trace.reading.printed_numbers import (
     has_signs_of_thousands,
     is_grouped,
     is_missing,
+    is_without_words,
     looks_like_numbers,
     marks_thousands,
     printed_form,
@@ -48,6 +49,8 @@ _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searchin
 _ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
 _DIGIT = re.compile(r"[+\-]?[.,]?\d")
+_PAGE_BREAK = re.compile(r"^\f+\r*\n|\f", re.MULTILINE)
+_FACTOR = re.compile(r"\s*[\d.,eE+\-]+\s*[*×x]\s*")  # above the numbers, as Matlab prints it
 # What people and programs write for the minus sign.
 _MARK = "\ufeff"  # of a text in UTF-8
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
@@ -125,9 +128,14 @@ def _lines(source: Source) -> list[str]:
     text = text.replace(_MARK, "")  # one of a second file that was appended is no sign of a row
     if not text.isascii():
         # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
+        # A raised digit or a fraction becomes no digit of the number that it follows.
         text = _THOUSANDS.sub("’", text)
+        raised = {ord(s): f"^{s}" for s in set(text) if unicodedata.category(s) == "No"}
+        text = text.translate(raised)
         text = unicodedata.normalize("NFKC", text).translate(_MINUS)
-    return text.replace("\r\r\n", "\n").splitlines()
+    # A page break is no end of a line: an empty one may be a missing height.
+    text = _PAGE_BREAK.sub("", text)
+    return re.split(r"\r*\n|\r", text.removesuffix("\n"))
 
 
 # ---------------------------------------------------------------------- block
@@ -181,13 +189,18 @@ class _Reader:
         """Return whether a line holds as many fields as there are columns."""
         return len(split(self.lines[place], self.delimiter)) >= self.count
 
-    def may_be_row(self, place: int) -> bool:
-        """Return whether a line holds a row of numbers, or what may be a damaged one."""
+    def may_be_row(self, place: int, adjoins: bool) -> bool:
+        """Return whether a line holds a row of numbers, or what may be a damaged one.
+
+        One that ``adjoins`` the rows may be one if it begins with a number or has no word.
+        """
         if place in self.rows:
             return not self.rows[place].is_empty
         line = self.lines[place].strip()
         if not line or line[0] in COMMENT:
             return False
+        if adjoins and (_DIGIT.match(line) or is_without_words(line)):
+            return True
         if self.count == 1:
             return is_grouped(line) or (" " not in line and _DIGIT.match(line) is not None)
         first = split(line, self.delimiter)[0]
@@ -346,7 +359,13 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
         is_row = place in reader.rows
         if is_row and reader.rows[place].is_empty:
             continue
-        if reader.may_be_row(place) and (touches or (is_row and reader.is_whole(place))):
+        if _FACTOR.fullmatch(lines[place]):
+            raise InputError(
+                f"line {place + 1} of {source} is {shown_line(lines[place])}: multiply the numbers "
+                "by this factor, and remove it"
+            )
+        may_be_row = reader.may_be_row(place, place == start - 1)
+        if may_be_row and (touches or (is_row and reader.is_whole(place))):
             raise InputError(
                 f"line {place + 1} of {source} is {shown_line(lines[place])}, above the numbers "
                 f"that begin on line {start + 1}: remove it if it is none of them, and correct it "
@@ -354,22 +373,32 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
             )
         touches = False
     for place in range(last + 1, len(lines)):
-        if reader.may_be_row(place):
+        if reader.may_be_row(place, place == last + 1):
             words = (k for k in range(last + 1, place + 1) if k not in reader.rows)
             end = next(words, last + 1)
             flaw = flaw_of(split(lines[end], reader.delimiter))
-            if flaw is not None and reader.may_be_row(end):
+            if flaw is not None and reader.may_be_row(end, True):
                 raise InputError(f"line {end + 1} of {source} has {flaw}")
             held = "one number" if reader.count == 1 else f"{reader.count} numbers"
-            if end == last + 1 and reader.may_be_row(end):
+            if end == last + 1 and reader.may_be_row(end, True):
                 raise InputError(
                     f"line {end + 1} of {source} is {shown_line(lines[end])}: it must hold {held}, "
-                    "with an empty field for one that is missing"
+                    "with an empty field for one that is missing; remove it if it is no row"
                 )
             raise InputError(
                 f"line {end + 1} of {source} is {shown_line(lines[end])}: it ends the rows of "
                 f"{held} on lines {start + 1} to {last + 1}, and more numbers follow on line "
                 f"{place + 1}; keep the rows of one trace in a file"
+            )
+    # Lines beside the block that differ in their digits alone are rows of another form.
+    n = _ROWS_TO_BEGIN
+    for beside in lines[max(start - n, 0) : start], lines[last + 1 : last + 1 + n]:
+        forms = {re.sub(r"[\d.,+\-\s]+", " ", line) for line in beside}
+        if len(beside) == n and len(forms) == 1 < len(set(beside)):
+            raise InputError(
+                f"{source} has lines such as {shown_line(beside[-1])} beside the rows of numbers, "
+                "which differ in their digits alone: remove them if they are none of the rows, and "
+                "correct them if they are"
             )
 
 
@@ -387,14 +416,15 @@ def _refuse_odd_ends(
     """
 
     def judged(k: int) -> bool:  # noughts and codes of missing heights are written as they please
-        return isfinite(numbers[k]) and numbers[k] != 0 and not may_be_code(numbers[k])
+        is_free = (numbers[k] == 0 and k < n - 1) or may_be_code(numbers[k])
+        return isfinite(numbers[k]) and not is_free
 
     n = len(column)
     forms = [printed_form(column[k]) for k in range(_ENDS, n - _ENDS) if judged(k)]
     if len(forms) < _TO_JUDGE:
         return
     usual, times = Counter(forms).most_common(1)[0]
-    has_one_form = is_lone and times >= _ONE_FORM * len(forms)
+    has_one_form = times >= (_ONE_FORM if is_lone else 1.0) * len(forms)
     fewest, shortest = (min(counts) for counts in zip(*forms, strict=True))
     ends = (*range(min(_ENDS, n)), *range(max(_ENDS, n - _ENDS), n)) if is_lone else (n - 1,)
     for k in filter(judged, ends):
