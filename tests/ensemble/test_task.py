@@ -98,6 +98,7 @@ def test_the_range_of_adhesion_is_in_the_row():
     problem = replace(loop.problem, strength=1e12)
     row = loop_row(campaign, replace(loop, jumps=(opening, opening), problem=problem))
     assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [1e12, 2, 1.0]
+    assert row["zone_error"] == replace(loop, problem=problem).zone_error > 0
 
 
 def test_curves_are_cut_where_the_axis_ends():
