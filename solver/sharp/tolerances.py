@@ -70,6 +70,10 @@ SHORTEST_CRACK = 0.02
 
 # ---------------------------------------------------------------- continuation of a branch
 
+AT_OPENING = 0.5
+"""Of the smallest step: a pinned edge that begins to move on a shorter way moves already. Before a
+kink the last state is a whole smallest step away; edges that have just begun to move together, and
+are pinned again by the error of an equilibrium, were a fortieth."""
 PREDICTED_MOTION = 0.15
 """λ_min. Longest predicted motion of the edge that leads in one step."""
 ORDER_RESOLVED = 0.1

@@ -74,7 +74,7 @@ def test_stripes_lower_the_loss_of_a_wave_whose_crest_is_weak(wave_file, tmp_pat
 
 def test_json_names_the_range_and_what_zones_at_edges_change(wave_file, tmp_path):
     out = tmp_path / "loop.json"
-    range_ = 0.2 * AMPLITUDE
+    range_ = 0.1 * AMPLITUDE
     words = ("--max-penetration", 0.8, "--adhesion-range", range_, "--load-steps", 5)
     assert run(*wave_words(wave_file, *words, "--json", out)) == 0
     data = json.loads(out.read_text())

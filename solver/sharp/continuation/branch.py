@@ -19,6 +19,7 @@ from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
+    AT_OPENING,
     LONGEST_STEP,
     ORDER_RESOLVED,
     OTHER_MINIMUM,
@@ -298,7 +299,8 @@ class Branch:
 
         The branch has a kink there, and the state on either side belongs to the path.
         """
-        distance, finest = pinned.distance(step), self.steps.finest
+        finest = self.steps.finest
+        distance = pinned.distance(step, AT_OPENING * finest)
         if not distance < abs(step) + finest:
             return step
         self._begins_to_move = True
