@@ -96,9 +96,10 @@ def figure(path: Path) -> None:
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import NullFormatter
 
     lines = KEPT.read_text("utf-8").splitlines()
-    figure, panels = plt.subplots(1, len(SCENES), figsize=(11, 3.8), sharey=True, layout="constrained")
+    figure, panels = plt.subplots(1, len(SCENES), figsize=(11, 3.8), layout="constrained")
     for axes, (scene, title) in zip(panels, TITLES.items(), strict=True):
         (head,) = (line for line in lines if line.startswith(f"# {scene}: "))
         valid, edge, touch, _ = map(float, head.removesuffix(" nm").split()[-4:])
@@ -112,10 +113,16 @@ def figure(path: Path) -> None:
                   label="doubtful")  # fmt: skip
         axes.plot(delta, grid, "x", color="#c4472b", ms=7, label="minimisation")
         for name, at in (("inside", valid), ("edge", edge), ("touch", touch)):
+            if at > 2 * delta.max():
+                continue
             axes.axvline(at, color="0.6", lw=0.8, zorder=0)
-            axes.text(at, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
-        axes.set(xscale="log", xlabel="range δ (nm)", ylim=(0, 1.1))
-        axes.set_title(title, fontsize=10, pad=18)
+            side = "left" if name == "touch" else "right"
+            place = {"transform": axes.get_xaxis_transform(), "rotation": 90, "va": "bottom"}
+            axes.text(at, 0.03, f" {name} ", ha=side, fontsize=8, color="0.4", **place)
+        axes.set(xscale="log", xlabel="range δ (nm)", title=title)
+        axes.set(**({"yscale": "log", "ylim": (2e-4, 2)} if scene == "steel" else {"ylim": (0, 1.1)}))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    panels[0].set_xticks([30, 100, 300], ["30", "100", "300"])
     panels[0].set_ylabel("loss over that of zero range")
     panels[0].legend(frameon=False, fontsize=8, loc="lower left")
     figure.savefig(path, dpi=160)

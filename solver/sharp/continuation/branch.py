@@ -193,6 +193,8 @@ class Branch:
     trail : Trail
         Accepted points since the last search for touches.
     steps : StepSize
+    continued : int
+        Number of points that a descent led to, one after the other.
     """
 
     def __init__(
@@ -214,7 +216,7 @@ class Branch:
         self._passed = [PreviousPoint(point.at, point.rate, point.gaps)]
         if point.previous is not None:
             self._passed.insert(0, point.previous)
-        self.trail = Trail(point)
+        self.trail, self.continued = Trail(point), 0
         self.steps = StepSize(resolution.jump)
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = Predictor(point)
@@ -285,6 +287,7 @@ class Branch:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.add(point, self._closing.between(self.point, point, self._target.branch))
         self.point, self._predictor = point, Predictor(point)
+        self.continued += 1
         self.steps.forget_failures()
 
     def _next_step(self) -> float:
@@ -329,7 +332,7 @@ class Branch:
 
     def _accept(self, event: Accepted, closed: float, step: float) -> None:
         self.trail.add(event.point, closed)
-        self.point = event.point
+        self.point, self.continued = event.point, 0
         self._passed.append(PreviousPoint(event.point.at, event.point.rate, event.point.gaps))
         self._work_before = (0.0, math.inf)
         if event.is_output:
