@@ -9,10 +9,8 @@ namespace {
 // Pin edges that come to their memory, and release those whose opening no longer holds them.
 //
 // Returns the ends with these at their memory, or a little to the side to which they are released;
-// `pinned` is changed likewise. An edge that comes back from there at once is `held` by ten times the
-// error of its force: it moves by less than the iteration tells, and would be pinned and released
-// by turns.
-Vector pin_edges(LinearResponse& response, const Vector& ends, Flags& pinned, Flags& held,
+// `pinned` is changed likewise.
+Vector pin_edges(LinearResponse& response, const Vector& ends, Flags& pinned,
                  const ResponseSolution& now, const EdgeLaw& law, const Model& model) {
   const Integers edges = indices(pinned);
   const Vector residual = HeldEdges(response, edges, now, model.device).residual();
@@ -23,7 +21,6 @@ Vector pin_edges(LinearResponse& response, const Vector& ends, Flags& pinned, Fl
     if (!pinned[e] && way * (way + now.motion[e] - here[e]) < 0) {
       out[e] = law.memory[e];
       pinned[e] = true;
-      held[e] = held[e] || std::abs(way) < 2 * law.newton_tolerance;
     }
   }
   const double slack = law.force_error / law.critical;
@@ -31,9 +28,8 @@ Vector pin_edges(LinearResponse& response, const Vector& ends, Flags& pinned, Fl
     const int e = edges[c];
     const double range = pinning_range(ends[e], law).value;
     const double released = outwards(e) * law.newton_tolerance;
-    const double beyond = held[e] ? 10 * slack : slack;
-    const bool advances = residual[c] < -beyond;
-    if (!advances && !(residual[c] > range + beyond)) continue;
+    const bool advances = residual[c] < -slack;
+    if (!advances && !(residual[c] > range + slack)) continue;
     out[e] = ends[e] + (advances ? released : -released);
     pinned[e] = false;
   }
@@ -63,7 +59,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
                              bool strict, const EdgeLaw& law, const Model& model) {
   const int edges = int(ends.size());
   Equilibrium out;
-  Flags pinned = at_memory(ends, law), held(edges, false);
+  Flags pinned = at_memory(ends, law);
   Vector travelled(edges), step(edges), moved(edges);
   double last = infinity;
   bool judged_again = false;
@@ -80,7 +76,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     if (!std::isfinite(pressure)) break;
     if (law.pins()) {
       const Vector before = ends;
-      ends = pin_edges(response, ends, pinned, held, out.at, law, model);
+      ends = pin_edges(response, ends, pinned, out.at, law, model);
       if (ends != before) {
         if (out.corrections >= MOST_CORRECTIONS) break;
         last = infinity;

@@ -293,8 +293,7 @@ class EquilibriumPath(ByValue, ResultViews):
     def range_warnings(self) -> list[str]:
         """Return sentences where the range of adhesion may matter more than the model knows."""
         given = self.problem, self.valid_range, self.lost, self.contact_fraction
-        opened = self.jumps, self.problem.attraction_range, self.edge_range
-        return range_warnings(*given, *self.outer_ranges) + opening_warnings(*opened)
+        return range_warnings(*given, *self.outer_ranges) + opening_warnings(self.jumps)
 
     def strain_warnings(self) -> list[str]:
         """Return sentences where strains are not small."""
