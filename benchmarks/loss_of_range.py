@@ -105,12 +105,13 @@ def figure(path: Path) -> None:
         valid, edge, touch, _ = map(float, head.removesuffix(" nm").split()[-4:])
         rows = np.array([line.split() for line in lines if line.startswith(f"{scene} ")])
         numbers = np.where(rows[:, 2:] == "-", "nan", rows[:, 2:]).astype(float)
-        delta, sharp, openings, _, warnings, grid = numbers.T[:6]
+        delta, sharp, _, _, warnings, grid = numbers.T[:6]
         known, sure = np.isfinite(sharp), warnings == 0
         axes.plot(delta[known], sharp[known], "-", color="#1f5fa8", lw=1, label="sharp")
         axes.plot(delta[sure], sharp[sure], "o", color="#1f5fa8", ms=5, label="without a doubt")
-        axes.plot(delta[known & ~sure], sharp[known & ~sure], "o", mfc="white", color="#1f5fa8", ms=5,
-                  label="doubtful")  # fmt: skip
+        doubtful = known & ~sure
+        open_ = {"mfc": "white", "color": "#1f5fa8", "ms": 5, "label": "doubtful"}
+        axes.plot(delta[doubtful], sharp[doubtful], "o", **open_)
         axes.plot(delta, grid, "x", color="#c4472b", ms=7, label="minimisation")
         for name, at in (("inside", valid), ("edge", edge), ("touch", touch)):
             if at > 2 * delta.max():
@@ -120,7 +121,9 @@ def figure(path: Path) -> None:
             place = {"transform": axes.get_xaxis_transform(), "rotation": 90, "va": "bottom"}
             axes.text(at, 0.03, f" {name} ", ha=side, fontsize=8, color="0.4", **place)
         axes.set(xscale="log", xlabel="range δ (nm)", title=title)
-        axes.set(**({"yscale": "log", "ylim": (2e-4, 2)} if scene == "steel" else {"ylim": (0, 1.1)}))
+        axes.set(
+            **({"yscale": "log", "ylim": (2e-4, 2)} if scene == "steel" else {"ylim": (0, 1.1)})
+        )
         axes.xaxis.set_minor_formatter(NullFormatter())
     panels[0].set_xticks([30, 100, 300], ["30", "100", "300"])
     panels[0].set_ylabel("loss over that of zero range")

@@ -26,8 +26,8 @@ class Cycle:
     """Contact and cycle in SI units; the answer has the first value of each tuple.
 
     Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load; preloads in Pa
-    if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload. The waves
-    of the pattern are counted in the answer's period.
+    if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload.
+    The waves of the pattern are counted in the answer's period.
     """
 
     half_space: HalfSpace

@@ -119,7 +119,7 @@ def _scope(answer: Answer) -> str:
 
 
 def _range(answer: Answer) -> str:
-    """Describe below which range of adhesion the zero-range limit holds, or the one that is given."""
+    """Describe the range of adhesion that is given, or below which zero range holds."""
     if answer.main["strength"] is not None:
         return str(answer.main["range_summary"])
     inside, ranges = "no tension inside patches", []
