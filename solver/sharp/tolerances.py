@@ -35,9 +35,8 @@ DESCENT_HANDS_OVER = 1e-3
 less have not left their branch."""
 ENDLESS = 100_000
 """Steps of one descent, or nucleations in one jump; more are an endless loop."""
-CONTINUED = 500
-"""How often a descent, one after the other, may lead to the next point of a branch; more are an
-endless loop."""
+CONTINUED = 200
+"""How often a descent may lead to the next point of a branch; more are an endless loop."""
 RESTS = 20
 """How often a descent may come to rest without a minimum that Newton's iteration finds."""
 OTHER_MINIMUM = 0.01

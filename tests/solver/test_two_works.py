@@ -18,6 +18,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
+from adhesis.solver.sharp.continuation import follower
 from adhesis.solver.sharp.continuation.branch import Branch
 from tools.hostile import draw
 
@@ -227,3 +228,15 @@ def test_edges_that_begin_to_move_together_do_not_hold_each_other_back(monkeypat
         for accuracy in (1e-4, 1e-6)
     )
     assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error
+
+
+def test_a_branch_that_goes_on_without_an_end_is_refused(monkeypatch):
+    monkeypatch.setattr(follower, "CONTINUED", 30)
+    scene = draw(5202, 90, "open")
+    problem = scene.problem()
+    with pytest.raises(adhesis.PathError, match="no equilibrium is found on a branch that goes on"):
+        run_loop(
+            make_method("sharp", problem, accuracy=scene.accuracy),
+            load_steps=scene.load_steps,
+            **scene.turn(problem),
+        )

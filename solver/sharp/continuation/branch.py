@@ -194,7 +194,7 @@ class Branch:
         Accepted points since the last search for touches.
     steps : StepSize
     continued : int
-        Number of points that a descent led to, one after the other.
+        Number of points that a descent led to.
     """
 
     def __init__(
@@ -332,7 +332,7 @@ class Branch:
 
     def _accept(self, event: Accepted, closed: float, step: float) -> None:
         self.trail.add(event.point, closed)
-        self.point, self.continued = event.point, 0
+        self.point = event.point
         self._passed.append(PreviousPoint(event.point.at, event.point.rate, event.point.gaps))
         self._work_before = (0.0, math.inf)
         if event.is_output:
