@@ -1,7 +1,7 @@
 """Losses under adhesion of a finite range beside those of ``sharp``.
 
     python benchmarks/finite_range.py even [--loops 40] [--seed 1]
-    python benchmarks/finite_range.py random [--loops 40] [--seed 1] [--edges 0.5]
+    python benchmarks/finite_range.py random [--loops 40] [--seed 1] [--edges 0.5 [--opening]]
 
 The range is half of the least of ``valid_range``, ``edge_range``, ``touch_range`` and
 ``turn_range`` of a loop of zero range, or with ``--edges`` a share of ``edge_range``. The loss is
@@ -377,6 +377,7 @@ def main() -> int:
     parser.add_argument("--lowest", type=int, default=3, help="largest lowest wave number drawn")
     parser.add_argument("--patches", type=int, default=1, help="at least, of a loop that is judged")
     parser.add_argument("--edges", type=float, help="range over edge_range, not half the least")
+    parser.add_argument("--opening", action="store_true", help="loops whose patches open alone")
     parser.add_argument("--most-nodes", type=int, default=1 << 13, help="of a loop that is judged")
     args = parser.parse_args()
     is_even = args.profiles == "even"
@@ -401,6 +402,8 @@ def main() -> int:
             crack = LONGEST_GRIFFITH_CRACK * problem.shortest_wavelength * (1 - 1e-9)
             longest = np.sqrt(np.pi * gamma * crack / (4 * MODULUS))
             delta = min(args.edges * loop.edge_range, longest)
+        if args.opening and delta < loop.valid_range:
+            continue
         loss = judge(loop, coefficients, gamma, delta, args)
         if loss is None:
             continue

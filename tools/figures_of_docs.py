@@ -51,7 +51,7 @@ def _paper() -> tuple[str, ...]:
     )
 
 
-_DRAWN = ("loop", "structure", "zero_range", "opening", "one_asperity", "two_scales", "two_methods")
+_DRAWN = ("loop", "structure", "zero_range", "one_asperity", "two_scales", "two_methods")
 PARTS = {
     **{
         name.replace("_", "-"): Part(
@@ -59,6 +59,9 @@ PARTS = {
         )
         for name in _DRAWN
     },
+    "loss-of-range": Part(
+        ("benchmarks/loss_of_range.py figure OUT/loss_of_range.png",), "*.png", "figures"
+    ),
     "tutorial": Part(
         ("-m tools.transcripts docs/tutorial.md --keep OUT",), "first_*.png", "figures"
     ),

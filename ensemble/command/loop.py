@@ -22,6 +22,7 @@ from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
+    pattern_of,
     prepared_of,
     trace_of,
     what_was_read,
@@ -33,7 +34,6 @@ from adhesis.solver.loading.loop_state import field_nodes
 from adhesis.solver.loading.path import PathResult, run_path
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.pattern import stripes_of
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile, profile_from_heights, self_affine_profile
 from adhesis.solver.registry import make_method
@@ -50,13 +50,7 @@ def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
     taken = _take_defaults(args)
     _check_files(args)
-    options = {
-        "count": "stripes",
-        "amplitude": "stripe_amplitude",
-        "phase": "stripe_phase",
-        "turning_points": "path",
-    }
-    with refused_as_input(vars(args), thickness="layer", **options):
+    with refused_as_input(vars(args), thickness="layer", turning_points="path"):
         profile, warnings = _profile(args)
         source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
@@ -67,7 +61,7 @@ def execute(args: argparse.Namespace) -> int:
             adhesion_range=args.adhesion_range,
             measure=args.measure,
             work_of_adhesion_open=args.work_of_adhesion_open,
-            pattern=stripes_of(args.stripes, args.stripe_amplitude, args.stripe_phase),
+            pattern=pattern_of(args),
         )
         cycle.check(problem)
     _check_film(args, cycle)

@@ -30,7 +30,7 @@ from adhesis.ensemble.trace.answer import (
 )
 from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.loops import Loops
-from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
+from adhesis.ensemble.trace.options import pattern_of, prepared_of, trace_of, what_was_read
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Plan, make_plan
 from adhesis.solver.model.half_space import HalfSpace
@@ -54,6 +54,7 @@ def execute(args: argparse.Namespace) -> int:
             half_space, gammas, turns.points, args.load_steps, args.method, args.accuracy, control,
             args.adhesion_range, args.strength, at_preload=turns.are_preloads, latest=turns.latest,
             work_of_adhesion_open=args.work_of_adhesion_open, measure=args.measure,
+            pattern=pattern_of(args),
         )  # fmt: skip
     if args.to is not None:
         check_output_folder("--to", args.to, FILES, {"the command": args.file})

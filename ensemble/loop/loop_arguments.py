@@ -66,21 +66,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in Pa, or 1MPa (likewise; with --hurst 1e6)",
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
-    contact.add_argument(
-        "--stripes",
-        type=int,
-        metavar="N",
-        help="the work of adhesion varies N times along the period, about --work-of-adhesion",
-    )
-    contact.add_argument(
-        "--stripe-amplitude", type=float, metavar="EPS", help="by this share of it, below 1"
-    )
-    contact.add_argument(
-        "--stripe-phase",
-        type=float,
-        metavar="PHI",
-        help="in rad: γ(x) = γ (1 + EPS cos(2π N x/L + PHI)) (default 0)",
-    )
     trace_arguments.add_cycle_arguments(contact)
     contact.add_argument(
         "--path",

@@ -21,7 +21,6 @@ from adhesis.solver.loading.zero_range import (
     DOUBTFUL_LOSS,
     DOUBTFUL_RANGE,
     EDGE_SHARE,
-    OPENED_SHARE,
     beyond_limit,
 )
 
@@ -40,8 +39,8 @@ def why_beyond(opens: bool) -> str:
         return (
             f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, "
             f"or the range of adhesion is longer than touch_range, turn_range or {EDGE_SHARE:.2g} "
-            f"of edge_range, {OPENED_SHARE:g} of it where patches open, so that what the model "
-            "leaves out matters for it (docs/zero-range.md)"
+            "of edge_range, or patches open from inside, so that what the model leaves out matters "
+            "for it (docs/zero-range.md)"
         )
     return (
         f"{ANY_RANGE} is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "

@@ -95,6 +95,7 @@ NUMBERS = (
     ),
     _dataset("audit_residual", FLOAT, "1", "(loss - loss_from_drops) / loss"),
     _dataset("loss_error", FLOAT, "J m-2", "estimated numerical error of the loss"),
+    _dataset("zone_error", FLOAT, "J m-2", "estimated change of the loss by zones at edges"),
     _dataset("races", COUNT, "1", "jumps that another rule of descent would have ended elsewhere"),
     _dataset("energy_at_stake", FLOAT, "J m-2", "energy between the ends of those jumps"),
     # below the least of four ranges of adhesion the zero-range limit holds

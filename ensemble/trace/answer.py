@@ -25,6 +25,7 @@ from adhesis.solver import checks, views
 from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.pattern import AdhesionPattern
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.registry import METHOD_NAMES, MethodName, check_law
 from adhesis.solver.values import ByValue
@@ -79,7 +80,8 @@ _ONE_PATCH = 0.25
 _READ = ("points", "step", "length", "height_range", "drop_outs", "tip_radius")
 _CONTACT = (
     *("young", "poisson", "work_of_adhesion", "work_of_adhesion_open", "measure"),
-    *("stiffness", "strength"),
+    *("stiffness", "strength", "adhesion_range", "zone_error"),
+    *("least_work_of_adhesion", "stripes", "stripe_amplitude", "stripe_phase"),
 )
 _OF_ALL_LOOPS = (
     *("valid_range", "edge_range", "touch_range", "turn_range"),
@@ -316,6 +318,7 @@ def loss_of_trace(
     strength: float | None = None,
     work_of_adhesion_open: float | None = None,
     measure: Measure = "arc",
+    pattern: AdhesionPattern | None = None,
     quick: bool = False,
     processes: int | None = None,
     progress: bool = False,
@@ -353,6 +356,9 @@ def loss_of_trace(
         adhesion both keep their ratio.
     measure : {"arc", "flat"}
         Whether adhesion acts on the length of the profile or on its projection.
+    pattern : AdhesionPattern, optional
+        Variation of γ over the period of the trace, from its first point on
+        (:func:`adhesis.stripes`); where a variant has another period, its waves keep their lengths.
     quick : bool
         Without the two tables.
     processes : int, optional
@@ -393,6 +399,7 @@ def loss_of_trace(
     cycle = make_cycle(
         half_space, work_of_adhesion, turns, load_steps, method, accuracy, control,
         adhesion_range, strength, preload is not None, latest, work_of_adhesion_open, measure,
+        pattern,
     )  # fmt: skip
     check(prepared, cycle)
     checks.flag("quick", quick)
@@ -502,6 +509,8 @@ def _quantity(answer: Answer, name: str) -> Uncertain:
         error = answer.main["loss_error"]
         numerics = abs(answer.main["audit_residual"]) if error is None else abs(error) / abs(value)
         doubts["numerics"] = float(numerics)
+        if answer.main["zone_error"]:
+            doubts["zones"] = answer.main["zone_error"] / abs(value)
     spread = float(np.sqrt(sum(d * d for d in doubts.values())))
     return Uncertain(value, abs(value) * max(LEAST, COVERAGE * spread), doubts)
 

@@ -12,6 +12,7 @@ from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.pattern import AdhesionPattern
 from adhesis.solver.model.problem import Measure, Problem
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName, make_method
@@ -26,6 +27,7 @@ class Cycle:
 
     Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load; preloads in Pa
     if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload.
+    The waves of the pattern are counted in the answer's period.
     """
 
     half_space: HalfSpace
@@ -41,6 +43,7 @@ class Cycle:
     latest: float | None = None
     work_of_adhesion_open: float | None = None
     measure: Measure = "arc"
+    pattern: AdhesionPattern | None = None
 
     @property
     def turn_sign(self) -> str:
@@ -77,6 +80,7 @@ class Cycle:
             adhesion_range=self.adhesion_range,
             work_of_adhesion_open=opening,
             measure=self.measure,
+            pattern=self.pattern,
         )
 
 
@@ -105,6 +109,7 @@ def run(job: Job, progress: Progress | None = None) -> dict[str, Any]:
         "preload_warnings": loop.preload_warnings,
         "fall_warnings": loop.fall_warnings(),
         "loss_note": loop.loss_note,
+        "range_summary": loop.range_summary(),
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),

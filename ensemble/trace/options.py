@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.errors import InputError, quoted
+from adhesis.ensemble.errors import InputError, quoted, refused_as_input
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.reading.printed_numbers import DELIMITERS
+from adhesis.solver.model.pattern import AdhesionPattern, stripes_of
 
 _OF_READING = ("unit", "step", "decimal", "row", "channel")
 _OF_PREPARING = ("degree", "cut_off", "tip_radius", "longest_gap", "keep_outliers", "invert")
@@ -60,6 +61,13 @@ def _range(text: str) -> tuple[float, float]:
     except InputError as error:
         raise InputError(f"--exclude is {quoted(text)}: a position of it {error}") from None
     return begin, end
+
+
+def pattern_of(args: argparse.Namespace) -> AdhesionPattern | None:
+    """Make the stripes of the options."""
+    names = {"count": "stripes", "amplitude": "stripe_amplitude", "phase": "stripe_phase"}
+    with refused_as_input(vars(args), **names):
+        return stripes_of(args.stripes, args.stripe_amplitude, args.stripe_phase)
 
 
 def what_was_read(prepared: Prepared) -> str:

@@ -56,6 +56,21 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         "both it is pinned (default: the same)",
     )
     group.add_argument(
+        "--stripes",
+        type=int,
+        metavar="N",
+        help="the work of adhesion varies N times along the period, about --work-of-adhesion",
+    )
+    group.add_argument(
+        "--stripe-amplitude", type=float, metavar="EPS", help="by this share of it, below 1"
+    )
+    group.add_argument(
+        "--stripe-phase",
+        type=float,
+        metavar="PHI",
+        help="in rad: γ(x) = γ (1 + EPS cos(2π N x/L + PHI)) (default 0)",
+    )
+    group.add_argument(
         "--measure",
         default="arc",
         metavar="NAME",

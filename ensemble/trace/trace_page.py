@@ -40,6 +40,8 @@ from adhesis.solver.loading.equilibrium_path import (
     sticking_text,
 )
 
+_OF_MODEL = {"numerics": "of the loop itself", "zones": "cohesive zones at edges, left out"}
+
 
 def summary(answer: Answer) -> str:
     """The answer in a few lines for the terminal."""
@@ -93,7 +95,8 @@ def _friction(answer: Answer) -> list[str]:
     gamma, loop = answer.cycle.work_of_adhesion_open, answer.main
     if gamma is None or gamma == answer.cycle.works_of_adhesion[0]:
         return []
-    return [friction_text(gamma, loop["loss"], loop["friction"])]
+    varies = answer.cycle.pattern is not None
+    return [friction_text(gamma, loop["loss"], loop["friction"], varies=varies)]
 
 
 def _note(answer: Answer) -> str:
@@ -119,7 +122,9 @@ def _scope(answer: Answer) -> str:
 
 
 def _range(answer: Answer) -> str:
-    """Describe below which range of adhesion the zero-range limit holds."""
+    """Describe the range of adhesion that is given, or below which zero range holds."""
+    if answer.main["strength"] is not None:
+        return str(answer.main["range_summary"])
     inside, ranges = "no tension inside patches", []
     if answer.valid_range is not None:
         tension = stress_text(answer.largest_interior_tension)
@@ -242,10 +247,9 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
 def _doubt_rows(answer: Answer) -> list[list[str]]:
     rows = [["doubt", "loss", "pull-off", "contact"]]
     quantities = (answer.loss, answer.pull_off_stress, answer.contact_fraction)
-    for name in (*DOUBTS, "numerics"):
+    for name, words in (DOUBTS | _OF_MODEL).items():
         shares = [q.doubts.get(name) for q in quantities]
         if any(share is not None for share in shares):
-            words = DOUBTS.get(name, "of the loop itself")
             cells = ["" if share is None else rounded_percent(share) for share in shares]
             rows.append([f"{name}: {words}", *cells])
     rows.append(["interval", *(f"± {rounded_percent(q.relative)}" for q in quantities)])

@@ -92,8 +92,12 @@ def make_plan(
     jobs, base = {}, prepared.profile()
     for run in runs:
         gamma, point = run.work_of_adhesion, run.turning_point
+        profile = prepared.profile(**run.changes) if run.changes else base
+        own = cycle
+        if cycle.pattern is not None:  # stripes keep their width where the period is another
+            own = replace(cycle, pattern=cycle.pattern.on_period(profile.period / base.period))
         jobs[run.name] = Job(
-            *(run.name, prepared.profile(**run.changes) if run.changes else base, cycle),
+            *(run.name, profile, own),
             cycle.works_of_adhesion[0] if gamma is None else gamma,
             cycle.turning_points[0] if point is None else point,
         )

@@ -212,6 +212,15 @@ class EquilibriumPath(ByValue, ResultViews):
         return TOUCH_SHARE * max(self.lost, 0.0) / stress if stress > 0 else math.inf
 
     @property
+    def zone_error(self) -> float:
+        """Estimated change of the loss by cohesive zones at edges, which are left out, in J/m².
+
+        0 with zero range (docs/zero-range.md).
+        """
+        range_ = self.problem.attraction_range
+        return SMEARED * (range_ / self.edge_range) ** 4 * abs(self.lost) if range_ > 0 else 0.0
+
+    @property
     def least_range(self) -> float:
         """The least of ``valid_range``, ``edge_range``, ``touch_range``, ``turn_range``, in m.
 
@@ -285,8 +294,7 @@ class EquilibriumPath(ByValue, ResultViews):
     def range_warnings(self) -> list[str]:
         """Return sentences where the range of adhesion may matter more than the model knows."""
         given = self.problem, self.valid_range, self.lost, self.contact_fraction
-        opened = self.jumps, self.problem.attraction_range, self.edge_range
-        return range_warnings(*given, *self.outer_ranges) + opening_warnings(*opened)
+        return range_warnings(*given, *self.outer_ranges) + opening_warnings(self.jumps)
 
     def strain_warnings(self) -> list[str]:
         """Return sentences where strains are not small."""
@@ -399,17 +407,14 @@ class EquilibriumPath(ByValue, ResultViews):
         if math.isfinite(self.turn_range):
             outside += f"; beyond the turn: {1e9 * self.turn_range:.3g} nm"
         if math.isfinite(strength):
-            range_ = self.problem.work_of_adhesion / strength
             largest = 0.0 if interior is None else interior.tension
-            zones = 100 * SMEARED * (range_ / self.edge_range) ** 4
-            if range_ < self.edge_range:
-                outside += f"; zones at edges, left out, change the loss by about {zones:.1g} %"
+            zones = 100 * self.zone_error / (abs(self.lost) or 1.0)
             return (
-                f"adhesion of a range of {range_:.3g} m: surfaces jump together from there on, and "
-                f"patches open from inside at {strength:.3g} Pa, "
+                f"adhesion of a range of {self.problem.attraction_range:.3g} m: surfaces jump "
+                f"together from there on, and patches open from inside at {strength:.3g} Pa, "
                 f"{counted(self.openings, 'opening')} with barriers of "
                 f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; "
-                f"{outside}"
+                f"{outside}; zones at edges, left out, change the loss by about {zones:.1g} %"
             )
         inside = "no tension inside patches"
         if interior is not None:
@@ -431,15 +436,16 @@ class EquilibriumPath(ByValue, ResultViews):
 
         None stands for infinity, and for the stiffness of a fixed separation. With one work of
         adhesion ``work_of_adhesion_open`` is that one, and ``least_work_of_adhesion`` without a
-        pattern.
+        pattern; ``stripes`` and what belongs to them are None unless the pattern is one wave.
         ``pandas.DataFrame([loop.numbers() for loop in loops])`` compares loops.
         """
         problem, half_space = self.problem, self.problem.half_space
         own = (*self._numbers, "loss_from_drops", "audit_residual", "loss_error", "races")
-        own = (*own, "friction", "energy_at_stake", "openings", "barrier")
+        own = (*own, "friction", "energy_at_stake", "openings", "barrier", "zone_error")
         more = ("largest_contact_fraction", "largest_interior_tension")
         values = {name: getattr(self, name) for name in (*own, *more)}
-        gamma = problem.work_of_adhesion
+        gamma, pattern = problem.work_of_adhesion, problem.pattern
+        waves = pattern.stripes if pattern is not None else (None, None, None)
         return {
             **{name: getattr(problem.profile, name) for name in _OF_PROFILE},
             "young": half_space.young,
@@ -449,6 +455,8 @@ class EquilibriumPath(ByValue, ResultViews):
             "work_of_adhesion_open": problem.gamma_open,
             "stiffness": finite(problem.control.stiffness),
             "strength": finite(problem.strength),
+            "adhesion_range": problem.attraction_range,
+            **dict(zip(("stripes", "stripe_amplitude", "stripe_phase"), waves, strict=True)),
             "measure": problem.measure,
             "full_contact_energy": problem.full_contact_energy,
             "load_steps": self.load_steps,

@@ -74,11 +74,6 @@ DOUBTFUL_EXCESS = 1.01
 """Tension inside patches over a finite strength above which a loss is doubtful: a hundredth is
 the excess at which a crack that closed again is retried (``solver.crack.HEALED_TENSION``)."""
 
-OPENED_SHARE = 0.1
-"""Of ``edge_range``: the longest range at which patches may open from inside without a doubt. A
-real interface yields over a zone before it opens. At a quarter losses were 4 to 46 % too small, and
-zones grow as the square of the range (docs/zero-range.md)."""
-
 SMEARED = 0.05
 """Share of the loss of zero range that cohesive zones at edges change, over (δ/``edge_range``)⁴:
 0.04 to 0.06 beside exact waves under Dugdale's law (docs/zero-range.md)."""
@@ -326,21 +321,16 @@ def stress_text(pascals: float) -> str:
     return f"{1e-6 * pascals:.3g} MPa" if pascals >= 1e6 else f"{1e-3 * pascals:.3g} kPa"
 
 
-def opening_warnings(jumps: Sequence[Jump], range_: float, edge_range: float) -> list[str]:
-    """Return a warning if patches open from inside at a range that is not short.
+def opening_warnings(jumps: Sequence[Jump]) -> list[str]:
+    """Return a warning if patches open from inside, of a real interface over a zone.
 
-    Parameters
-    ----------
-    jumps : sequence of Jump
-    range_, edge_range : float
-        That of adhesion, and of the path, in m.
+    At a tenth of ``edge_range`` losses were up to 23 % too small (docs/zero-range.md).
     """
-    if range_ <= OPENED_SHARE * edge_range or not any(jump.barrier > 0 for jump in jumps):
+    if not any(jump.barrier > 0 for jump in jumps):
         return []
     return [
-        f"patches open from inside at a range of {1e9 * range_:.3g} nm, longer than "
-        f"{OPENED_SHARE:g} of edge_range, {1e9 * edge_range:.3g} nm: a real interface yields over "
-        "a zone before, and loses more (docs/zero-range.md)"
+        "patches open from inside: a real interface yields over a zone before, and loses more "
+        "(docs/zero-range.md)"
     ]
 
 
@@ -361,8 +351,8 @@ def beyond_limit(
     The least of their ranges is below :data:`DOUBTFUL_RANGE`, or they are more than
     :data:`DOUBTFUL_LOSS` times the work of adhesion of the largest contact, at which its edges
     recede. At a finite strength it is those whose own range of adhesion, γ over the strength, is
-    longer than edges, touches or turns allow, or than :data:`OPENED_SHARE` of what edges allow
-    where patches open (``barrier`` is positive), and those at which the tension inside patches
+    longer than edges, touches or turns allow, those in which patches open (``barrier`` is
+    positive), and those at which the tension inside patches
     exceeds the strength :data:`DOUBTFUL_EXCESS` times. None is where the strength is unknown (NaN).
     """
     loss, gamma = np.asarray(loss), np.asarray(work_of_adhesion)
@@ -374,8 +364,7 @@ def beyond_limit(
     exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
     edges = EDGE_SHARE * np.asarray(edge_range)
     long = gamma > strength * least_range(math.inf, edges, touch_range, turn_range)
-    opened = (np.asarray(barrier) > 0) & (gamma > OPENED_SHARE * strength * np.asarray(edge_range))
-    opened = exceeded | long | opened
+    opened = exceeded | long | (np.asarray(barrier) > 0)
     return np.asarray(np.where(np.isposinf(strength), closed, np.isfinite(strength) & opened))
 
 

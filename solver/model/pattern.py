@@ -86,6 +86,16 @@ class AdhesionPattern(ByValue):
         """Largest m with c_m ≠ 0; 0 where nothing varies."""
         return self._variation.highest_harmonic if self._variation else 0
 
+    @property
+    def stripes(self) -> tuple[int | None, float | None, float | None]:
+        """The arguments of :func:`stripes` that make it; None where it is not one wave."""
+        waves = np.flatnonzero(self.coefficients)
+        if len(waves) != 1:
+            return None, None, None
+        (wave,) = waves.tolist()
+        c = self.coefficients[wave]
+        return wave, float(2 * np.abs(c)), float(np.angle(c))
+
     def at(self, theta: Array) -> Array:
         """Evaluate γ(x)/γ at θ = q0 x."""
         return 1.0 + self._variation.at(theta) if self._variation else np.ones_like(theta)
@@ -105,6 +115,14 @@ class AdhesionPattern(ByValue):
         """Return the pattern moved by a ``share`` of the period towards positive x."""
         turn = np.exp(-2j * np.pi * np.arange(self.coefficients.size) * real("share", share))
         return AdhesionPattern(self.coefficients * turn)
+
+    def on_period(self, ratio: float) -> AdhesionPattern:
+        """Return waves of these lengths on a period ``ratio`` times as long, in whole numbers."""
+        waves = np.flatnonzero(self.coefficients)
+        others = np.rint(waves * ratio).astype(int).clip(1)
+        coefficients = np.zeros(others.max(initial=0) + 1, dtype=np.complex128)
+        np.add.at(coefficients, others, self.coefficients[waves])
+        return AdhesionPattern(coefficients)
 
     def mirrored(self) -> AdhesionPattern:
         """Return the pattern γ(-x)."""

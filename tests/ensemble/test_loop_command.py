@@ -67,8 +67,24 @@ def test_stripes_lower_the_loss_of_a_wave_whose_crest_is_weak(wave_file, tmp_pat
     data = json.loads(out.read_text())
     assert data["work_of_adhesion"] == GAMMA
     assert data["least_work_of_adhesion"] == pytest.approx(0.5 * GAMMA, rel=1e-9)
+    assert data["stripes"] == 1
+    assert (data["stripe_amplitude"], data["stripe_phase"]) == pytest.approx((0.5, np.pi))
+    assert (data["adhesion_range"], data["zone_error"]) == (0.0, 0.0)
     assert 0.1 * WAVE.loop.loss < data["loss"] < 0.6 * WAVE.loop.loss
     assert "J/m² along the profile)" in capsys.readouterr().out
+
+
+def test_json_names_the_range_and_what_zones_at_edges_change(wave_file, tmp_path):
+    out = tmp_path / "loop.json"
+    range_ = 0.1 * AMPLITUDE
+    words = ("--max-penetration", 0.8, "--adhesion-range", range_, "--load-steps", 5)
+    assert run(*wave_words(wave_file, *words, "--json", out)) == 0
+    data = json.loads(out.read_text())
+    assert data["adhesion_range"] == pytest.approx(range_, rel=1e-12)
+    assert data["strength"] == pytest.approx(GAMMA / range_, rel=1e-12)
+    share = 0.05 * (range_ / data["edge_range"]) ** 4
+    assert data["zone_error"] == pytest.approx(share * data["loss"], rel=1e-9)
+    assert (data["stripes"], data["stripe_amplitude"], data["stripe_phase"]) == (None,) * 3
 
 
 @pytest.mark.usefixtures("exact_method")
@@ -109,7 +125,7 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
 # Units of what a JSON document may hold; a number that is none of these is dimensionless.
 DIMENSIONAL = {
     "m": {"h_max", "h_rms", "period", "separation", "patch_length"}
-    | {"valid_range", "edge_range", "touch_range", "turn_range"},
+    | {"valid_range", "edge_range", "touch_range", "turn_range", "adhesion_range"},
     "m²": {"m0"},
     "1/m²": {"m4"},
     "Pa": {
@@ -121,7 +137,7 @@ DIMENSIONAL = {
         *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),
         *("energy_at_stake", "barrier", "work_gained", "work_spent", "full_contact_energy"),
         *("effective_work_of_approach", "effective_work_of_separation"),
-        *("work_of_adhesion_open", "least_work_of_adhesion", "friction"),
+        *("work_of_adhesion_open", "least_work_of_adhesion", "friction", "zone_error"),
     },
     "Pa/m": {"stiffness"},
     "s": {"seconds"},

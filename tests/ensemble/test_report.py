@@ -784,6 +784,19 @@ def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
     assert warning.startswith("WARNING: 3 of 4 losses")
 
 
+def test_the_table_of_losses_says_what_zones_at_edges_change(tmp_path):
+    text = text_of(hurst=(0.7,), gamma=(0.02,), realisations=4)
+    plan = parse_campaign(text.replace("poisson = 0.5", "poisson = 0.5\nstrength = 1e9"))
+    values = rows(plan)
+    values["opening_strength"][:] = 1e9
+    values["zone_error"][:] = [1e-6, 2e-6, 3e-6, 4e-6]
+    table = loss_tables.losses(aggregate(write(tmp_path / "r.h5", plan, values)))
+    names = [column.name for column in table.columns]
+    place = names.index("zone_error_mean [J/m^2]")
+    assert table.rows[0][place] == pytest.approx(2.5e-6)
+    assert table.columns[place].heading == "± zones"
+
+
 def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, undrawn):
     for n, named, other in (
         (3, "by Student's t", "Hall"),

@@ -102,8 +102,10 @@ def test_the_range_of_adhesion_is_in_the_row():
     assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [np.inf, 0, 0.0]
     opening = Jump("unloading", 1e-6, 1.0, "opening", 1, 2, 0.5, 0.4, 1e-5, barrier=0.5)
     problem = replace(loop.problem, strength=1e12)
-    row = loop_row(campaign, replace(loop, jumps=(opening, opening), problem=problem))
+    opened = replace(loop, jumps=(opening, opening), problem=problem, narrowest_length=1e-6)
+    row = loop_row(campaign, opened)
     assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [1e12, 2, 1.0]
+    assert row["zone_error"] == opened.zone_error > 0
 
 
 def test_curves_are_cut_where_the_axis_ends():

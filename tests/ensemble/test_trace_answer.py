@@ -16,7 +16,7 @@ import pytest
 from markdown_it import MarkdownIt
 from matplotlib.image import imread
 
-from adhesis import Control, Problem, make_method, run_loop, self_affine_profile
+from adhesis import Control, Problem, make_method, run_loop, self_affine_profile, stripes
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
@@ -27,6 +27,7 @@ from adhesis.ensemble.trace.answer import (
     make_cycle,
     run_plan,
 )
+from adhesis.ensemble.trace.answer import document as document_of
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
@@ -515,6 +516,53 @@ def test_a_plan_expects_no_more_patches_than_crests_that_are_reached(gamma: floa
 
 
 @pytest.mark.usefixtures("quick_figures")
+def of_the_answer_alone(cycle: Any, trace: Prepared) -> Answer:
+    """Run the answer's own loop of a trace."""
+    return run_plan(trace, cycle, only(make_plan(trace, cycle, quick=True, processes=0), "answer"))
+
+
+def test_stripes_reach_every_loop_of_a_trace_with_their_width() -> None:
+    cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-2, pattern=stripes(20, 0.3))
+    trace = prepared()
+    jobs = {job.name: job for job in make_plan(trace, cycle, quick=True, processes=0).jobs}
+    periods = {name: job.profile.period for name, job in jobs.items()}
+    assert periods["blend 10 %"] < 0.96 * periods["answer"]
+    width = periods["answer"] / 20
+    for name, job in jobs.items():
+        problem = job.cycle.problem(job.profile, job.work_of_adhesion)
+        assert problem.pattern is not None
+        assert problem.pattern.stripes[0] == round(periods[name] / width)
+    found = document_of(of_the_answer_alone(cycle, trace))
+    assert found["stripes"] == found["loop"]["stripes"] == 20
+    assert found["stripe_amplitude"] == pytest.approx(0.3)
+    assert found["least_work_of_adhesion"] == pytest.approx(0.7 * 0.04)
+
+
+def test_the_command_takes_stripes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, out = tmp_path / "t.txt", tmp_path / "out"
+    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
+    given: list[Any] = []
+    monkeypatch.setattr(
+        "adhesis.ensemble.command.trace.make_plan",
+        lambda _, cycle, **__: given.append(cycle) or small_plan()[2],
+    )
+    words = ["trace", str(path), *CONTACT, "--unit", "um", "--to", str(out), "--plan"]
+    assert main([*words, "--stripes", "8", "--stripe-amplitude", "0.3"]) == 0
+    assert given[0].pattern == stripes(8, 0.3)
+    assert main([*words, "--stripes", "8"]) == 2
+
+
+def test_a_range_of_a_trace_is_said_with_what_zones_at_edges_change() -> None:
+    cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-2, adhesion_range=2e-7)
+    answer = of_the_answer_alone(cycle, prepared())
+    found = document_of(answer)
+    assert found["adhesion_range"] == pytest.approx(2e-7)
+    assert found["zone_error"] > 0
+    share = found["zone_error"] / found["loss"]["value"]
+    assert answer.loss.doubts["zones"] == pytest.approx(share)
+    assert "\nrange       adhesion of a range of 2e-07 m" in str(answer)
+
+
 def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys, monkeypatch):
     """The measure reaches the loops, the page and the document; an unknown one is refused."""
     monkeypatch.setattr(answers, "Loops", lambda jobs, *_: Loops(jobs, 0))  # in this process

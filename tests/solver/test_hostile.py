@@ -23,7 +23,7 @@ def test_a_hostile_loop_keeps_every_promise(number):
 @pytest.mark.parametrize(("number", "flagged"), [(21, True), (30, False)])
 def test_tension_above_the_strength_is_stated(number, flagged):
     """No state has more inside a patch unless the loss is doubtful for it."""
-    found = judge(draw(41270, number, strength=True), number)
+    found = judge(draw(41270, number, "range"), number)
     assert found["wrong"] == []
     assert found["openings"] > 0
     assert found["flagged"] == (found["excess"] > 1.01) == flagged

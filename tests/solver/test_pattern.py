@@ -165,6 +165,18 @@ def test_a_pattern_knows_its_bounds_and_symmetries():
     np.testing.assert_allclose(both.mirror_axes, [0, PERIOD / 4], atol=1e-18)
 
 
+def test_a_pattern_knows_its_stripes_also_on_another_period():
+    wide = stripes(20, 0.3, 1.0)
+    assert wide.stripes == pytest.approx((20, 0.3, 1.0), rel=1e-12)
+    assert wide.on_period(0.91) == stripes(18, 0.3, 1.0)
+    assert wide.on_period(1e-3) == stripes(1, 0.3, 1.0)
+    assert (
+        AdhesionPattern([0, 0, 0.1, 0.2]).stripes
+        == (None, None, None)
+        == AdhesionPattern([0, 0]).stripes
+    )
+
+
 def test_a_range_of_a_loop_is_that_of_the_weakest_place():
     problem = Problem(ROUGH, SOLID, 2e-3, pattern=UNEVEN)
     loop = loop_of(problem, 1e-3, max_penetration=0.7)

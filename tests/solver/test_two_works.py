@@ -18,6 +18,9 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
+from adhesis.solver.sharp.continuation import follower
+from adhesis.solver.sharp.continuation.branch import Branch
+from tools.hostile import draw
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
 SOLID = HalfSpace(1e6, 0.5)
@@ -206,3 +209,34 @@ def test_a_loop_under_a_load_does_not_creep() -> None:
     assert loop.method.newton_steps < 1000
     assert abs(loop.audit_residual) < 1e-4
     assert loop.friction > 0
+
+
+def test_edges_that_begin_to_move_together_do_not_hold_each_other_back(monkeypatch):
+    """The error of an equilibrium pins some again, by turns, at each smallest step."""
+    advance, steps = Branch.advance, [0]
+
+    def counted(branch):
+        steps[0] += 1
+        assert steps[0] < 20_000  # 5,000 without such steps
+        return advance(branch)
+
+    monkeypatch.setattr(Branch, "advance", counted)
+    scene = draw(9001, 0, "open")
+    problem = scene.problem()
+    coarse, fine = (
+        run_loop(make_method("sharp", problem, accuracy=accuracy), **scene.turn(problem))
+        for accuracy in (1e-4, 1e-6)
+    )
+    assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error
+
+
+def test_a_branch_that_goes_on_without_an_end_is_refused(monkeypatch):
+    monkeypatch.setattr(follower, "CONTINUED", 30)
+    scene = draw(5202, 90, "open")
+    problem = scene.problem()
+    with pytest.raises(adhesis.PathError, match="no equilibrium is found on a branch that goes on"):
+        run_loop(
+            make_method("sharp", problem, accuracy=scene.accuracy),
+            load_steps=scene.load_steps,
+            **scene.turn(problem),
+        )

@@ -103,6 +103,7 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "gamma_open": gamma,
         "audit_residual": audit,
         "loss_error": 1e-4 * loss,
+        "zone_error": np.zeros(n),
         "valid_range": 1e-2 * h_max,
         "edge_range": 2e-2 * h_max,
         "touch_range": 3e-2 * h_max,

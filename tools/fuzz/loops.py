@@ -8,13 +8,14 @@ the field) and contact is not lost below s = h_max; that loop integral and sum o
 within both errors, where nothing raced; and for every twentieth that ``grid`` does. A path that is
 refused (PathError) is counted.
 
-    python tools/fuzz/loops.py --seed N [--scenes 2000] [--number K] [--strength | --many]
+    python tools/fuzz/loops.py --seed N [--scenes 2000] [--number K] [--law LAW] [--control C]
 
-With ``--many`` loops have 20 to 80 patches, and all are compared: half a minute each. With
-``--strength`` adhesion has a range: half of them up to four decades above that which keeps patches
-closed inside, the others up to ``edge_range``. Then no state may have a gap that should have
-touched, or a place at the strength where a crack grows, and none may have a tension inside a patch
-that exceeds the strength by more than a hundredth, unless the loop's warnings state it.
+The law of adhesion is one γ, two works (open), γ(x) (pattern) or a range; loops of ``--law many``
+have one γ and 20 to 80 patches, and all are compared: half a minute each. Of the ranges half are up
+to four decades above that which keeps patches closed inside, the others up to ``edge_range``. Then
+no state may have a gap that should have touched, or a place at the strength where a crack grows,
+and none may have a tension inside a patch that exceeds the strength by more than a hundredth,
+unless the loop's warnings state it.
 """
 
 from __future__ import annotations
@@ -32,16 +33,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
 import numpy as np
 
-from tools.hostile import draw, judge
+from tools.hostile import CONTROLS, LAWS, draw, judge
 from tools.isolated import Isolated
 
 LIMIT = 120.0  # s of CPU time of one scene, all its runs together
 _QUANTILES = (0.1, 0.5, 0.9, 0.99)  # of the differences over loss_error that are printed
 
 
-def judged(seed: int, number: int, strength: bool, many: bool) -> dict[str, Any]:
+def judged(seed: int, number: int, law: str, control: str) -> dict[str, Any]:
     """Draw a scene and judge it."""
-    return judge(draw(seed, number, strength, many), number)
+    return judge(draw(seed, number, law, control), number)
 
 
 def calibration(found: list[dict[str, Any]]) -> str:
@@ -82,11 +83,11 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=np.inf)
     parser.add_argument("--scenes", type=int, default=2000, help="at most so many")
     parser.add_argument("--number", type=int, help="this scene alone")
-    parser.add_argument("--strength", action="store_true", help="adhesion of a finite range")
-    parser.add_argument("--many", action="store_true", help="20 to 80 patches, all compared")
+    parser.add_argument("--law", choices=LAWS, default="one")
+    parser.add_argument("--control", choices=CONTROLS, default="separation")
     args = parser.parse_args()
     if args.number is not None:
-        alone = draw(args.seed, args.number, args.strength, args.many)
+        alone = draw(args.seed, args.number, args.law, args.control)
         print(alone)
         one = judge(alone, args.number)
         print(one)
@@ -99,7 +100,7 @@ def main() -> int:
     for number in range(args.scenes):
         if time.monotonic() > end and everything:
             break
-        found, ended = isolated(args.seed, number, args.strength, args.many)
+        found, ended = isolated(args.seed, number, args.law, args.control)
         found = found or {"wrong": [ended], "kind": "ended"}
         everything.append(found)
         kinds[found["kind"]] += 1
@@ -107,13 +108,13 @@ def main() -> int:
         if found["wrong"]:
             failures += 1
             again = f"python tools/fuzz/loops.py --seed {args.seed} --number {number}"
-            again += " --strength" if args.strength else " --many" if args.many else ""
+            again += f" --law {args.law} --control {args.control}"
             print(f"{'; '.join(found['wrong'])}\n    {again}")
         if time.monotonic() - shown > 14:
             shown = time.monotonic()
             count = len(everything)
             print(f"fuzz: {count} loops, {failures} wrong, {races} with races", flush=True)
-    if args.strength:
+    if args.law == "range":
         print(f"fuzz: {opening_summary(everything)}")
     seconds = sum(found.get("seconds", 0.0) for found in everything)
     print(

@@ -73,6 +73,11 @@ def losses(data: Aggregate) -> Table:
         ),
         *estimated("loss", _ALL, "loss (mJ/m²)", **_MILLI, least=True),
         *_friction_columns(data),
+        *(
+            estimated("zone_error", "mean", "± zones", **_MILLI)
+            if data.campaign.material.opens
+            else ()
+        ),
         TableColumn("loss_over_work_of_adhesion", _over_gamma, "W/γ", number(3), only_if_any=True),
         TableColumn("interval", lambda cell: interval_method(cell.done)),
         *estimated("loss_from_drops", **_MILLI),

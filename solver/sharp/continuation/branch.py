@@ -17,6 +17,7 @@ from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
+    AT_OPENING,
     LONGEST_STEP,
     ORDER_RESOLVED,
     PREDICTED_MOTION,
@@ -188,6 +189,8 @@ class Branch:
         The last accepted point.
     trail : Trail
         Accepted points since the last search for touches.
+    continued : int
+        Number of points that a descent led to.
     finest : float
         Separation to which a jump is located, in d: the smallest step, but across a fold or to the
         target.
@@ -209,7 +212,7 @@ class Branch:
         if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
-        self.trail = Trail(point)
+        self.trail, self.continued = Trail(point), 0
         self.finest, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = Predictor(point)
@@ -255,6 +258,7 @@ class Branch:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.add(point, self._closing.between(self.point, point, self._target.branch))
         self.point, self._predictor = point, Predictor(point)
+        self.continued += 1
 
     def _next_step(self) -> float:
         """Return the next step in d: no edge is predicted to move far, and the target not passed.
@@ -276,7 +280,8 @@ class Branch:
 
         The branch has a kink there, and the state on either side belongs to the path.
         """
-        distance, finest = pinned.distance(step), self.finest
+        finest = self.finest
+        distance = pinned.distance(step, AT_OPENING * finest)
         if not distance < abs(step) + finest:
             return step
         self._begins_to_move = True
