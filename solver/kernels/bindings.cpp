@@ -398,15 +398,7 @@ void bind_response(nb::module_& m) {
       .def_prop_ro("slope", [](const Equilibrium& e) { return e.at.slope; })
       .def_ro("pinned_share", &Equilibrium::pinned_share,
               "Place of C of pinned edges between both critical openings.")
-      .def_ro("pinned_rate", &Equilibrium::pinned_rate, "Its derivative by d.")
-      .def(
-          "solve_field",
-          [](const Equilibrium& e, double prescribed, const Model& model) {
-            return solve_separately(e.ends, e.references, e.orders, e.potential, e.at.pressure,
-                                    prescribed, model);
-          },
-          "prescribed"_a, "model"_a, Unlocked(),
-          "Solve every gap by itself in the potential of the others.");
+      .def_ro("pinned_rate", &Equilibrium::pinned_rate, "Its derivative by d.");
   nb::enum_<DescentEvent>(m, "DescentEvent", "Why a descent ended.")
       .value("AT_REST", DescentEvent::at_rest)
       .value("VANISHED", DescentEvent::vanished)
@@ -443,15 +435,6 @@ void bind_response(nb::module_& m) {
             return r.solve(prescribed, law, model.device);
           },
           "prescribed"_a, "law"_a, "model"_a, Unlocked())
-      .def(
-          "solve_separately",
-          [](const LinearResponse& r, const Vector& gaps, double pressure, double prescribed,
-             const Model& model) {
-            return solve_separately(gaps, r.nodes.gaps, r.nodes.orders, r.potential_at(pressure),
-                                    pressure, prescribed, model);
-          },
-          "gaps"_a, "pressure"_a, "prescribed"_a, "model"_a,
-          "Solve every gap by itself in the potential of the last solution.")
       .def("tangent_between", &tangent_between, "gaps"_a, "edges"_a, "prescribed"_a, "law"_a,
            "model"_a,
            "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.\n\n"
