@@ -363,7 +363,14 @@ void bind_response(nb::module_& m) {
       .def_prop_ro("separation", [](const Equilibrium& e) { return e.at.separation; })
       .def_prop_ro("slope", [](const Equilibrium& e) { return e.at.slope; })
       .def_ro("pinned_share", &Equilibrium::pinned_share)
-      .def_ro("pinned_rate", &Equilibrium::pinned_rate);
+      .def_ro("pinned_rate", &Equilibrium::pinned_rate)
+      .def(
+          "solve_field",
+          [](const Equilibrium& e, double prescribed, const Model& model) {
+            return solve_separately(e.ends, e.references, e.orders, e.potential, e.at.pressure,
+                                    prescribed, model);
+          },
+          "prescribed"_a, "model"_a, Unlocked());
   nb::enum_<DescentEvent>(m, "DescentEvent")
       .value("AT_REST", DescentEvent::at_rest)
       .value("VANISHED", DescentEvent::vanished)

@@ -1,4 +1,5 @@
-// Elastic field of given gaps: equation (1) of gap_field.py, solved on the tree of gaps.
+// Elastic field of given gaps: equation (1) of gap_field.py, solved on the tree of gaps, or gap by
+// gap in a known potential of the others.
 #pragma once
 
 #include <optional>
@@ -11,7 +12,7 @@ struct Field {
   Model model;
   Nodes nodes;
   Equations equations;
-  Pair solved;                       // (B + G)⁻¹ of S~ and of X
+  Pair solved;                       // (B + G)⁻¹ of S~ and of X; empty if the potential was known
   double unit_mean = not_a_number;   // Xᵀ (B + G)⁻¹ X
   double resistance = not_a_number;  // -2π/resistance is ∂p/∂d at fixed edges
   double pressure = not_a_number;    // p; NaN if there is no field
@@ -39,8 +40,19 @@ struct SolvedField {
 SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders, int fields,
                         const Model& model);
 
+// Solve every gap by itself in the potential of the others, G = g dθ/dη at the nodes of nearby
+// gaps. The pressure is corrected, so that d has the prescribed value to rounding.
+Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,
+                       const Vector& potential, double pressure, double prescribed,
+                       const Model& model);
+
 // Evaluate C = sqrt(2 dη/dθ) f(±1) at every gap end, less the terms of higher modes if asked for.
 Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equations,
                      bool with_end_terms);
+
+// Interpolate a potential g at θ from G = g dθ/dη at the nodes of a gap; beyond an end of the gap
+// it is the potential at that end.
+double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,
+                             double theta);
 
 }  // namespace adhesis

@@ -109,6 +109,9 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     if (out.corrections >= MOST_CORRECTIONS) break;
     last = size;
   }
+  out.potential = response.potential_at(pressure);
+  out.references = response.nodes.gaps;
+  out.orders = response.nodes.orders;
   out.ends = ends;
   if (out.found && law.pins()) share_openings(out, response, pinned, law, model);
   return out;

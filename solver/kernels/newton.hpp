@@ -9,8 +9,11 @@ struct Equilibrium {
   bool found = false;        // whether a stable equilibrium was found within reach
   bool is_outgrown = false;  // whether a gap or run needs more nodes than the response has
   Vector ends;
+  Vector potential;  // of the other gaps at the reference nodes, as G
   ResponseSolution at;
   int corrections = 0;
+  std::vector<Gap> references;  // of the gaps, and the orders of their rules
+  Integers orders;
   // Place of C between both critical openings, 0 where an edge begins to advance and 1 where it
   // begins to recede, and its derivative by d; NaN for edges that are not pinned. Empty with one
   // work of adhesion.

@@ -6,23 +6,6 @@ namespace adhesis {
 
 namespace {
 
-// Interpolate a potential g at θ from G = g dθ/dη at the nodes of a gap; beyond an end of the gap
-// it is the potential at that end.
-double interpolate_potential(const Gap& gap, const GaussRule& rule, const double* potential,
-                             double theta) {
-  MappedPoint at = eta_at(gap, std::min(std::max(theta, gap.end[0]), gap.end[1]));
-  double above = 0, below = 0, sign = 1;
-  for (int i = 0; i < rule.count; ++i) {
-    double apart = at.eta - rule.eta[i];
-    if (apart == 0) return at.slope * potential[i];
-    double share = sign * rule.weights[i] / apart;
-    above += share * potential[i];
-    below += share;
-    sign = -sign;
-  }
-  return at.slope * above / below;
-}
-
 // Move the reference of a gap, filled in already, with the potential there; `old` is where it was.
 // Returns whether it has a field.
 bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,

@@ -95,6 +95,12 @@ double LinearResponse::pressure_at(double prescribed, const Device& device) cons
   return (2 * pi * prescribed - weight * mean[0]) / by_pressure;
 }
 
+Vector LinearResponse::potential_at(double pressure) const {
+  Vector out(potential[0].begin(), potential[0].begin() + nodes.size());
+  add_scaled(pressure, potential[1].data(), out.data(), nodes.size());
+  return out;
+}
+
 Vector LinearResponse::motion_to(const Vector& ends) const {
   Vector motion(ends.size());
   for (int e = 0; e < int(ends.size()); ++e)

@@ -87,6 +87,9 @@ struct LinearResponse {
   // p with d prescribed, by the mean openings of the last solution.
   double pressure_at(double prescribed, const Device& device) const;
 
+  // Potentials of the last solution at p, at the nodes of all gaps.
+  Vector potential_at(double pressure) const;
+
   // Motion of all edges outwards from their references to these.
   Vector motion_to(const Vector& ends) const;
 

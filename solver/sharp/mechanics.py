@@ -144,7 +144,7 @@ class EdgeMechanics(EdgeProblem):
         gaps = found.gaps
         nearly = found.pressure, found.separation
         field = GapField(
-            self.source, gaps, prescribed, lambda: solve_field(gaps, prescribed, self.model), nearly
+            self.source, gaps, prescribed, lambda: found.solve_field(prescribed, self.model), nearly
         )
         pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)

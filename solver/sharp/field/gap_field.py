@@ -113,7 +113,7 @@ class GapField:
         if self._solve is not None:
             solution = self._solve()
             check_definite(solution)
-            self._solution, self._solve = solution, None
+            self._solution, self._solve = solution, None  # it may hold a response
         return self._solution
 
     @property
