@@ -60,20 +60,6 @@ inline double dot(const double* a, const double* b, int count) {
   return total;
 }
 
-// Sum (a_i - b_i) x_i, in the same order as dot.
-inline double dot_difference(const double* a, const double* b, const double* x, int count) {
-  Four even = {}, odd = {};
-  int i = 0;
-  for (; i + 8 <= count; i += 8) {
-    even += (load_four(a + i) - load_four(b + i)) * load_four(x + i);
-    odd += (load_four(a + i + 4) - load_four(b + i + 4)) * load_four(x + i + 4);
-  }
-  Four both = even + odd;
-  double total = (both[0] + both[1]) + (both[2] + both[3]);
-  for (; i < count; ++i) total += (a[i] - b[i]) * x[i];
-  return total;
-}
-
 // Compute out = base + a x, without a base a x, four rows at a time; `a` has at least four rows and
 // columns, or no columns.
 [[gnu::always_inline]] inline void apply(const double* a, int rows, int columns, const double* x,

@@ -1,6 +1,7 @@
 // What Python sees of the kernels: objects that it owns, functions, and arrays of their numbers.
 //
-// Long kernels run without the interpreter's lock.
+// What they mean is stated where they are declared, and here only where it differs. Long kernels
+// run without the interpreter's lock.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -8,7 +9,6 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
 
 #include <chrono>
 
@@ -124,18 +124,6 @@ namespace adhesis {
 
 namespace {
 
-// A value and a slope at each angle.
-template <class Evaluate>
-std::pair<Vector, Vector> evaluate_at(const Vector& theta, Evaluate evaluate) {
-  std::pair<Vector, Vector> out;
-  for (double at : theta) {
-    const ValueAndSlope found = evaluate(at);
-    out.first.push_back(found.value);
-    out.second.push_back(found.slope);
-  }
-  return out;
-}
-
 // One member of every object.
 template <class Object, class Member>
 auto each(const std::vector<Object>& objects, Member Object::* member) {
@@ -197,7 +185,7 @@ class PythonAdhesion : public Adhesion {
 };
 
 void bind_model(nb::module_& m) {
-  nb::class_<Panels>(m, "Panels", "The full-contact stress of a profile, compressed on panels.")
+  nb::class_<Panels>(m, "Panels")
       .def(nb::init<double, int, Vector, Vector, Vector, Vector, Vector, Vector, Pair, Pair,
                     Integers, Vector, Vector, int, Vector, Vector, Vector, int>(),
            nb::kw_only(), "width"_a, "finest_count"_a, "x"_a, "w"_a, "stress"_a, "slope"_a,
@@ -206,25 +194,19 @@ void bind_model(nb::module_& m) {
       .def(
           "stress",
           [](const Panels& p, const Vector& theta) {
-            return evaluate_at(theta, [&](double at) {
-              return ValueAndSlope{evaluate_series(p.stress, at, p).value,
-                                   evaluate_series(p.slope, at, p).value};
-            });
+            std::pair<Vector, Vector> out;
+            for (double at : theta) {
+              out.first.push_back(evaluate_series(p.stress, at, p).value);
+              out.second.push_back(evaluate_series(p.slope, at, p).value);
+            }
+            return out;
           },
-          "theta"_a, "Evaluate S and S' at any angles.")
-      .def(
-          "half_plane_opening",
-          [](const Panels& p, const Vector& theta, int side) {
-            return evaluate_at(theta, [&](double at) { return half_plane_opening(at, side, p); });
-          },
-          "theta"_a, "side"_a,
-          "Evaluate C and dC/dθ of half-plane cracks that begin (side 0) or end (1) at θ.");
-  nb::class_<Device>(m, "LoadingDevice",
-                     "Device that prescribes the value d = separation_weight·q0 s - compliance·p.")
+          "theta"_a, "Evaluate S and S' at any angles.");
+  nb::class_<Device>(m, "LoadingDevice")
       .def(nb::init<double, double>(), "separation_weight"_a, "compliance"_a)
       .def_ro("separation_weight", &Device::separation_weight)
       .def_ro("compliance", &Device::compliance);
-  nb::class_<Model>(m, "FieldModel", "Inputs of a field besides its gaps and the prescribed value.")
+  nb::class_<Model>(m, "FieldModel")
       .def(nb::init<Device, double, std::shared_ptr<const Panels>>(), "device"_a, "digits"_a,
            "panels"_a)
       .def_ro("device", &Model::device)
@@ -235,25 +217,21 @@ void bind_model(nb::module_& m) {
       .def_ro("pins", &Adhesion::pins)
       .def_ro("least", &Adhesion::least)
       .def_ro("largest", &Adhesion::largest)
-      .def("work", &Adhesion::work, "theta"_a, "recedes"_a,
-           "Evaluate w of an edge that advances or recedes at θ, and dw/dθ.")
-      .def("work_up_to", &Adhesion::work_up_to, "theta"_a, "recedes"_a,
-           "Integrate w dθ from 0 to θ.")
+      .def("work", &Adhesion::work, "theta"_a, "recedes"_a)
+      .def("work_up_to", &Adhesion::work_up_to, "theta"_a, "recedes"_a)
       .def(
           "contact_work",
           [](const Adhesion& adhesion, const Vector& gaps, bool recedes) {
             return contact_work(gaps, recedes, adhesion);
           },
-          "gaps"_a, "recedes"_a = false, "Integrate w dθ over the patches between gaps.");
-  nb::class_<ProfileAdhesion, Adhesion>(m, "ProfileAdhesion",
-                                        "γ along the profile, and a constant ratio γ_open/γ.")
+          "gaps"_a, "recedes"_a = false);
+  nb::class_<ProfileAdhesion, Adhesion>(m, "ProfileAdhesion")
       .def(nb::init<std::shared_ptr<const Panels>, double, double, double>(), "panels"_a,
            "ratio"_a = 1.0, "least"_a = 1.0, "largest"_a = 1.0);
   nb::class_<PythonAdhesion, Adhesion>(m, "PythonAdhesion", "A law of Python functions.")
       .def(nb::init<bool, double, double, WorkFunction, IntegralFunction>(), "pins"_a, "least"_a,
            "largest"_a, "work"_a, "work_up_to"_a);
-  nb::class_<EdgeLaw>(m, "EdgeLaw",
-                      "Law by which the edges move, with the tolerances of one problem.")
+  nb::class_<EdgeLaw>(m, "EdgeLaw")
       .def(nb::init<std::shared_ptr<const Adhesion>, double, double, double, double, double, double,
                     double, double>(),
            nb::kw_only(), "adhesion"_a, "critical"_a, "newton_tolerance"_a, "field_error"_a,
@@ -265,8 +243,7 @@ void bind_model(nb::module_& m) {
       .def_rw("smallest", &EdgeLaw::smallest)
       .def_prop_rw(
           "memory", [](const EdgeLaw& law) { return pairs_of(law.memory); },
-          [](EdgeLaw& law, const Vector& gaps) { law.memory = gaps; }, nb::for_getter(new_array),
-          "Gaps at the last state.")
+          [](EdgeLaw& law, const Vector& gaps) { law.memory = gaps; }, nb::for_getter(new_array))
       .def(
           "free_edges",
           [](const EdgeLaw& law, const Vector& gaps) {
@@ -283,32 +260,23 @@ void bind_model(nb::module_& m) {
               out.push_back(critical_of(e, gaps[e], opening[e], law).value);
             return out;
           },
-          "gaps"_a, "opening"_a, "Compute C_c at every edge with the opening C.")
-      .def(
-          "critical_openings",
-          [](const EdgeLaw& law, const Vector& theta) {
-            return evaluate_at(theta, [&](double at) { return critical_opening(at, law); });
-          },
-          "theta"_a, "Evaluate C_c of edges that advance, and its θ-derivative.");
-  m.def("shortest_length", &shortest_length, "gaps"_a,
-        "Find the length of the shortest gap or patch.");
+          "gaps"_a, "opening"_a, "Compute C_c at every edge with the opening C.");
+  m.def("shortest_length", &shortest_length, "gaps"_a);
 }
 
 void bind_field(nb::module_& m) {
-  nb::class_<Field>(m, "Field", "Solution of equation (1) of gap_field for given gaps.")
-      .def_ro("pressure", &Field::pressure, "p = 2p̄/E*; NaN if there is no solution.")
-      .def_ro("separation", &Field::separation, "q0 s.")
-      .def_ro("unit_mean", &Field::unit_mean, "Xᵀ (B + G)⁻¹ X.")
-      .def_ro("opening", &Field::opening, "C at each edge.")
+  nb::class_<Field>(m, "Field")
+      .def_ro("pressure", &Field::pressure)
+      .def_ro("separation", &Field::separation)
+      .def_ro("unit_mean", &Field::unit_mean)
+      .def_ro("opening", &Field::opening)
       .def_ro("scaled_opening", &Field::scaled_opening,
               "f: the openings over sqrt(1-η²), at all nodes.")
       .def_prop_ro("orders", [](const Field& f) { return f.nodes.orders; })
       .def_prop_ro("offset", [](const Field& f) { return f.nodes.offset; })
       .def_prop_ro("theta", [](const Field& f) { return f.nodes.theta; })
-      .def_prop_ro(
-          "weight", [](const Field& f) { return f.nodes.weight; }, "X.")
-      .def_prop_ro(
-          "load", [](const Field& f) { return f.equations.load; }, "S~.")
+      .def_prop_ro("weight", [](const Field& f) { return f.nodes.weight; })
+      .def_prop_ro("load", [](const Field& f) { return f.equations.load; })
       .def(
           "block",
           [](const Field& f, int k) {
@@ -348,7 +316,7 @@ void bind_field(nb::module_& m) {
             for (double at : theta) out.push_back(sum_modes(f.nodes.gaps[k], at, modes));
             return out;
           },
-          "k"_a, "theta"_a, "modes"_a, "Sum b_n sin((n+1)t), cos t = η(θ), in gap k.")
+          "k"_a, "theta"_a, "modes"_a)
       .def(
           "refine_opening",
           [](const Field& f, int k, const Vector& modes, int factor) {
@@ -359,7 +327,7 @@ void bind_field(nb::module_& m) {
           },
           "k"_a, "modes"_a, "factor"_a,
           "Evaluate θ and T of gap k at about `factor` times as many nodes as modes.")
-      .def("work_of_gaps", &work_of_gaps, Unlocked(), "Integrate S_full T dθ over the gaps.");
+      .def("work_of_gaps", &work_of_gaps, Unlocked());
   m.def(
       "sum_pull",
       [](const Vector& theta, const Vector& sine, const Vector& cosine, const Vector& weight) {
@@ -367,8 +335,7 @@ void bind_field(nb::module_& m) {
         for (double each : theta) out.push_back(sum_pull(each, sine, cosine, weight));
         return out;
       },
-      "theta"_a, "sine"_a, "cosine"_a, "weight"_a, Unlocked(),
-      "Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2.");
+      "theta"_a, "sine"_a, "cosine"_a, "weight"_a, Unlocked());
   m.def(
       "solve_field",
       [](const Vector& gaps, double prescribed, const Model& model,
@@ -381,12 +348,11 @@ void bind_field(nb::module_& m) {
 }
 
 void bind_response(nb::module_& m) {
-  nb::class_<ResponseSolution>(m, "ResponseSolution",
-                               "All edges as a linear response has them at a prescribed value.")
+  nb::class_<ResponseSolution>(m, "ResponseSolution")
       .def_ro("motion", &ResponseSolution::motion)
       .def_ro("pressure", &ResponseSolution::pressure)
       .def_ro("stable", &ResponseSolution::stable);
-  nb::class_<Equilibrium>(m, "Equilibrium", "Equilibrium of all edges, if one was found.")
+  nb::class_<Equilibrium>(m, "Equilibrium")
       .def_ro("found", &Equilibrium::found)
       .def_ro("is_outgrown", &Equilibrium::is_outgrown)
       .def_ro("corrections", &Equilibrium::corrections)
@@ -396,37 +362,35 @@ void bind_response(nb::module_& m) {
       .def_prop_ro("pressure", [](const Equilibrium& e) { return e.at.pressure; })
       .def_prop_ro("separation", [](const Equilibrium& e) { return e.at.separation; })
       .def_prop_ro("slope", [](const Equilibrium& e) { return e.at.slope; })
-      .def_ro("pinned_share", &Equilibrium::pinned_share,
-              "Place of C of pinned edges between both critical openings.")
-      .def_ro("pinned_rate", &Equilibrium::pinned_rate, "Its derivative by d.")
+      .def_ro("pinned_share", &Equilibrium::pinned_share)
+      .def_ro("pinned_rate", &Equilibrium::pinned_rate)
       .def(
           "solve_field",
           [](const Equilibrium& e, double prescribed, const Model& model) {
             return solve_separately(e.ends, e.references, e.orders, e.potential, e.at.pressure,
                                     prescribed, model);
           },
-          "prescribed"_a, "model"_a, Unlocked(),
-          "Solve every gap by itself in the potential of the others.");
-  nb::enum_<DescentEvent>(m, "DescentEvent", "Why a descent ended.")
+          "prescribed"_a, "model"_a, Unlocked());
+  nb::enum_<DescentEvent>(m, "DescentEvent")
       .value("AT_REST", DescentEvent::at_rest)
       .value("VANISHED", DescentEvent::vanished)
       .value("STEP_LIMIT", DescentEvent::step_limit)
       .value("NO_FIELD", DescentEvent::no_field)
       .value("OUTGROWN", DescentEvent::outgrown);
-  nb::class_<Descent>(m, "Descent", "Result of a descent.")
+  nb::class_<Descent>(m, "Descent")
       .def_ro("event", &Descent::event)
       .def_prop_ro(
           "gaps", [](const Descent& d) { return pairs_of(d.ends); }, new_array)
       .def_ro("steps", &Descent::steps)
       .def_ro("raced", &Descent::raced);
-  nb::class_<Running>(m, "Running", "What a descent knows of the way that its edges have come.")
+  nb::class_<Running>(m, "Running")
       .def(
           "__init__",
           [](Running* running, const Vector& start) {
             new (running) Running{Flags(start.size()), start};
           },
           "start"_a);
-  nb::class_<LinearResponse>(m, "LinearResponse", "Linear response of all gaps and their edges.")
+  nb::class_<LinearResponse>(m, "LinearResponse")
       .def_prop_ro("gap_count", &LinearResponse::gap_count)
       .def_prop_ro("orders", [](const LinearResponse& r) { return r.nodes.orders; })
       .def_prop_ro(
@@ -435,39 +399,27 @@ void bind_response(nb::module_& m) {
       .def_prop_ro(
           "charges", [](const LinearResponse& r) { return each(r.tree.runs, &Run::rank); },
           "Number of charges of every run of the tree of gaps.")
-      .def("settle", &settle_response, "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked(),
-           "Renew the response for a known equilibrium; False if it is outgrown.")
+      .def("settle", &settle_response, "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked())
       .def(
           "solve",
           [](LinearResponse& r, double prescribed, const EdgeLaw& law, const Model& model) {
             return r.solve(prescribed, law, model.device);
           },
           "prescribed"_a, "law"_a, "model"_a, Unlocked())
-      .def(
-          "solve_separately",
-          [](const LinearResponse& r, const Vector& gaps, double pressure, double prescribed,
-             const Model& model) {
-            return solve_separately(gaps, r.nodes.gaps, r.nodes.orders, r.potential_at(pressure),
-                                    pressure, prescribed, model);
-          },
-          "gaps"_a, "pressure"_a, "prescribed"_a, "model"_a,
-          "Solve every gap by itself in the potential of the last solution.")
       .def("tangent_between", &tangent_between, "gaps"_a, "edges"_a, "prescribed"_a, "law"_a,
            "model"_a,
            "Compute ∂(C_e - C_c)/∂n_f between some edges of these gaps.\n\n"
            "All others follow, but those at their memory, which are pinned.")
       .def("find_equilibrium", &find_equilibrium, "gaps"_a, "prescribed"_a, "reach"_a, "strict"_a,
-           "law"_a, "model"_a, Unlocked(),
-           "Find the equilibrium next to these gaps by Newton's iteration.")
+           "law"_a, "model"_a, Unlocked())
       .def("descend", &descend, "gaps"_a, "prescribed"_a, "most"_a, "equal_speeds"_a, "running"_a,
-           "law"_a, "model"_a, Unlocked(), "Descend in energy until an event.");
+           "law"_a, "model"_a, Unlocked());
   m.def("set_up_response", &set_up_response, "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a,
-        "model"_a, Unlocked(),
-        "Solve the field of these gaps, and linearise about it; None if they have none.");
+        "model"_a, Unlocked());
 }
 
 void bind_nucleation(nb::module_& m) {
-  nb::class_<SearchLengths>(m, "SearchLengths", "Lengths of a search for touches, in 1/q0.")
+  nb::class_<SearchLengths>(m, "SearchLengths")
       .def(nb::init<double, double, double, double, double, double>(), nb::kw_only(), "wave"_a,
            "closing_per_motion"_a, "surface"_a, "narrowest"_a, "widest"_a, "range"_a)
       .def(
@@ -476,7 +428,7 @@ void bind_nucleation(nb::module_& m) {
             for (double& one : curvature) one = seed_width(one, lengths);
             return curvature;
           },
-          "curvature"_a, "Compute the widths of seeds at touches with these curvatures.")
+          "curvature"_a)
       .def(
           "clearances",
           [](const SearchLengths& lengths, Vector opening, const Vector& curvature) {
@@ -511,19 +463,18 @@ void bind_nucleation(nb::module_& m) {
 }
 
 void bind_predictor(nb::module_& m) {
-  nb::class_<TwoPoints>(m, "TwoPoints", "Two points of a branch, `way` apart in d.")
+  nb::class_<TwoPoints>(m, "TwoPoints")
       .def(nb::init<Vector, Vector, Vector, Vector, double>(), "gaps"_a, "rate"_a, "gaps_before"_a,
            "rate_before"_a, "way"_a)
-      .def("leading_edge", &leading_edge, "Find the leading edge, and the fold ahead.")
-      .def("other_fold", &other_fold, "leading"_a,
-           "Find the nearest fold ahead that other gaps lead to.")
+      .def("leading_edge", &leading_edge)
+      .def("other_fold", &other_fold, "leading"_a)
       .def(
           "predict_gaps",
           [](const TwoPoints& points, double on, const LeadingEdge& leading) {
             return pairs_of(predict_ends(points, on, leading));
           },
           "on"_a, "leading"_a, "Predict the gaps at a distance `on` in d.");
-  nb::class_<LeadingEdge>(m, "LeadingEdge", "The edge that leads, and d along its motion.")
+  nb::class_<LeadingEdge>(m, "LeadingEdge")
       .def_ro("edge", &LeadingEdge::edge)
       .def_ro("fastest", &LeadingEdge::fastest)
       .def_ro("gone", &LeadingEdge::gone)
@@ -532,30 +483,24 @@ void bind_predictor(nb::module_& m) {
       .def_ro("cube", &LeadingEdge::cube)
       .def_ro("fold", &LeadingEdge::fold)
       .def_ro("fold_distance", &LeadingEdge::fold_distance);
-  nb::class_<OtherFold>(m, "OtherFold", "Fold that others lead to than the leading edge.")
+  nb::class_<OtherFold>(m, "OtherFold")
       .def(nb::init<>())
-      .def_ro("edge", &OtherFold::edge, "-1 for none.")
-      .def_ro("distance", &OtherFold::distance, "In d; infinite for none.");
+      .def_ro("edge", &OtherFold::edge)
+      .def_ro("distance", &OtherFold::distance);
 }
 
 void bind_grid(nb::module_& m) {
   m.def(
       "dot", [](Numbers a, Numbers b) { return dot(a.data(), b.data(), int(a.size())); }, "a"_a,
-      "b"_a, "Sum a_i b_i, in an order that depends on their number alone.");
-  m.def("total", &total, "values"_a,
-        "Sum the values, in an order that depends on their number alone.");
-  m.def("restrict", &restrict_inside, "values"_a, "inside"_a,
-        "Set the values outside Ω to zero, in place; returns whether they all were.");
-  m.def("residual_inside", &residual_inside, "target"_a, "displacement"_a, "inside"_a, "out"_a,
-        "Compute the residual on Ω, zero elsewhere; returns the largest absolute one.");
+      "b"_a);
+  m.def("total", &total, "values"_a);
+  m.def("restrict", &restrict_inside, "values"_a, "inside"_a);
+  m.def("residual_inside", &residual_inside, "target"_a, "displacement"_a, "inside"_a, "out"_a);
   m.def("update_direction", &update_direction, "direction"_a, "inside"_a, "correction"_a,
-        "factor"_a,
-        "Set the next search direction: the correction on Ω plus `factor` times the last one.");
+        "factor"_a);
   m.def("advance", &advance, "stress"_a, "displacement"_a, "residual"_a, "direction"_a,
-        "response"_a, "inside"_a, "step"_a,
-        "Take a step along the direction; returns the largest absolute residual on Ω.");
-  m.def("inverse_form", &inverse_form, "matrix"_a, "vector"_a,
-        "Return bᵀA⁻¹b for a symmetric positive definite A; overwrites A.");
+        "response"_a, "inside"_a, "step"_a);
+  m.def("inverse_form", &inverse_form, "matrix"_a, "vector"_a);
 }
 
 // Single parts, for their tests.
@@ -565,7 +510,7 @@ void bind_parts(nb::module_& m) {
       [](Matrix h, Matrix r) {
         return count_negative(h.values.data(), r.values.data(), h.n).negative;
       },
-      "h"_a, "r"_a, "Count the negative eigenvalues of [[h, 1], [1, r]].");
+      "h"_a, "r"_a);
   m.def(
       "local_minima",
       [](const Vector& theta, const Vector& opening) {
@@ -574,30 +519,16 @@ void bind_parts(nb::module_& m) {
                           each(found, &Candidate::error));
       },
       "theta"_a, "opening"_a, "Find local minima where θ falls: position, value, its error.");
-  nb::class_<EdgeModel>(m, "EdgeModel", "Model of the edge openings about solved edges.")
+  nb::class_<EdgeModel>(m, "EdgeModel")
       .def(nb::init<const Integers&, const Vector&, const Vector&, const Matrix&, const EdgeLaw&,
                     const Panels&>(),
            "edges"_a, "gaps"_a, "residual"_a, "tangent"_a, "law"_a, "panels"_a,
            nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>())
       .def_prop_ro("opening",
                    [](const EdgeModel& e) { return each(e.edges, &MovingEdge::opening); })
-      .def_prop_ro("own", [](const EdgeModel& e) { return each(e.edges, &MovingEdge::own); })
-      .def_prop_ro("coupling", &EdgeModel::coupling)
-      .def_prop_ro("forces", &EdgeModel::forces)
-      .def_prop_ro("hessian", &EdgeModel::hessian)
-      .def("advance", &EdgeModel::advance, "step"_a, "Move the edges outwards by these steps.")
-      .def("flow", &flow_through, "limit"_a, "equal_speeds"_a, "is_long"_a, "strongest"_a, "law"_a);
-  nb::class_<ModelFlow>(m, "ModelFlow", "Flow through the model.")
-      .def(nb::init<Vector, Vector, Vector, std::vector<Vector>>(), "motion"_a, "opening"_a,
-           "lengths"_a, "residuals"_a)
-      .def_ro("motion", &ModelFlow::motion)
-      .def_ro("lengths", &ModelFlow::lengths);
-  m.def("implicit_step", &implicit_step, "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a,
-        "Take a linearly implicit step.");
-  m.def("distance_to_minimum", &distance_to_minimum, "hessian"_a, "force"_a,
-        "Compute the largest motion to the minimum of a quadratic model; infinite without one.");
-  m.def("model_error", &model_error, "flow"_a, "residual"_a, "edges"_a, "gaps"_a, "law"_a);
-  m.def("next_reach", &next_reach, "before"_a, "length"_a, "error"_a);
+      .def("advance", &EdgeModel::advance, "step"_a);
+  m.def("implicit_step", &implicit_step, "hessian"_a, "force"_a, "longest"_a, "equal_speeds"_a);
+  m.def("distance_to_minimum", &distance_to_minimum, "hessian"_a, "force"_a);
 }
 
 }  // namespace

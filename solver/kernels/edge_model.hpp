@@ -50,13 +50,10 @@ class EdgeModel {
   // edges, which have no force, are kept where they are.
   Matrix hessian() const;
 
-  // ∂C_e/∂n_f over C_f; zero on the diagonal.
-  const Matrix& coupling() const { return coupling_; }
-
  private:
   const EdgeLaw& law_;
   const Panels& panels_;
-  Matrix coupling_;
+  Matrix coupling_;  // ∂C_e/∂n_f over C_f; zero on the diagonal
 
   // Evaluate R, C_c and the rates at the present edges.
   void evaluate(MovingEdge& edge) const;

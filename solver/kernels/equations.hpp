@@ -15,6 +15,7 @@ struct Nodes {
   Integers offset;       // first node of each gap, and N
   Integers square;       // first element of the M×M matrix of each gap, and of all
   Vector theta, weight;  // θ and X
+  Vector inset;          // distances from the nearer end of the gap
   Vector sine, cosine;   // of θ/2
   std::vector<std::array<double, 2>> slope;  // dη/dθ at both ends of each gap
 
@@ -40,12 +41,6 @@ Equations allocate_equations(const Nodes& nodes);
 
 // Fill in nodes, block and loads of gap k, of S alone or also of S'.
 void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model& model);
-
-// 1/sin²(x/2) - 4/x², x = Δθ: the kernel of a gap's own periodic images.
-double periodic_images(double x);
-
-// 4 [α²/sinh²(αx) - 1/x²], x = Δη: the own kernel but for a straight crack in η.
-double mapped_kernel(double alpha, double x);
 
 // Load on the own gap, and charges, of the singular opening that an edge leaves when it moves;
 // `density` is space for the nodes of the gap.

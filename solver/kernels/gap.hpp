@@ -92,7 +92,7 @@ inline MappedPoint eta_at(const Gap& gap, double theta) {
 }
 
 struct Place {
-  double theta, stretch;  // θ and dθ/dη
+  double theta, stretch, inset;  // θ, dθ/dη, and the distance from the nearer end
 };
 
 // Find θ at η, measured from the nearer end.
@@ -102,7 +102,7 @@ inline Place theta_at(const Gap& gap, double eta) {
   double grown = std::expm1(2 * gap.alpha * (side == 0 ? 1 + eta : 1 - eta));
   double r = grown / (1 / poles.near + (1 + grown) / poles.far);
   double stretch = 2 * gap.alpha / (1 / (poles.near + r) + 1 / (poles.far - r));
-  return {side == 0 ? gap.end[0] + r : gap.end[1] - r, stretch};
+  return {side == 0 ? gap.end[0] + r : gap.end[1] - r, stretch, r};
 }
 
 // The rate ln ρ of a gap: the error of M modes falls as ρ^-M.

@@ -74,11 +74,11 @@ int fast_size(int fewest) {
   constexpr int many_nodes = 500;  // from so many on, sizes of the transform lie closer together
   int eighth = 1;
   while (16 * eighth <= fewest + 1) eighth *= 2;
-  for (int step : {9, 10, 12, 15, 16}) {
-    if (fewest <= many_nodes && step != 12 && step != 16) continue;
+  for (int step : {9, 10, 12, 15}) {
+    if (fewest <= many_nodes && step != 12) continue;
     if (step * eighth - 1 >= fewest) return step * eighth - 1;
   }
-  return 32 * eighth - 1;
+  return 16 * eighth - 1;
 }
 
 int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave) {

@@ -3,33 +3,25 @@
 namespace adhesis {
 
 GaussRule::GaussRule(int m)
-    : count(m), eta(m), weights(m), end_values{Vector(m), Vector(m)}, crack(m * m), modes(m * m),
+    : count(m), eta(m), weights(m), end_values{Vector(m), Vector(m)}, straight(m * m), modes(m * m),
       derivative(m * m) {
-  Vector to_modes(m * m);  // coefficients of U_n from the nodes' values; rows nodes
   for (int i = 0; i < m; ++i) {
     const double t = (m - i) * pi / (m + 1), sine = std::sin(t);
     eta[i] = std::cos(t);
     weights[i] = pi / (m + 1) * sine * sine;
-    double sign = 1;
-    for (int n = 0; n < m; ++n) {
-      modes[i * m + n] = std::sin(t * (n + 1)) / sine;
-      to_modes[i * m + n] = 2 / pi * modes[i * m + n] * weights[i];
-      end_values[0][i] += sign * to_modes[i * m + n] * (n + 1);
-      end_values[1][i] += to_modes[i * m + n] * (n + 1);
-      sign = -sign;
-    }
+    // of the polynomial through the nodes
+    end_values[0][i] = alternating(i) * (1 - eta[i]);
+    end_values[1][i] = alternating(m - 1 - i) * (1 + eta[i]);
+    for (int n = 0; n < m; ++n) modes[i * m + n] = std::sin(t * (n + 1)) / sine;
   }
   for (int i = 0; i < m; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      double total = 0;
-      for (int n = 0; n < m; ++n) total += to_modes[i * m + n] * (n + 1) * to_modes[j * m + n];
-      crack[i * m + j] = crack[j * m + i] = 0.5 * pi * total;
+    straight[i * m + i] = 0.5 * (m + 1) * weights[i];
+    for (int j = 0; j < m; ++j) {
+      if (j == i) continue;
+      const double apart = eta[i] - eta[j];
+      straight[i * m + j] = alternating(i + j) * weights[i] * weights[j] / (pi * apart * apart);
+      derivative[i * m + j] = alternating(i + j) * weights[j] / weights[i] / apart;
     }
-    // of the polynomial through the nodes, by the barycentric formula
-    for (int j = 0; j < m; ++j)
-      if (j != i)
-        derivative[i * m + j] =
-            ((i + j) % 2 == 0 ? 1 : -1) * weights[j] / weights[i] / (eta[i] - eta[j]);
   }
 }
 

@@ -16,24 +16,7 @@ struct Complex {
   }
 };
 
-// Take `parts` butterflies of radix 2 for each of `stride`.
-WIDE void take_twos(int parts, int stride, const Circle& circle, const Complex& x, Complex& out) {
-  const int far = stride * parts;
-  for (int p = 0; p < parts; ++p) {
-    const double c = circle.cosine[4 * p * stride], s = circle.sine[4 * p * stride];
-    const double *re = &x.re[stride * p], *im = &x.im[stride * p];
-    double* __restrict to_re = &out.re[2 * stride * p], * __restrict to_im =
-                                                            &out.im[2 * stride * p];
-    for (int q = 0; q < stride; ++q) {
-      const double a = re[q] - re[far + q], b = im[q] - im[far + q];
-      to_re[q] = re[q] + re[far + q];
-      to_im[q] = im[q] + im[far + q];
-      to_re[stride + q] = a * c - b * s;
-      to_im[stride + q] = a * s + b * c;
-    }
-  }
-}
-
+// Take `parts` butterflies of radix 4 for each of `stride`.
 WIDE void take_fours(int parts, int stride, const Circle& circle, const Complex& x, Complex& out) {
   const int far = stride * parts;
   for (int p = 0; p < parts; ++p) {
@@ -64,9 +47,9 @@ WIDE void take_fours(int parts, int stride, const Circle& circle, const Complex&
   }
 }
 
-// Take butterflies of an odd radix, of which there are few.
-WIDE void take_odd(int radix, int parts, int stride, const Circle& circle, const Complex& x,
-                   Complex& out) {
+// Take butterflies of another radix, of which there are few.
+WIDE void take_others(int radix, int parts, int stride, const Circle& circle, const Complex& x,
+                      Complex& out) {
   const int far = stride * parts, turn = 2 * circle.count;
   for (int p = 0; p < parts; ++p) {
     for (int k = 0; k < radix; ++k) {
@@ -94,10 +77,8 @@ void transform(Complex& x, Complex& other, const Circle& circle) {
     const int radix = left % 4 == 0 ? 4 : left % 2 == 0 ? 2 : left % 3 == 0 ? 3 : 5;
     if (radix == 4)
       take_fours(left / 4, stride, circle, x, other);
-    else if (radix == 2)
-      take_twos(left / 2, stride, circle, x, other);
     else
-      take_odd(radix, left / radix, stride, circle, x, other);
+      take_others(radix, left / radix, stride, circle, x, other);
     left /= radix;
     stride *= radix;
     std::swap(x, other);
