@@ -46,20 +46,16 @@ bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolu
   return weakest >= 0;
 }
 
-// Let edges run that are out of balance; returns whether they are more. If none runs yet, those
-// run, too, that Newton's step moves far.
-bool run_more(Flags& runs, const LinearResponse& response, const ResponseSolution& now,
-              const EdgeLaw& law) {
+// Let edges run that are out of balance in their references; returns whether they are more.
+bool run_unbalanced(Flags& runs, const LinearResponse& response, const EdgeLaw& law) {
   if (law.critical == 0) return false;
-  const bool none = std::find(runs.begin(), runs.end(), true) == runs.end();
   bool more = false;
   for (int e = 0; e < int(runs.size()); ++e) {
     const Edge& edge = response.edges[e];
     const bool pinned = law.pins() && edge.held;
     const double residual = edge.imbalance(e % 2).value;
-    const bool unbalanced = std::abs(residual) > UNBALANCED * law.critical && !pinned;
-    const bool far = std::abs(now.motion[e] - edge.here) > FOLLOWING * law.longest_step;
-    if ((unbalanced || (none && far)) && !runs[e]) runs[e] = more = true;
+    if (std::abs(residual) > UNBALANCED * law.critical && !pinned && !runs[e])
+      runs[e] = more = true;
   }
   return more;
 }
@@ -168,7 +164,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   Descent out;
   double& reach = running.reach;
   Flags held = held_edges(runs, ends, law);
-  Integers edges = indices(held);
+  Integers edges = indices(held), modelled;
   Vector before = ends;
   ModelFlow flow;
   Matrix tangent;
@@ -176,12 +172,16 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   bool moved = true, judges = false;
   while (out.steps < most_steps) {
     check_signals();
-    if (!moved) {
-      condense_gaps(response, hold_edges(response, ends, held, law));
-    } else if (!move_references(response, ends, held, pressure, prescribed, law, model)) {
+    if (moved && !move_references(response, ends, held, pressure, prescribed, law, model)) {
       out.event = DescentEvent::outgrown;
       break;
     }
+    if (run_unbalanced(runs, response, law)) {
+      held = held_edges(runs, ends, law);
+      edges = indices(held);
+      moved = false;
+    }
+    if (!moved) condense_gaps(response, hold_edges(response, ends, held, law));
     ++out.steps;
     moved = false;
     const ResponseSolution now = response.solve(prescribed, law, device);
@@ -194,7 +194,10 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
     const Vector residual = condensed.residual();
     if (judges) {
       judges = false;
-      const double error = model_error(flow, residual, edges, ends, law);
+      Vector at_end;
+      for (int e : modelled)
+        at_end.push_back(residual[std::lower_bound(edges.begin(), edges.end(), e) - edges.begin()]);
+      const double error = model_error(flow, at_end, modelled, ends, law);
       const double length = largest(flow.motion) / law.longest_step;
       reach = std::max(next_reach(reach, length, error), MODEL_SHORT_STEP);
       if (error > 1 && length > 1.5 * MODEL_SHORT_STEP) {
@@ -203,17 +206,16 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
         continue;
       }
     }
-    bool more = run_more(runs, response, now, law), is_cut = false;
+    const bool none = law.critical > 0 && out.steps > 1 && indices(runs).empty();
+    bool more = (none || !now.stable) && run_weakest(runs, response, now), is_cut = false;
     if (!(now.stable || more)) {
-      more = run_weakest(runs, response, now);
-      if (!more) {
-        out.event = DescentEvent::no_field;
-        break;
-      }
+      out.event = DescentEvent::no_field;
+      break;
     }
     Vector way;
     if (!more) {
       tangent = condensed.tangent();
+      modelled = edges;
       flow = flow_on(edges, residual, tangent, ends, strongest, reach, equal_speeds, law, panels);
       way = condensed.follow(flow.motion, pressure);
       const Vector here = response.motion_to(ends);
@@ -242,7 +244,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
       break;
     }
   }
-  out.raced = law.critical > 0 && may_race(edges, tangent, running.start, ends, law);
+  out.raced = law.critical > 0 && may_race(modelled, tangent, running.start, ends, law);
   out.ends = ends;
   return out;
 }
