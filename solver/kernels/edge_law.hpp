@@ -144,10 +144,15 @@ inline Vector move_edges(const Vector& ends, const Vector& motion) {
   return out;
 }
 
+// Find the length of the shortest gap or patch; NaN if an edge is.
 inline double shortest_length(const Vector& ends) {
-  double least = ends.front() + 2 * pi - ends.back();
-  for (size_t e = 1; e < ends.size(); ++e) least = std::min(least, ends[e] - ends[e - 1]);
-  return std::min(least, 2 * pi);
+  double least = std::min(2 * pi, ends.front() + 2 * pi - ends.back());
+  for (size_t e = 1; e < ends.size(); ++e) {
+    const double length = ends[e] - ends[e - 1];
+    if (!(length >= least)) least = length;
+    if (std::isnan(least)) break;
+  }
+  return least;
 }
 
 // Longest step that counts as rest: less where gaps or patches are short.

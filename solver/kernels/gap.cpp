@@ -16,15 +16,17 @@ Vector tabulate_expm1() {
 }  // namespace
 
 WIDE void place_nodes(const Gap& gap, std::span<const double> cosine, std::span<const double> sine,
-                      double* theta, double* theta_by_t) {
-  static const Vector table = tabulate_expm1();
+                      double* __restrict theta, double* __restrict theta_by_t) {
+  static const Vector kept = tabulate_expm1();
+  const double* table = kept.data();
   const int count = int(cosine.size());
   const double alpha = 2 * gap.alpha;
   const int middle = (count + 1) / 2;  // nodes up to it are measured from the right end
   for (int side = 0; side < 2; ++side) {
-    auto [near, far] = poles_of(gap, side);
+    auto poles = poles_of(gap, side);
+    const double near = poles.near, far = poles.far, end = gap.end[side];
     const double inwards = 1.0 - 2 * side, slope = alpha / (near + far), product = near * far;
-    for (int i = side == 1 ? 0 : middle; i < (side == 1 ? middle : count); ++i) {
+    for (int i = side == 1 ? 0 : middle, last = side == 1 ? middle : count; i < last; ++i) {
       double y = alpha * (1 + inwards * cosine[i]);
       int entry = int(y * per_unit);
       double x = y - double(entry) / per_unit;
@@ -33,7 +35,7 @@ WIDE void place_nodes(const Gap& gap, std::span<const double> cosine, std::span<
       grown = table[entry] + grown * (1 + table[entry]);
       double r = grown * product / (far + (1 + grown) * near);
       theta_by_t[i] = slope * (near + r) * (far - r) * sine[i];
-      theta[i] = gap.end[side] + inwards * r;
+      theta[i] = end + inwards * r;
     }
   }
 }

@@ -303,6 +303,8 @@ class Profile(ByValue):
         first = int(harmonics[0])
         angle = (np.pi * np.arange(first) - np.angle(self.coefficients[first])) / first
         for m in harmonics[1:]:
+            if not len(angle):
+                break
             odd = np.imag(self.coefficients[m] * np.exp(1j * m * angle))
             angle = angle[np.abs(odd) < allowed]
         return np.asarray(np.sort(angle % np.pi) / self.q0, dtype=np.float64)

@@ -16,7 +16,6 @@ from adhesis.solver._kernels import (
     Field,
     FieldModel,
     Running,
-    shortest_length,
     solve_field,
 )
 from adhesis.solver.model.profile import Array, Integers
@@ -118,8 +117,6 @@ class EdgeMechanics(EdgeProblem):
         the edges were in the state before, which matters with two works of adhesion; here if not
         given.
         """
-        if not shortest_length(gaps) > 0:
-            return None
         reach = max(reach, self.newton_tolerance)
         law = self.law_at(gaps if memory is None else memory)
         for _ in range(RESPONSE_TRIALS):

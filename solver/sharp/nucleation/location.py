@@ -7,6 +7,7 @@ the criterion of touches, ``opening.Openings`` that of gaps that open inside pat
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -168,14 +169,14 @@ class ClosingBound:
 
     def __init__(self, edges: EdgeMechanics) -> None:
         self._edges = edges
+        self._by_motion = CLOSING_BY_MOTION * edges.largest_opening / math.sqrt(edges.wave)
 
     def between(self, point: Point, reached: Point, branch: Branch) -> float:
         """Bound the closing of a gap from one point of a branch to the next."""
         if branch == "loading":
             return abs(reached.at - point.at) * self._rate(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
-        motion = CLOSING_BY_MOTION * np.abs(reached.gaps - point.gaps).sum(axis=1).max()
-        return float(self._edges.largest_opening / np.sqrt(self._edges.wave) * motion)
+        return self._by_motion * float(np.abs(reached.gaps - point.gaps).sum(axis=1).max())
 
     def _rate(self, point: Point) -> float:
         """Bound the closing of a gap along the branch per unit of d."""
@@ -193,4 +194,5 @@ class ClosingBound:
 
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """
-        return 2 * np.pi / float(np.diff(point.gaps).sum())
+        gaps = point.gaps
+        return 2 * math.pi / float((gaps[:, 1] - gaps[:, 0]).sum())

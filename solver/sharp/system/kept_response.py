@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from adhesis.solver._kernels import LinearResponse, set_up_response, shortest_length
 from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
@@ -33,7 +31,7 @@ class KeptResponse:
 
         ``least`` are the least orders of the gaps, if there are such. None if these have no field.
         """
-        if not (np.isfinite(gaps).all() and shortest_length(gaps) > 0):
+        if not shortest_length(gaps) > 0:
             return None
         problem, self.settled = self._problem, None
         if self._response is None or self._response.gap_count != len(gaps):
