@@ -313,7 +313,8 @@ void bind_field(nb::module_& m) {
           "sum_modes",
           [](const Field& f, int k, const Vector& theta, const Vector& modes) {
             Vector out;
-            for (double at : theta) out.push_back(sum_modes(f.nodes.gaps[k], at, modes));
+            for (double at : theta)
+              out.push_back(sum_modes(f.nodes.gaps[k], {at, at, at, at}, modes)[0]);
             return out;
           },
           "k"_a, "theta"_a, "modes"_a)
@@ -447,19 +448,22 @@ void bind_nucleation(nb::module_& m) {
       "search",
       [](const Field& field, const Searched& searched, const SearchLengths& lengths) {
         Search found = search(field, searched.gaps, lengths);
-        Vector clearance;
-        for (const Minimum& one : found.minima) clearance.push_back(clearance_of(one, lengths));
+        Vector width, clearance;
+        for (const Minimum& one : found.minima) {
+          width.push_back(seed_width(one.curvature, lengths));
+          clearance.push_back(clearance_of(one, lengths));
+        }
         return std::tuple(
             found.least, found.count,
             std::tuple(each(found.minima, &Minimum::theta), each(found.minima, &Minimum::opening),
-                       each(found.minima, &Minimum::curvature), each(found.minima, &Minimum::rim),
-                       std::move(clearance)),
+                       std::move(width), each(found.minima, &Minimum::rim), std::move(clearance)),
             Searched{std::move(found.searched)});
       },
       "field"_a, "searched"_a, "lengths"_a, Unlocked(),
       "Find the minima of the gaps of a field that may have closed.\n\n"
       "Returns the least clearance of the other gaps, the number of these, their minima "
-      "(positions, openings, curvatures, rims and clearances), and the updated searched gaps.");
+      "(positions, openings, widths of seeds, rims and clearances), and the updated searched "
+      "gaps.");
 }
 
 void bind_predictor(nb::module_& m) {

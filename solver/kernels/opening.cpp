@@ -26,9 +26,9 @@ void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
   double width = 0.5 * minimum.width, low = infinity, half = 0;
   for (int i = 0; i < MINIMUM_REFINEMENTS; ++i) {
     width /= 8;
-    const double left = sum_modes(gap, minimum.theta - width, modes);
-    const double here = sum_modes(gap, minimum.theta, modes);
-    const double right = sum_modes(gap, minimum.theta + width, modes);
+    const double theta = minimum.theta;
+    const auto [left, here, right, same] =
+        sum_modes(gap, {theta - width, theta, theta + width, theta}, modes);
     half = (right - 2 * here + left) / (2 * width * width);
     const double slope = (right - left) / (2 * width);
     if (!(half > 0)) {
@@ -116,15 +116,19 @@ FineOpening refine_opening(const Gap& gap, Vector modes, int count) {
   return out;
 }
 
-double sum_modes(const Gap& gap, double theta, const Vector& modes) {
-  const MappedPoint at = eta_at(gap, theta);
-  double b1 = 0, b2 = 0;
+std::array<double, 4> sum_modes(const Gap& gap, const std::array<double, 4>& theta,
+                                const Vector& modes) {
+  Four eta, b1 = {}, b2 = {};
+  std::array<double, 4> out;
+  for (int lane = 0; lane < 4; ++lane) eta[lane] = eta_at(gap, theta[lane]).eta;
   for (int n = int(modes.size()) - 1; n >= 0; --n) {
-    const double next = 2 * at.eta * b1 - b2 + modes[n];
+    const Four next = 2 * eta * b1 - b2 + modes[n];
     b2 = b1;
     b1 = next;
   }
-  return b1 * std::sqrt(at.square);
+  for (int lane = 0; lane < 4; ++lane)
+    out[lane] = b1[lane] * std::sqrt(eta_at(gap, theta[lane]).square);
+  return out;
 }
 
 double sum_pull(double theta, const Vector& sine, const Vector& cosine, const Vector& weight) {

@@ -27,8 +27,9 @@ FineOpening open_gap(const Field& field, int k, const Circle& circle);
 // Evaluate θ and T of a gap, θ falling, at `count` nodes, from fewer modes.
 FineOpening refine_opening(const Gap& gap, Vector modes, int count);
 
-// Sum b_n sin((n+1)t), cos t = η(θ), over n.
-double sum_modes(const Gap& gap, double theta, const Vector& modes);
+// Sum b_n sin((n+1)t), cos t = η(θ), over n, at four places.
+std::array<double, 4> sum_modes(const Gap& gap, const std::array<double, 4>& theta,
+                                const Vector& modes);
 
 // Integrate S_full T dθ over the gaps: by f, less π/2 s_n²/(n+1) of all modes above those of f.
 double work_of_gaps(const Field& field);

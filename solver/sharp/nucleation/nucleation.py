@@ -153,8 +153,7 @@ class Nucleation:
         """
         least, count, found, self.searched = search(field.solution, self.searched, self._lengths)
         self.edges.count.openings += count
-        theta, opening, curvature, rim, clearance = found
-        widths = self._lengths.seed_widths(curvature)
+        theta, opening, widths, rim, clearance = found
         near = HEALED_PLACE * self.edges.wave
         touching: Any = ()
         if self.range > 0:
