@@ -151,11 +151,18 @@ class EdgeMechanics(EdgeProblem):
         self.kept.forget()
 
     def relax(
-        self, gaps: Array, prescribed: float, reach: float, *, equal_speeds: bool = False
+        self,
+        gaps: Array,
+        prescribed: float,
+        reach: float,
+        *,
+        equal_speeds: bool = False,
+        share: float = 1.0,
     ) -> tuple[Point | Array, bool]:
         """Descend in energy at a prescribed value to the next minimum.
 
-        By linear kinetics, or with ``equal_speeds``, to be compared with that.
+        By linear kinetics, or with ``equal_speeds``, to be compared with that; in steps of at most
+        this share of the longest.
 
         Returns
         -------
@@ -172,7 +179,8 @@ class EdgeMechanics(EdgeProblem):
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
-        law = self.law_at(gaps)
+        law = EdgeLaw(self.law_at(gaps))
+        law.longest_step *= share
         left, rests, raced = ENDLESS, 0, False
         orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps

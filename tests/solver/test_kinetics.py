@@ -75,12 +75,22 @@ def test_a_race_is_flagged_with_what_is_at_stake():
     assert result.energy_at_stake == pytest.approx(sum(j.at_stake for j in result.jumps))
 
 
+def test_finer_steps_decide_next_to_a_separatrix():
+    """At accuracy 1e-5 first steps and equal speeds end on its other side, 5e-5 of the loss off."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, seed=1, h_rms=1e-6)
+    method = SharpMethod(Problem(profile, SOLID, 0.04), accuracy=1e-5)
+    loop = run_loop(method, max_penetration=0.9)
+    assert (len(loop.jumps), loop.races) == (133, 1)
+    # of accuracy 1e-6, with its error
+    assert loop.loss == pytest.approx(0.122149467, abs=loop.loss_error + 6.5e-8)
+
+
 def test_under_a_load_the_speeds_of_the_edges_decide_nothing():
     """There the advance of one edge helps all others (docs/paths.md)."""
     problem = replace(race(), work_of_adhesion=0.01, control=Control(0.0))
     methods = [SharpMethod(problem) for _ in range(2)]
     relax = methods[1].edges.relax
-    methods[1].edges.relax = lambda *where, equal_speeds=False: relax(*where, equal_speeds=True)
+    methods[1].edges.relax = lambda *where, **how: relax(*where, equal_speeds=True)
     one, other = (run_loop(method, max_stress=2e3, load_steps=6) for method in methods)
     assert len(one.jumps) == len(other.jumps) > 2
     assert other.loss == pytest.approx(one.loss, rel=1e-7)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +18,7 @@ from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     ENDLESS,
+    FINER_STEPS,
     LONGEST_STEP,
     OTHER_MINIMUM,
 )
@@ -87,7 +89,7 @@ class Orders:
 
 
 Rival = Point | None | FullContact
-"""End of a descent with equal speeds: a minimum, no contact, or full contact (with a stiffness)."""
+"""Another end of a descent: a minimum, no contact, or full contact (with a stiffness)."""
 
 
 class Jumps:
@@ -301,32 +303,50 @@ class Jumps:
     ) -> Point | None:
         """Descend to the next minimum of the energy; None when no contact is left.
 
-        Where edges may have raced, a minimum that equal speeds lead to instead is added to
-        ``rivals``, unless there is one.
+        Where edges may have raced, finer steps decide, if they end with less energy: more may be
+        that of a minimum on the way that the field's error shows. A minimum that equal speeds or
+        the first steps lead to instead is added to ``rivals``, unless there is one.
         """
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
         point, raced = self._relax(gaps, at)
-        if not rivals and self._may_race and raced:
-            try:
-                rival, _ = self._relax(gaps, at, equal_speeds=True)
-                # next to a fold the field's error may show a minimum where the edges are
-                has_left = rival is None or not self._is_same(rival.gaps, gaps)
-                if has_left and not self._is_same_minimum(rival, point):
-                    rivals.append(rival)
-            except FullContact as full:
-                rivals.append(full)
-            except NoState:
-                pass  # a comparison that does not come to rest is no failure of the path
+        if not (raced and self._may_race):
+            return point
+        others: list[Rival] = []
+        try:
+            others.append(self._relax(gaps, at, equal_speeds=True)[0])
+        except FullContact as full:
+            others.append(full)
+        except NoState:
+            pass  # a comparison that does not come to rest is no failure of the path
+        with suppress(NoState, FullContact):
+            finer, _ = self._relax(gaps, at, share=FINER_STEPS)
+            if point and finer and not self._is_same_minimum(point, finer):
+                end, other = (self.states.of_point(one).potential for one in (finer, point))
+                if end < other:
+                    others.append(point)
+                    point = finer
+        for rival in others:
+            if not rivals and self._is_rival(rival, gaps, point):
+                rivals.append(rival)
         return point
 
+    def _is_rival(self, other: Rival, start: Array, point: Point | None) -> bool:
+        """Whether a descent from some gaps ended elsewhere than at a minimum."""
+        if isinstance(other, FullContact):
+            return True
+        # next to a fold the field's error may show a minimum where the edges are
+        if other is not None and self._is_same(other.gaps, start):
+            return False
+        return not self._is_same_minimum(other, point)
+
     def _relax(
-        self, gaps: Array, at: float, *, equal_speeds: bool = False
+        self, gaps: Array, at: float, *, equal_speeds: bool = False, share: float = 1.0
     ) -> tuple[Point | None, bool]:
         """Descend until nothing vanishes; returns also whether edges may have raced."""
         reach, races = LONGEST_STEP * self.edges.wave, False
         while len(gaps):
-            found, raced = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds)
+            found, raced = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds, share=share)
             races = races or raced
             if isinstance(found, Point):
                 return found, races
