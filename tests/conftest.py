@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,14 @@ from tests.support.scheduling import rank_of, scheduler
 
 # Nothing that is imported and collected is garbage: until all is, looking for some is in vain.
 gc.disable()
+
+# Tests send signals: what nohup or a shell's background ignores would be ignored by them, too.
+for number, handler in (
+    (signal.SIGHUP, signal.SIG_DFL),
+    (signal.SIGINT, signal.default_int_handler),
+):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, handler)
 
 # The same examples every time. `make fuzz` draws anew, from a seed that it prints.
 settings.register_profile("same", derandomize=True, deadline=None)
