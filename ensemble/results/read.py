@@ -15,12 +15,22 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
-from adhesis.ensemble.errors import InputError, lack
+from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import HEAD, check_head
 from adhesis.ensemble.task.dataset import KEPT, sizes_of
+from adhesis.solver.checks import shown
 
+_MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
+_LONGEST_ATTRIBUTE = 2**16  # bytes of a root attribute, of a text those of a reference to it
+_NUMBERS = ("file_version", "seed")  # root attributes that are no texts
+# Attributes that may differ between versions of adhesis that write the same file version.
+_WORDING = frozenset(("title", "long_name"))
+# Attributes by which HDF5 joins datasets to the scales of their dimensions.
+_OF_HDF5 = frozenset(("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIMENSION_LABELS"))
+# Exponential functions of numpy differ between processors by the last bits.
+_SCALE_ROUNDING = 1e-12
 _LOOKS = 3
 _MOST_NAMED = 10
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
@@ -29,9 +39,9 @@ _INSTEAD = "restore it from a copy, or compute the campaign again into another f
 class Results:
     """A results file, read with plain h5py, at any moment of a run.
 
-    Opening it checks everything but the rows by its checksum, and that the layout and the tasks are
-    those that this adhesis gives the campaign. InputError if it is missing, foreign, truncated or
-    damaged. The rows are checked by :meth:`status`.
+    Opening it checks everything but the rows: the root attributes, the shapes and types of the
+    datasets, the dimension scales, and that the tasks are those of the campaign. InputError if it
+    is missing, foreign, truncated or damaged. The rows are checked by :meth:`status`.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -48,17 +58,35 @@ class Results:
         try:
             with _damage(self.path):
                 self._check_members()
-                self.attributes = {n: v for n, v in self._file.attrs.items() if n != HEAD}
+                self._check_size()
+                self.attributes = self._root_attributes()
                 schema.check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
-                self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
+                self.part = self._part()
+                self._datasets = schema.datasets(self.campaign)
                 self._check_layout()
+                self._check_attributes()
+                self._check_scales()
                 self._tasks = self._checked_tasks()
         except BaseException:
             self._file.close()
             raise
+
+    def _check_size(self) -> None:
+        """Refuse a file with more than a campaign can have beside its rows, before reading.
+
+        HDF5 keeps texts beside the datasets, with no limit to their length.
+        """
+        size = os.path.getsize(self.path)
+        rows = (self._file[d.name] for d in schema.DATASETS if d.name in self._file)
+        held = sum(min(size, dataset.id.get_storage_size()) for dataset in rows)
+        if size - held > _MOST_BESIDES + held:
+            raise InputError(
+                f"{self.path} holds {(size - held) / 1e6:.0f} MB beside its rows, more than a "
+                "campaign can have there"
+            )
 
     def _check_members(self) -> None:
         """Refuse links to elsewhere, before any member of the root is looked up.
@@ -72,20 +100,44 @@ class Results:
                     f"{_INSTEAD}"
                 )
 
+    def _root_attributes(self) -> dict[str, Any]:
+        found = {}
+        for name in self._file.attrs:
+            if name == HEAD:
+                continue
+            if self._file.attrs.get_id(name).get_storage_size() > _LONGEST_ATTRIBUTE:
+                raise ValueError(name)
+            value = self._file.attrs[name]
+            if isinstance(value, str) == (name in _NUMBERS):
+                raise ValueError(name)
+            found[name] = value
+        return found
+
+    def _part(self) -> Part:
+        text = self.attributes.get("part", str(WHOLE))
+        try:
+            return Part.parse(text)
+        except InputError:  # of which it names an option
+            raise InputError(
+                f"{self.path} is damaged: its attribute part is {quoted(text)}, and must be K/N "
+                f"with 1 ≤ K ≤ N, as 3/20; {_INSTEAD}"
+            ) from None
+
     def _check_layout(self) -> None:
         """Compare shapes and types with those of the campaign, before anything of them is read."""
-        datasets = schema.datasets(self.campaign)
-        missing = [column.name for column in datasets if column.name not in self._file]
+        missing = [column.name for column in self._datasets if column.name not in self._file]
         if missing:
             raise InputError(
                 f"{self.path} was written by another state of adhesis, without {missing[0]}: read "
                 "it with that one, or compute the campaign again into another file"
             )
+        if schema.file_size(self.campaign, self.part) > os.path.getsize(self.path):
+            raise ValueError("truncated")
         wanted = schema.scales(self.campaign, self.part)
         self._sizes = sizes_of(wanted)
         for scale in wanted:
             self._check_dataset(scale.name, scale.values.shape, scale.values.dtype)
-        for column in datasets:
+        for column in self._datasets:
             self._check_dataset(
                 column.name, schema.shape_of(column, self._sizes), np.dtype(column.dtype)
             )
@@ -96,6 +148,43 @@ class Results:
             raise ValueError(name)
         if found.is_virtual or found.external:
             raise ValueError(name)  # its numbers would be those of other files
+
+    def _check_attributes(self) -> None:
+        """Compare the attributes with those that the campaign and the layout have.
+
+        Readers of other programs go by them: by a seed, a unit, or a factor of a dataset.
+        """
+        for name, value in (
+            {"part": None} | schema.fixed_attributes(self.campaign, self.part)
+        ).items():
+            found: Any = self.attributes.get(name)
+            if name not in _WORDING and not np.array_equal(found, value):
+                raise InputError(
+                    f"{self.path} is damaged: its attribute {name} is {shown(found)}, and that of "
+                    f"its campaign is {shown(value)}; {_INSTEAD}"
+                )
+        wanted = {s.name: schema.description(s) for s in schema.scales(self.campaign, self.part)}
+        for column in self._datasets:
+            wanted[column.name] = schema.description(column)
+            of_dims = [[scale.name for scale in d.values()] for d in self._file[column.name].dims]
+            if of_dims != [[f"/{name}"] for name in column.dims]:
+                raise ValueError(column.name)
+        for name, attributes in wanted.items():
+            found = self._file[name].attrs
+            if set(found) - _OF_HDF5 != set(attributes):
+                raise ValueError(name)
+            for key in attributes.keys() - _WORDING:
+                if not np.array_equal(found[key], attributes[key]):
+                    raise ValueError(name)
+
+    def _check_scales(self) -> None:
+        for scale in schema.scales(self.campaign, self.part):
+            found = self._file[scale.name][:]
+            if not np.allclose(found, scale.values, rtol=_SCALE_ROUNDING, atol=0.0):
+                raise InputError(
+                    f"{self.path} is damaged: its {scale.name} is not that of its campaign; "
+                    f"{_INSTEAD}"
+                )
 
     def _checked_tasks(self) -> Tasks:
         """Return the tasks of the campaign, which those of the file must be."""

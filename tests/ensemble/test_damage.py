@@ -27,7 +27,7 @@ from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING, ROW_
 from adhesis.ensemble.run.session import Options, run_campaign
 from adhesis.ensemble.task.dataset import KEPT
 from tests.support.campaign_support import differences, write_campaign
-from tests.support.crafted_hdf5 import made, virtual
+from tests.support.crafted_hdf5 import made, put, virtual
 from tests.support.fake_run import fake_engine
 from tools.damage import Damage
 
@@ -153,11 +153,22 @@ def test_a_file_whose_rows_have_not_all_numbers_of_today_is_not_called_damaged(
     assert "was written by another state of adhesis, without friction: read it with" in sentence
 
 
+def test_an_axis_that_is_not_the_campaigns_is_refused(damage, path):
+    changed(path, _set("unloading_penetration", 4, 0.123))
+    write_head(path)
+    verdict, sentence = damage.judge(path.read_bytes())
+    assert verdict == "refused"
+    assert "its unloading_penetration is not that of its campaign" in sentence
+
+
 PROMISES = {
     "a size beyond memory": lambda file: made(file, "loss", (10**12,)),
     "a name less": lambda file: file.move("loss", "moved"),
     "what another file holds": lambda file: virtual(file, "loss", "sound.h5", "loss"),
     "any file": lambda file: made(file, "loss", external=[("/proc/self/environ", 0, 64)]),
+    "a long text": lambda file: put(
+        file.attrs, file.attrs["campaign"] + "#" * 40_000_000, "campaign"
+    ),
 }
 
 
@@ -208,6 +219,43 @@ def test_a_link_is_refused_before_it_is_followed(path, name, kind, tmp_path):
     sign_all(path)
     with pytest.raises(InputError, match=f"is damaged: its {name} is a link, and not in the file"):
         Results(path)
+
+
+ATTRIBUTES = {
+    "another seed": lambda file: file.attrs.modify("seed", 77),
+    "a seed of several numbers": lambda file: file.attrs.create("seed", [5, 5]),
+    "another convention": lambda file: file.attrs.modify("Conventions", "none"),
+    "a part": lambda file: file.attrs.create("part", "1/1 "),
+    "no part": lambda file: file.attrs.create("part", "3/2"),
+    "another unit": lambda file: file["loss"].attrs.modify("units", "mJ m-2"),
+    "the unit of an axis": lambda file: file["unloading_penetration"].attrs.modify("units", "m"),
+    "no unit": lambda file: file["loss"].attrs.pop("units"),
+    "a factor": lambda file: file["loss"].attrs.create("scale_factor", 2.0),
+    "a fill value": lambda file: file["loss"].attrs.create("_FillValue", 1.0),
+    "other names of flags": lambda file: file["status"].attrs.modify("flag_meanings", "a b c d"),
+    "other flags": lambda file: file["status"].attrs.modify(
+        "flag_values", np.arange(1, 5, 1, "u1")
+    ),
+    "another dimension": lambda file: _another_dimension(file["loss"], file["field_task"]),
+}
+
+
+def _another_dimension(dataset, scale):
+    dataset.dims[0].detach_scale(dataset.dims[0][0])
+    dataset.dims[0].attach_scale(scale)
+
+
+@pytest.mark.parametrize("name", ATTRIBUTES)
+def test_an_attribute_that_is_not_the_campaigns_is_refused(path, name, capsys):
+    """Other programs go by it, and the checksum of the head can be made right."""
+    changed(path, ATTRIBUTES[name])
+    write_head(path)
+    assert main(["verify", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    if name == "another seed":
+        assert "is damaged: its attribute seed is 77, and that of its campaign is 5" in line
+    assert "--part" not in line  # no option was used
+    assert name != "no part" or "is damaged: its attribute part is '3/2'" in line
 
 
 # ---------------------------------------------------------------- what commands say
