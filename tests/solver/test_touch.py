@@ -71,18 +71,22 @@ def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None
 
 
 @pytest.mark.parametrize(
-    ("hurst", "seed"),
+    ("hurst", "seed", "gamma", "depth"),
     [
         # the third derivative is large beside the curvature: the parabola errs by 5e-5 h_max
-        (0.9, 2384431779287079),
+        (0.9, 2384431779287079, 0.04, 0.6),
         # two gaps close at once, one fast, one slowly
-        (0.7, 1734347148937202),
+        (0.7, 1734347148937202, 0.04, 0.6),
+        # the cubic between two points of the branch begins no equilibrium, their tangents do
+        (0.8, 8788061040437920, 0.01, 0.9),
     ],
 )
-def test_every_touch_of_paper_scale_is_located(hurst: float, seed: int) -> None:
+def test_every_touch_of_paper_scale_is_located(
+    hurst: float, seed: int, gamma: float, depth: float
+) -> None:
     profile = self_affine_profile(
         hurst, period=2e-3 * np.pi, n0=10, ratio=100, seed=seed, h_rms=1e-6
     )
-    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.04))
-    loop = run_loop(method, max_penetration=0.6, load_steps=20)
+    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), gamma))
+    loop = run_loop(method, max_penetration=depth, load_steps=40)
     assert abs(loop.audit_residual) < 1e-4

@@ -85,7 +85,13 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
     reach = LONGEST_STEP * edges.wave
 
     def solve(clear: Point, hit: Point, at: float) -> Point | None:
-        return edges.equilibrium(clear.interpolate(hit, at), at, reach, memory=clear.gaps)
+        gaps = clear.interpolate(hit, at)
+        point = edges.equilibrium(gaps, at, reach, memory=clear.gaps)
+        near = abs(at - clear.at) < abs(hit.at - at)
+        for start in (clear, hit) if near else (hit, clear):
+            if point is None:
+                point = edges.equilibrium(start.extrapolate(at), at, reach, memory=clear.gaps)
+        return point
 
     return solve
 
