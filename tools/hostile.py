@@ -221,7 +221,7 @@ def follow(
             missed = 0.0 if found["not held"] else missed_by(method, states)
             if missed > _MISSED * method.nucleation.range + method.nucleation.tolerance:
                 wrong.append(f"a touch is missed by {missed / method.nucleation.range:.1e} ranges")
-            found |= {"excess": excess, "late": late, "healed": method.follower.openings.heals}
+            found |= {"excess": excess, "late": late, "healed": method.follower.cracks.heals}
             if late > _TENSION:
                 wrong.append(f"a patch is late to open by {late:.1e} of the strength")
             found["flagged"] = any("the tension inside patches" in w for w in loop.warnings)
@@ -240,7 +240,7 @@ def tension_of(
     excesses of the tension and of the root of G. Two jumps at one place have a state between them.
     It is left out where the second is an opening: at the first nothing opened there yet.
     """
-    openings = method.follower.openings
+    openings = method.follower.cracks
     openings.healed = []
     largest = late = 0.0
     for state in _staying(loop, states):

@@ -567,13 +567,13 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
     columns |= {
         "branch": np.array(record.branches),
         "separation": separation,
-        "tangent": record.column("stiffness"),
+        "tangent": record.column("tangent"),
         "edge_friction": friction if friction.any() else None,
     }
     ledger = Ledger.of(problem, jumps, **columns)
     fields = columns | {
         "problem": problem,
-        "load_step": np.array(record.on_axis),
+        "load_step": np.array(record.ends_load_step),
         "penetration": problem.penetration(separation),
         "patches": patches,
         "jumps": jumps,

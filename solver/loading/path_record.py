@@ -133,7 +133,7 @@ class Record:
         The last one; out of contact at first.
     drive : float
         Prescribed value there: Δ/h_max, u_tot/h_max or Pa.
-    branches, on_axis, legs, states : list
+    branches, ends_load_step, legs, states : list
         Of every state its branch, whether it ends a load step, and the number of its leg.
     jumps : list of Jump
     error : float
@@ -150,7 +150,7 @@ class Record:
         self.method, self.problem, self.axis = method, method.problem, axis
         self.on_state, self.progress = on_state, progress
         self.branches: list[Branch] = []
-        self.on_axis: list[bool] = []
+        self.ends_load_step: list[bool] = []
         self.legs: list[int] = []
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
@@ -164,10 +164,10 @@ class Record:
         self.branch: Branch = branch
         self.visit(self.leg > 0, self.state)
 
-    def visit(self, on_axis: bool, state: ContactState) -> None:
-        """Append one state; ``on_axis`` if it ends a load step."""
+    def visit(self, ends_load_step: bool, state: ContactState) -> None:
+        """Append one state, and whether it ends a load step."""
         self.branches.append(self.branch)
-        self.on_axis.append(on_axis)
+        self.ends_load_step.append(ends_load_step)
         self.legs.append(self.leg)
         self.states.append(state)
         if self.on_state is not None:

@@ -31,7 +31,7 @@ class ContactState(ByValue):
         measure without the root (:meth:`~adhesis.solver.model.problem.Problem.toughness`).
     contact_fraction : float
         A/A0.
-    stiffness : float
+    tangent : float
         dp̄/ds along the branch in Pa/m, or dY/dx if another quantity than the separation is
         prescribed (:mod:`adhesis.solver.model.control`); NaN if the method does not compute it.
     edge_friction : float
@@ -53,7 +53,7 @@ class ContactState(ByValue):
     elastic_energy: float
     adhesion_energy: float
     contact_fraction: float
-    stiffness: float = float("nan")
+    tangent: float = float("nan")
     hold_energy: float = 0.0
     edge_friction: float = 0.0
     internal: Any = field(default=None, repr=False, compare=False)

@@ -39,7 +39,7 @@ from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Openings
+from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 from adhesis.solver.sharp.output.interior_tension import largest_tension
@@ -177,7 +177,7 @@ class SharpMethod(Method):
         self.nucleation = Nucleation(problem, self.edges)
         self.jumps = Jumps(self.edges, self.nucleation, self.states)
         self.follower = Follower(
-            self.edges, self.nucleation, Openings(problem, self.edges), self.states, self.jumps,
+            self.edges, self.nucleation, Cracks(problem, self.edges), self.states, self.jumps,
             self.resolution,
         )  # fmt: skip
         self._loaded: list[ContactState] = []  # without adhesion unloading goes back through them

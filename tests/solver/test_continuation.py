@@ -13,9 +13,9 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.branch import (
-    Branch,
     Fold,
     Resolution,
+    StableBranch,
     Target,
 )
 from adhesis.solver.sharp.equilibrium.branch_point import Point
@@ -56,12 +56,12 @@ class Curve:
         return point if np.abs(point.gaps - gaps).max() < reach else None
 
 
-def branch(curve: Curve, start: float, jump: float) -> Branch:
+def branch(curve: Curve, start: float, jump: float) -> StableBranch:
     """Make a branch that is followed down to 0, to a resolution of folds."""
     closing = SimpleNamespace(between=lambda point, reached, name: abs(reached.at - point.at))
     resolution = Resolution(jump, 1e-3, np.inf, 1.0, 1e-9, 0.5, 0.0, 0.05)
     aim = Target(0.0, 0.0, "loading")
-    return Branch(cast(Any, curve), cast(Any, closing), resolution, curve.point(start), aim)
+    return StableBranch(cast(Any, curve), cast(Any, closing), resolution, curve.point(start), aim)
 
 
 def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked():

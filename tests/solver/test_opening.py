@@ -30,7 +30,7 @@ from adhesis.solver.loading.zero_range import (
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
-from adhesis.solver.sharp.continuation.branch import Branch
+from adhesis.solver.sharp.continuation.branch import StableBranch
 from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
 
@@ -145,16 +145,16 @@ def test_patches_open_under_every_control(control, turning_point):
 def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
     """It halved each of them once, so that none grew again: such a loop did not end."""
     branch = SimpleNamespace(
-        _imbalance=lambda output, point: 100.0,
+        _energy_residual=lambda output, point: 100.0,
         _resolution=SimpleNamespace(jump=1e-6, work=1.0),
         _work_before=(0.0, math.inf),
         _work_of_fields=0.0,
     )
     start = SimpleNamespace(at=0.0)
     for at in (1.0, 0.5):
-        Branch._work_error(branch, start, SimpleNamespace(at=at))
+        StableBranch._work_error(branch, start, SimpleNamespace(at=at))
     branch._work_before = (0.0, math.inf)  # the step was accepted
-    assert Branch._work_error(branch, start, SimpleNamespace(at=2.0)) == TRAPEZOID_FAR
+    assert StableBranch._work_error(branch, start, SimpleNamespace(at=2.0)) == TRAPEZOID_FAR
 
 
 def test_work_and_energy_agree_between_openings():
@@ -176,7 +176,7 @@ def test_a_crack_grows_by_the_field_with_the_crack():
         np.array([[2 * np.pi - b * q0, 2 * np.pi + b * q0]]), exact.separation(b) * q0
     )
     griffith = griffith_length(exact.tension(b, TROUGHS.period / 2), SOLID.modulus, GAMMA) * q0 / 2
-    release = method.follower.openings._release
+    release = method.follower.cracks._release
     assert release(field, np.pi, 0.1 * griffith) == pytest.approx(0.1, rel=1e-2)
     assert release(field, np.pi, 20 * griffith) < 20 / 2
 

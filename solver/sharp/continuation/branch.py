@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.solver._kernels import COMPARABLE, STEP_GROWTH, STEP_REDUCTION, shortest_length
-from adhesis.solver.model.jump import Branch as BranchName
+from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
@@ -27,7 +27,7 @@ from adhesis.solver.sharp.tolerances import (
     WORK_STALLED,
 )
 
-Imbalance = Callable[[Point, Point], float]
+EnergyResidual = Callable[[Point, Point], float]
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Target:
 
     at: float
     prescribed: float
-    branch: BranchName
+    branch: Branch
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class Trail:
         self.clearance, self.closed = clearance, 0.0
 
 
-class Branch:
+class StableBranch:
     """A stable branch that is followed from a point towards a target.
 
     Parameters
@@ -180,7 +180,7 @@ class Branch:
     resolution : Resolution
     point : Point
     target : Target
-    imbalance : callable, optional
+    energy_residual : callable, optional
         Computes the difference of work and energy between two points, in J/m².
 
     Attributes
@@ -203,9 +203,9 @@ class Branch:
         resolution: Resolution,
         point: Point,
         target: Target,
-        imbalance: Imbalance | None = None,
+        energy_residual: EnergyResidual | None = None,
     ) -> None:
-        self._imbalance = imbalance
+        self._energy_residual = energy_residual
         self._edges, self._closing, self._resolution = edges, closing, resolution
         self._target = target
         before = point.previous
@@ -360,9 +360,9 @@ class Branch:
         """
         span = abs(point.at - output.at)
         short = span < WORK_RESOLVED * self._resolution.jump
-        if self._imbalance is None or short:
+        if self._energy_residual is None or short:
             return 0.0
-        error = abs(self._imbalance(output, point)) / self._resolution.work
+        error = abs(self._energy_residual(output, point)) / self._resolution.work
         if math.isnan(error):
             return 0.0
         longer, larger = self._work_before

@@ -10,10 +10,16 @@ import numpy as np
 from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
-from adhesis.solver.model.jump import Branch as BranchName
+from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.branch import Accepted, Branch, Fold, Resolution, Target
-from adhesis.solver.sharp.continuation.jump import ComputedJump, History, Jumps, Orders
+from adhesis.solver.sharp.continuation.branch import (
+    Accepted,
+    Fold,
+    Resolution,
+    StableBranch,
+    Target,
+)
+from adhesis.solver.sharp.continuation.jump import ComputedJump, EventOrders, History, Jumps
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import positions, step_limits
 from adhesis.solver.sharp.errors import NoState
@@ -27,7 +33,7 @@ from adhesis.solver.sharp.nucleation.location import (
     locate,
 )
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Openings
+from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import (
     CONTINUED,
@@ -48,7 +54,7 @@ class Follower:
     edges : EdgeMechanics
     nucleation : Nucleation
         Contact that appears in gaps.
-    openings : Openings
+    cracks : Cracks
         Gaps that appear in contact.
     states : States
     jumps : Jumps
@@ -59,28 +65,28 @@ class Follower:
         self,
         edges: EdgeMechanics,
         nucleation: Nucleation,
-        openings: Openings,
+        cracks: Cracks,
         states: States,
         jumps: Jumps,
         resolution: Resolution,
     ) -> None:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
-        self.openings, self.resolution = openings, resolution
+        self.cracks, self.resolution = cracks, resolution
         self.closing = ClosingBound(edges)
         self._between = equilibrium_between(edges)
-        self._came_on: BranchName | None = None
+        self._came_on: Branch | None = None
         self._output: tuple[Point, ContactState] | None = None
 
-    def recall_point(self, memory: ContinuationData | None) -> Point | None:
-        """Return the point at which a path stopped, if this is the memory of its state."""
-        self.nucleation.searched = SearchedGaps() if memory is None else memory.searched
-        self.openings.healed, self.nucleation.healed = [], []
-        self._came_on = None if memory is None else memory.branch
-        if memory is None or memory.branch_data is None:
+    def recall_point(self, data: ContinuationData | None) -> Point | None:
+        """Return the point at which a path stopped, if these are the data of its state."""
+        self.nucleation.searched = SearchedGaps() if data is None else data.searched
+        self.cracks.healed, self.nucleation.healed = [], []
+        self._came_on = None if data is None else data.branch
+        if data is None or data.branch_data is None:
             return None
-        at, nearly, rate, slope, previous, pinned = memory.branch_data
-        field = self.edges.field(memory.gaps, at, nearly)
-        return Point(at, field, rate, slope, memory.clearance, previous, pinned)
+        at, nearly, rate, slope, previous, pinned = data.branch_data
+        field = self.edges.field(data.gaps, at, nearly)
+        return Point(at, field, rate, slope, data.clearance, previous, pinned)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
         """Follow a stable branch to the target or through its next jump.
@@ -98,8 +104,10 @@ class Follower:
         if jump is not None:
             history.commit(jump)
             return jump.at, jump.point
-        imbalance = self._imbalance if self.openings.is_possible else None
-        branch = Branch(self.edges, self.closing, self.resolution, point, target, imbalance)
+        energy_residual = self._energy_residual if self.cracks.is_possible else None
+        branch = StableBranch(
+            self.edges, self.closing, self.resolution, point, target, energy_residual
+        )
         while branch.point.at != target.at:
             event = branch.advance()
             if isinstance(event, Fold):
@@ -117,18 +125,18 @@ class Follower:
         pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.newton_tolerance)
         return point.with_previous(None) if pinned is None else pinned
 
-    def _imbalance(self, output: Point, point: Point) -> float:
+    def _energy_residual(self, output: Point, point: Point) -> float:
         """Compute the change of energy between two points of a branch, less the work, in J/m²."""
         if self._output is None or self._output[0] is not output:
             self._output = output, self.states.of_point(output)
         return self.states.energy_residual(self._output[1], self.states.of_point(point))
 
-    def _remember(self, history: History, branch: Branch, name: BranchName) -> None:
+    def _remember(self, history: History, branch: StableBranch, name: Branch) -> None:
         """Let the last state remember its point."""
         # What has not closed since the last search need not be searched again.
         point = branch.point.with_clearance(max(branch.trail.clearance - branch.trail.closed, 0.0))
         branch.point = point
-        memory = ContinuationData(
+        data = ContinuationData(
             point.field.gaps,
             point.clearance,
             BranchData(
@@ -137,10 +145,10 @@ class Follower:
             self.nucleation.searched,
             name,
         )
-        history.states[-1] = with_values(history.states[-1], internal=memory)
+        history.states[-1] = with_values(history.states[-1], internal=data)
 
     def _handle_accepted(
-        self, history: History, branch: Branch, event: Accepted, target: Target
+        self, history: History, branch: StableBranch, event: Accepted, target: Target
     ) -> ComputedJump | None:
         """Hand out the state of an accepted point; return the jump there, if there is one."""
         point = event.point
@@ -164,7 +172,7 @@ class Follower:
         return replace(jump, states=states + jump.states)
 
     def _handle_fold(
-        self, history: History, branch: Branch, fold: Fold, target: Target
+        self, history: History, branch: StableBranch, fold: Fold, target: Target
     ) -> ComputedJump | None:
         """Return the jump at the end of a branch; None if the branch goes on, or is refined."""
         jump = self._nucleation_jump(branch, target)
@@ -195,7 +203,7 @@ class Follower:
             return None
         return jump
 
-    def _nucleation_jump(self, branch: Branch, target: Target) -> ComputedJump | None:
+    def _nucleation_jump(self, branch: StableBranch, target: Target) -> ComputedJump | None:
         """Compute the jump where contact first appears in a gap, or a gap in contact; else None.
 
         The trail is searched for both; without a touch it begins anew.
@@ -210,8 +218,8 @@ class Follower:
             finest = self.resolution.finest
             touched, least = locate(self.nucleation, self._between, points, finest, clearance)
             opened = None
-            if self.openings.is_possible:
-                opened, _ = locate(self.openings, self._between, points, finest, 0.0)
+            if self.cracks.is_possible:
+                opened, _ = locate(self.cracks, self._between, points, finest, 0.0)
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
             ):
@@ -232,13 +240,13 @@ class Follower:
 
     def _opening_at(self, history: History, point: Point, target: Target) -> ComputedJump | None:
         """Compute the jump at the start of a branch where patches open at once; else None."""
-        if not self.openings.is_possible:
+        if not self.cracks.is_possible:
             return None
         while True:
-            least, found = self.openings.minimum(point.field)
+            least, found = self.cracks.minimum(point.field)
             if least > 0:
                 return None
-            opened = Located(point, self.openings.choose_seeds(found), 0.0)
+            opened = Located(point, self.cracks.choose_seeds(found), 0.0)
             jump = self._opening_jump(opened, target)
             if jump is not None:
                 self._check_openings(history, jump)
@@ -250,14 +258,14 @@ class Follower:
         before = self.states.of_point(point)
         jump = self.jumps.compute(
             before,
-            self.openings.insert_seeds(gaps, opened.seeds),
+            self.cracks.insert_seeds(gaps, opened.seeds),
             point.at,
             target.branch,
             known=point,
             barrier=sum(crack.barrier for crack in opened.seeds),
         )
         if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
-            self.openings.heal(opened.seeds)
+            self.cracks.heal(opened.seeds)
             return None
         late = self.states.work(before, jump.states[-1], opened.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
@@ -281,7 +289,7 @@ class Follower:
         before = self.states.of_point(point)
         jump = self.jumps.compute(
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,
-            orders=None if beyond is None else Orders(beyond, (point.field.gaps,)),
+            event_orders=None if beyond is None else EventOrders(beyond, (point.field.gaps,)),
         )  # fmt: skip
         gained = self.jumps.has_gained(point, jump.point, touched.seeds)
         if not gained and self.nucleation.heal(touched.seeds):
@@ -323,8 +331,10 @@ class Follower:
             states = (last,)
         response = self.edges.response_before_fold(point)
         before = self.states.at_fixed_edges(last, point.field, response, fold.at)
-        start, orders = self._start_at_fold(fold)
-        jump = self.jumps.compute(before, start, fold.at, target.branch, known=point, orders=orders)
+        start, event_orders = self._start_at_fold(fold)
+        jump = self.jumps.compute(
+            before, start, fold.at, target.branch, known=point, event_orders=event_orders
+        )
         after = jump.states[-1]
         late = self.states.work(before, after, way)
         drop = jump.jump.energy_drop
@@ -338,7 +348,7 @@ class Follower:
             misplaced += self._early_closure_error(before, point, way)
         return replace(jump, states=(*states, before, after), misplaced=misplaced), finest
 
-    def _orders_of_folds(self, fold: Fold) -> Orders | None:
+    def _orders_of_folds(self, fold: Fold) -> EventOrders | None:
         """Return starts from which either of two folds comes first, if both may."""
         two, point = fold.with_another, fold.point
         if two is None:
@@ -350,9 +360,9 @@ class Follower:
         longest = self.edges.longest_step
         ahead = zip(two.edges, two.ways, strict=True)
         starts = tuple(self._moved_on(point.gaps, edge, way * longest) for edge, way in ahead)
-        return Orders(furthest, starts)
+        return EventOrders(furthest, starts)
 
-    def _start_at_fold(self, fold: Fold) -> tuple[Array, Orders | None]:
+    def _start_at_fold(self, fold: Fold) -> tuple[Array, EventOrders | None]:
         """Return the edges from which a descent at a fold starts, and other orders of events.
 
         A state that is its own mirror image may go on as a saddle. That is left to either side;
@@ -369,7 +379,7 @@ class Follower:
         if saddle is not None:
             ways = self.edges.ways_off_saddle(saddle.gaps, fold.at, self.edges.law_at(point.gaps))
             if ways:
-                return ways[0], Orders(fold.at, tuple(ways))
+                return ways[0], EventOrders(fold.at, tuple(ways))
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= (1 - EQUAL) * rate.max())
         away = positions(point.gaps, self.edges.source.highest)[fastest]

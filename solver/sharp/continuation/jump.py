@@ -73,7 +73,7 @@ class History:
 
 
 @dataclass(frozen=True)
-class Orders:
+class EventOrders:
     """Two events so near to each other that either may come first.
 
     Attributes
@@ -150,14 +150,14 @@ class Jumps:
         touches: list[Touch] | None = None,
         known: Point | None = None,
         barrier: float = 0.0,
-        orders: Orders | None = None,
+        event_orders: EventOrders | None = None,
     ) -> ComputedJump:
         """Descend at d = ``at`` from the gaps ``start`` to the next state in which nothing touches.
 
         The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
         to a fold it may not be found again from its own edges. The jump raced, too, if another of
-        two events that may come in either of ``orders`` leads elsewhere in the end, or if it ends
+        two events in ``event_orders`` leads elsewhere in the end, or if it ends
         on one of two sides that are mirror images. Under a load no other order is sought.
         """
         rivals: list[Rival] = []
@@ -173,8 +173,8 @@ class Jumps:
             if rivals:
                 rival = self._end_of_rival(rivals[0], at)
                 at_stake = self._at_stake(before, point, rival, at)
-            elif orders is not None and self._may_race:
-                at_stake = self._at_stake_beyond(before, point, orders)
+            elif event_orders is not None and self._may_race:
+                at_stake = self._at_stake_beyond(before, point, event_orders)
         except FullContact:  # elsewhere, but with no energy that could be compared
             at_stake = 0.0
         except NoState:  # a comparison that does not come to rest is no failure of the path
@@ -186,12 +186,12 @@ class Jumps:
         return ComputedJump(at, (after,), jump, point)
 
     def _at_stake_beyond(
-        self, before: ContactState, point: Point | None, orders: Orders
+        self, before: ContactState, point: Point | None, event_orders: EventOrders
     ) -> float | None:
         """Difference in J/m² of the energies to which two events lead in either order, or None."""
-        at = orders.beyond
+        at = event_orders.beyond
         both = None if point is None else self._end_beyond(at, point.gaps)
-        ends = (self._end_beyond(at, start) for start in orders.starts)
+        ends = (self._end_beyond(at, start) for start in event_orders.starts)
         differences = [self._at_stake(before, both, end, at) for end in ends]
         return max((one for one in differences if one is not None), default=None)
 

@@ -2,7 +2,7 @@
 
 Both are the same search: a criterion has a value for every field, positive while nothing nucleates,
 and the first point of a branch is located at which it is not positive. ``nucleation.Nucleation`` is
-the criterion of touches, ``opening.Openings`` that of gaps that open inside patches.
+the criterion of touches, ``opening.Cracks`` that of gaps that open inside patches.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from adhesis.solver.sharp.tolerances import (
 )
 
 
-class Openings:
+class Cracks:
     """Criterion of openings inside patches for ``location.locate``, which also inserts cracks.
 
     Parameters

@@ -104,7 +104,7 @@ class States:
         return not self.problem.control.is_load and at < touch * (1 - 1e-12)
 
     @property
-    def _stiffness_unit(self) -> float:
+    def _tangent_unit(self) -> float:
         """Value of dY/dx in SI units at dY/dd = 1."""
         per = self._half * self.q0
         return 1 / per if self.problem.control.is_load else per
@@ -150,7 +150,7 @@ class States:
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * closed / self.q0,
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
-            stiffness=slope * self._stiffness_unit,
+            tangent=slope * self._tangent_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
             internal=ContinuationData(gaps, clearance),
         )
@@ -171,7 +171,7 @@ class States:
             separation=separation,
             mean_stress=mean_stress,
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
-            stiffness=float("nan"),
+            tangent=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
             internal=replace(state.internal, gaps=gap_field.gaps, clearance=0.0, branch_data=None),
         )
@@ -209,7 +209,7 @@ class States:
         both = before, after
         x = [control.prescribed(state.separation, state.mean_stress) for state in both]
         y = [control.conjugate(state.separation, state.mean_stress, h_max) for state in both]
-        way, change = x[1] - x[0], after.stiffness - before.stiffness
+        way, change = x[1] - x[0], after.tangent - before.tangent
         work = 0.5 * way * (y[0] + y[1]) - way**2 * change / 12
         return (after.potential - before.potential) / self.period + work
 
