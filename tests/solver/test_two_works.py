@@ -19,7 +19,7 @@ from adhesis.solver.model.profile import Profile, self_affine_profile, single_wa
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
 from adhesis.solver.sharp.continuation import follower
-from adhesis.solver.sharp.continuation.branch import Branch
+from adhesis.solver.sharp.continuation.branch import StableBranch
 from tools.hostile import draw
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
@@ -213,14 +213,14 @@ def test_a_loop_under_a_load_does_not_creep() -> None:
 
 def test_edges_that_begin_to_move_together_do_not_hold_each_other_back(monkeypatch):
     """The error of an equilibrium pins some again, by turns, at each smallest step."""
-    advance, steps = Branch.advance, [0]
+    advance, steps = StableBranch.advance, [0]
 
     def counted(branch):
         steps[0] += 1
         assert steps[0] < 20_000  # 5,000 without such steps
         return advance(branch)
 
-    monkeypatch.setattr(Branch, "advance", counted)
+    monkeypatch.setattr(StableBranch, "advance", counted)
     scene = draw(9001, 0, "open")
     problem = scene.problem()
     coarse, fine = (
