@@ -43,8 +43,9 @@ OTHER_MINIMUM = 0.01
 """λ_min. Edges this far apart are those of different minima."""
 FINER_STEPS = 0.3
 """Of the longest steps, in descents in which edges may have raced. Whole ones may end on the other
-side of a separatrix: a loop (γ = 0.04, seed 1, accuracy 1e-5) lost 5e-5 less, and equal speeds
-ended there, too, so that nothing told it. With a half of them it did, with 0.1 it does not."""
+side of a separatrix: a loop (γ = 0.04, seed 1, accuracy 1e-5) lost 5e-5 less. Equal speeds ended
+there, too, so that no race was flagged. With half of them the loss is wrong as well; with 0.3 and
+0.1 it is right."""
 
 # The way off a saddle.
 EQUAL = 1e-3
