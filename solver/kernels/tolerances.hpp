@@ -130,7 +130,8 @@ inline constexpr double FORCES_FELL = 8.0;
 // Of the distance of an opening from its critical value: the error that is allowed in addition.
 inline constexpr double MODEL_SHARE = 0.1;
 
-// Longest steps; edges that Newton's step of all edges, or the model, moves further run.
+// Longest steps. A long step through the model in which no edge goes further is taken as a short
+// one.
 inline constexpr double FOLLOWING = 0.2;
 
 // Longest steps (0.005 λ_min) of one step through the model near balance, also the shortest reach,
