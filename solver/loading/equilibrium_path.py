@@ -35,12 +35,17 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue, finite
 from adhesis.solver.views import ResultViews
 
+STEEP = 0.3
+"""Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
 LARGE_STRAIN = 0.3
 """Largest tension over Young's modulus, and longest neck over the period, above which small strain
 is doubtful."""
 
 PathOrLoop = TypeVar("PathOrLoop", bound="EquilibriumPath")
 
+# Relative error above which an audit residual or a numerical error is reported, of methods without
+# an accuracy.
+_LARGE = 0.02
 # Share of the loss below which a negative closing drop changes nothing that is read off.
 _FALL_SHARE = 0.01
 # Largest A/A0 from which on harder pressing can add a hundredth of the area at most.
@@ -140,6 +145,7 @@ class EquilibriumPath(ByValue, ResultViews):
     turn_range: float = float("nan")
 
     # Beside those of every path, in the order in which they are listed.
+    _result: ClassVar[str] = "loss"  # what is asked for
     _columns: ClassVar[tuple[str, ...]] = ()
     _numbers: ClassVar[tuple[str, ...]] = ()
 
@@ -320,9 +326,48 @@ class EquilibriumPath(ByValue, ResultViews):
         raise NotImplementedError
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the loss or work, one sentence each."""
+    def scale_of_errors(self) -> float:
+        """Energy in J/m² that the residual of the audit and the numerical error are compared with."""
         raise NotImplementedError
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to doubt the loss or work, one sentence each; none for most paths."""
+        found = self._warnings_of_way()
+        slope = float(np.sqrt(self.problem.profile.m2))
+        if slope > STEEP:
+            found.append(
+                f"the rms slope is {slope:.3g}: above {STEEP:g} linear elasticity itself is "
+                f"doubtful, and with it the {self._result}"
+            )
+        if self.problem.work_of_adhesion == 0:
+            return tuple(found)  # there is no loss to doubt
+        found += self.strain_warnings()
+        most, scale = getattr(self.method, "accuracy", _LARGE), self.scale_of_errors
+        if abs(self.audit_residual) > most:
+            found.append(
+                f"the audit residual, {self.audit_residual:.2g}, is larger than {most:g}, the "
+                "relative error allowed"
+            )
+        if self.loss_error > most * scale:
+            found.append(
+                f"the numerical error of the {self._result}, {self.loss_error:.2g} J/m² of "
+                f"{scale:.3g} J/m², is larger than {most:g} of it, the relative error allowed"
+            )
+        found += self.range_warnings()
+        alike = self.problem.equal_parts > 1 or self.problem.mirror_axes.size > 0
+        if self.problem.pinning > 0 and alike and self.patches.max() > 1:
+            found.append(
+                "parts of the profile are alike, and with two works of adhesion it is not settled "
+                f"at which separation one of equal patches recedes before the other: the "
+                f"{self._result} may be wrong by a per cent; take a profile whose parts differ a "
+                "little"
+            )
+        return tuple(found)
+
+    def _warnings_of_way(self) -> list[str]:
+        """Return the sentences on where the path turned and ended."""
+        return self.fall_warnings()
 
     def __str__(self) -> str:
         """Summarise it for a terminal, with its warnings."""

@@ -27,13 +27,6 @@ from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch
 from adhesis.solver.model.profile import Array
 
-STEEP = 0.3
-"""Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
-
-# Share of the loss above which an audit residual or an error of the loss is reported, for methods
-# without an accuracy.
-_LARGE = 0.02
-
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class LoopResult(EquilibriumPath):
@@ -97,6 +90,11 @@ class LoopResult(EquilibriumPath):
     def lost(self) -> float:
         """The loss."""
         return self.loss
+
+    @property
+    def scale_of_errors(self) -> float:
+        """The loss."""
+        return abs(self.loss)
 
     @property
     def audit_residual(self) -> float:
@@ -176,40 +174,8 @@ class LoopResult(EquilibriumPath):
             )
         return found
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the loss, one sentence each; none for most loops."""
-        found = self.preload_warnings
-        found += self.fall_warnings()
-        slope = float(np.sqrt(self.problem.profile.m2))
-        if slope > STEEP:
-            found.append(
-                f"the rms slope is {slope:.3g}: above {STEEP:g} linear elasticity itself is "
-                "doubtful, and with it the loss"
-            )
-        if self.problem.work_of_adhesion == 0:
-            return tuple(found)  # there is no loss to doubt
-        found += self.strain_warnings()
-        most = getattr(self.method, "accuracy", _LARGE)
-        if abs(self.audit_residual) > most:
-            found.append(
-                f"the audit residual, {self.audit_residual:.2g}, is larger than {most:g}, the "
-                "relative error allowed"
-            )
-        if self.loss_error > most * abs(self.loss):
-            found.append(
-                f"the numerical error of the loss, {self.loss_error:.2g} J/m² of {self.loss:.3g} "
-                f"J/m², is larger than {most:g} of it, the relative error allowed"
-            )
-        found += self.range_warnings()
-        alike = self.problem.equal_parts > 1 or self.problem.mirror_axes.size > 0
-        if self.problem.pinning > 0 and alike and self.patches.max() > 1:
-            found.append(
-                "parts of the profile are alike, and with two works of adhesion it is not settled "
-                "at which separation one of equal patches recedes before the other: the loss may "
-                "be wrong by a per cent; take a profile whose parts differ a little"
-            )
-        return tuple(found)
+    def _warnings_of_way(self) -> list[str]:
+        return self.preload_warnings + self.fall_warnings()
 
     @property
     def pull_off_penetration(self) -> float:

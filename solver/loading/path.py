@@ -140,6 +140,7 @@ class PathResult(EquilibriumPath):
     work: float
     energy_change: float
 
+    _result = "work"
     _columns = ("potential", "leg")
     _numbers = ("loss", "loss_dimensionless", "energy_change")
 
@@ -166,11 +167,6 @@ class PathResult(EquilibriumPath):
 
     def _rows_of_end(self) -> list[tuple[str, str]]:
         return [("minor loop", str(part)) for part in self.minor_loops]
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the work, one sentence each; none for most paths."""
-        return (*self.range_warnings(), *self.strain_warnings())
 
     @property
     def loss(self) -> float:
@@ -201,9 +197,14 @@ class PathResult(EquilibriumPath):
         """
         if self.problem.work_of_adhesion == 0 and self.ends_out:
             return 0.0
-        scale = max(abs(self.work), abs(self.energy_change), self.loss_from_drops)
+        scale = self.scale_of_errors
         rest = self.work - self.energy_change - self.loss_from_drops
         return rest / scale if scale else 0.0
+
+    @property
+    def scale_of_errors(self) -> float:
+        """The largest of work, change of energy and sum of drops, each without its sign."""
+        return max(abs(self.work), abs(self.energy_change), abs(self.loss_from_drops))
 
 
 def check_path(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -114,3 +116,23 @@ def test_a_path_may_end_in_contact():
     assert path.penetration[-1] == pytest.approx(0.3)
     assert path.energy_change < 0
     assert abs(path.audit_residual) < 1e-4
+
+
+def test_doubt_of_a_path_is_said_as_that_of_a_loop():
+    path = run_path(make_method("sharp", problem_of()), [0.5], load_steps=5)
+    assert path.warnings == ()
+    wrong = replace(path, work=1.1 * path.work)
+    assert [text[:18] for text in wrong.warnings] == ["the audit residual"]
+    uncertain = replace(path, loss_error=0.01 * path.work)
+    (text,) = uncertain.warnings
+    assert text.startswith("the numerical error of the work")
+    steep = replace(problem_of(), profile=ROUGH.scaled(30))
+    steep_path = run_path(make_method("sharp", steep), [0.1], load_steps=2)
+    assert any("linear elasticity itself" in text for text in steep_path.warnings)
+
+
+def test_a_method_without_adhesion_remembers_no_path_before():
+    method = make_method("sharp", problem_of(0.0))
+    first, again = (run_path(method, [0.4, 0.2, 0.4], load_steps=4) for _ in range(2))
+    assert again == first
+    assert np.all(np.diff(first.separation[first.leg == 3]) >= 0)
