@@ -15,7 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from adhesis.solver._kernels import Adhesion, ProfileAdhesion
+from adhesis.solver._kernels import Adhesion
 from adhesis.solver.method import (
     ContactState,
     Fields,
@@ -30,6 +30,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
+from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import History, Jumps
@@ -91,14 +92,6 @@ def _adhesion_ratio(profile: Profile, critical: float) -> float:
     return float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
 
 
-def _adhesion_of(problem: Problem, source: StressSource) -> Adhesion:
-    """Return the law of a problem's edges."""
-    ratio = problem.gamma_open / problem.work_of_adhesion if problem.pinning > 0 else 1.0
-    pattern = problem.pattern
-    bounds = (pattern.least, pattern.largest) if pattern else (1.0, 1.0)
-    return ProfileAdhesion(source.panels, ratio, *bounds)
-
-
 class SharpMethod(Method):
     """Contact states with real-valued edges.
 
@@ -113,6 +106,11 @@ class SharpMethod(Method):
     adhesion : Adhesion, optional
         Law of the edges, in units of the problem's γ (``kernels/edge_law.hpp``); by default that
         of the problem.
+
+    Raises
+    ------
+    ValueError
+        If such a law breaks its contract.
     """
 
     name = "sharp"
@@ -160,7 +158,10 @@ class SharpMethod(Method):
             tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance, problem.measure, problem.pattern)
         device = loading_device(problem)
-        adhesion = adhesion or _adhesion_of(problem, source)
+        if adhesion is None:
+            adhesion = adhesion_of(problem, source)
+        else:
+            check_adhesion(adhesion, problem, source)
         self.edges = EdgeMechanics(source, critical, tolerance, device, adhesion)
         self.states = States(problem, self.edges)
         finest = max(FIELD_RESOLVES * tolerance, ROUNDING)
@@ -304,7 +305,8 @@ class SharpMethod(Method):
         prescribed_in = self.problem.prescribed_in
         if target.branch == "loading":
             states = self._history(state, target).states
-            self._loaded += states
+            begin = prescribed_in(state)
+            self._loaded = [s for s in self._loaded if prescribed_in(s) > begin] + states
             return Path(tuple(states), ())
         lighter = [s for s in self._loaded if prescribed_in(s) >= target.prescribed]
         start = prescribed_in(state)

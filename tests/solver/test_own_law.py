@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -48,10 +50,57 @@ def test_a_law_of_its_own_meets_its_closed_form(ratio: float) -> None:
 
 
 def test_an_error_of_a_law_is_raised_where_the_path_is_followed() -> None:
-    def fails(theta: float, recedes: bool) -> tuple[float, float]:
-        raise ZeroDivisionError(f"at {np.sign(abs(theta))}")
+    own = TwoWorks(1.0)
 
+    def fails(theta: float, recedes: bool) -> tuple[float, float]:
+        if following:
+            raise ZeroDivisionError("here")
+        return own.work(theta, recedes)
+
+    following = False
     problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA)
-    law = PythonAdhesion(False, 1.0, 1.0, fails, TwoWorks(1.0).work_up_to)
-    with pytest.raises(ZeroDivisionError, match=r"at 1\.0"):
-        run_loop(SharpMethod(problem, adhesion=law), max_penetration=0.5, load_steps=5)
+    law = PythonAdhesion(False, 1.0, 1.0, fails, own.work_up_to)
+    method = SharpMethod(problem, adhesion=law)
+    following = True
+    with pytest.raises(ZeroDivisionError, match="here"):
+        run_loop(method, max_penetration=0.5, load_steps=5)
+
+
+def wavy(theta: float, recedes: bool) -> tuple[float, float]:
+    """Return w that varies, and its slope."""
+    return 1 + 0.5 * np.sin(theta), 0.5 * np.cos(theta)
+
+
+def wavy_up_to(theta: float, recedes: bool) -> float:
+    """Integrate w that varies."""
+    return float(theta + 0.5 - 0.5 * np.cos(theta))
+
+
+def test_a_law_that_keeps_its_contract_is_taken() -> None:
+    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
+    SharpMethod(problem, adhesion=PythonAdhesion(False, 0.5, 1.5, wavy, wavy_up_to))
+
+
+@pytest.mark.parametrize(
+    ("work", "up_to", "pins", "rule"),
+    [
+        (lambda a, r: (np.sin(a), np.cos(a)), lambda a, r: 1 - np.cos(a), False, "be positive"),
+        (lambda a, r: (1 + 0.01 * a, 0.01), lambda a, r: a + 5e-3 * a**2, False, "period 2π"),
+        (lambda a, r: (wavy(a, r)[0], 0.0), wavy_up_to, False, "slope"),
+        (wavy, lambda a, r: a, False, "derivative of work_up_to"),
+        (lambda a, r: (2.0 - r, 0.0), lambda a, r: (2 - r) * a, True, "must not have a smaller w"),
+        (lambda a, r: (1.0 + r, 0.0), lambda a, r: (1 + r) * a, False, "must pin"),
+    ],
+)
+def test_a_law_that_breaks_its_contract_is_refused(
+    work: Any, up_to: Any, pins: bool, rule: str
+) -> None:
+    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
+    with pytest.raises(ValueError, match=f"law of adhesion.*{rule}"):
+        SharpMethod(problem, adhesion=PythonAdhesion(pins, 0.5, 2.0, work, up_to))
+
+
+def test_a_law_that_pins_does_not_act_over_a_range() -> None:
+    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat", adhesion_range=1e-9)
+    with pytest.raises(ValueError, match="cannot act over a range"):
+        SharpMethod(problem, adhesion=TwoWorks(2.0).law)

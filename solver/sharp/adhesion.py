@@ -1,0 +1,76 @@
+"""Laws of the edges: that of a problem, and what is checked of a law of one's own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver._kernels import Adhesion, ProfileAdhesion
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+
+_PLACES = 97  # at which a law is looked at
+_STEP = 1e-4  # of the shortest wave: between values whose difference is compared with a slope
+_AGREE = 1e-3  # of the largest w, and per wave number of the largest slope that it may have
+
+
+def adhesion_of(problem: Problem, source: StressSource) -> Adhesion:
+    """Return the law of a problem's edges."""
+    ratio = problem.gamma_open / problem.work_of_adhesion if problem.pinning > 0 else 1.0
+    pattern = problem.pattern
+    bounds = (pattern.least, pattern.largest) if pattern else (1.0, 1.0)
+    return ProfileAdhesion(source.panels, ratio, *bounds)
+
+
+def check_adhesion(adhesion: Adhesion, problem: Problem, source: StressSource) -> None:
+    """Check a law of one's own against its contract (``kernels/edge_law.hpp``) at some places.
+
+    Raises
+    ------
+    ValueError
+        If w is not positive or not of period 2π, a slope is not that of w, an integral not that of
+        w, w of a receding edge is smaller, or differs although the law does not pin; or if a law
+        that pins is to act over a range.
+    """
+    if adhesion.pins and np.isfinite(problem.strength):
+        raise ValueError("the law of adhesion pins edges: it cannot act over a range, too")
+    step = _STEP * 2 * np.pi / source.top
+    theta = 2 * np.pi * np.arange(_PLACES) / _PLACES + 1.0 / source.top
+    works = []
+    for recedes in (False, True):
+        how = "recedes" if recedes else "advances"
+        work, slope = np.array([adhesion.work(at, recedes) for at in theta]).T
+        later, before, next_period = (
+            np.array([adhesion.work(at, recedes)[0] for at in theta + way])
+            for way in (step, -step, 2 * np.pi)
+        )
+        rise = [
+            adhesion.work_up_to(at + step, recedes) - adhesion.work_up_to(at - step, recedes)
+            for at in theta
+        ]
+        near = _AGREE * np.abs(work).max()
+        for fails, rule in (
+            (~(work > 0), "must be positive"),
+            (~(np.abs(next_period - work) < near), "must have the period 2π"),
+            (
+                ~(np.abs((later - before) / (2 * step) - slope) < near * source.top),
+                "must have the slope that work returns with it",
+            ),
+            (
+                ~(np.abs(np.array(rise) / (2 * step) - work) < near),
+                "must be the derivative of work_up_to",
+            ),
+        ):
+            if fails.any():
+                at = theta[fails][0]
+                raise ValueError(
+                    f"the law of adhesion at θ = {at:.6g}, of an edge that {how}: w {rule}"
+                )
+        works.append(work)
+    advances, recedes_at = works
+    if (recedes_at < advances).any():
+        raise ValueError("the law of adhesion: an edge that recedes must not have a smaller w")
+    if not adhesion.pins and (recedes_at != advances).any():
+        raise ValueError(
+            "the law of adhesion: edges that recede have another w than those that advance; such a "
+            "law must pin"
+        )
