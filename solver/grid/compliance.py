@@ -17,7 +17,6 @@ from functools import cache
 
 import numpy as np
 
-from adhesis.solver._kernels import inverse_form
 from adhesis.solver.model.profile import Array
 
 # Number of one-node blocks at the end of a patch beside the node, and growth of the next blocks.
@@ -230,16 +229,8 @@ class EdgeCompliance:
         a = np.array(low)
         b = np.array(high)
         v = self._block(a[:, None], b[:, None], a[None, :], b[None, :])
-        to = [self._block(a, b, np.array(k), np.array(k + 1)) for k in nodes]
-        for i, one in enumerate(to):
-            s[i, i] -= inverse_form(v.copy(), one)
-        if len(nodes) == 2:
-            # Polarisation: 2 aᵀV⁻¹b = (a+b)ᵀV⁻¹(a+b) - aᵀV⁻¹a - bᵀV⁻¹b.
-            both = inverse_form(v.copy(), to[0] + to[1])
-            apart = inverse_form(v.copy(), to[0] - to[1])
-            s[0, 1] -= 0.25 * (both - apart)
-            s[1, 0] = s[0, 1]
-        return s
+        to = self._block(j[:, None], j[:, None] + 1, a[None, :], b[None, :])
+        return s - to @ np.linalg.solve(v, to.T)
 
     def _block(self, a: Array, b: Array, c: Array, d: Array) -> Array:
         """Compute the sum of V over the nodes a … b-1 and c … d-1."""

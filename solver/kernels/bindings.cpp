@@ -504,7 +504,6 @@ void bind_grid(nb::module_& m) {
         "factor"_a);
   m.def("advance", &advance, "stress"_a, "displacement"_a, "residual"_a, "direction"_a,
         "response"_a, "inside"_a, "step"_a);
-  m.def("inverse_form", &inverse_form, "matrix"_a, "vector"_a);
 }
 
 // Single parts, for their tests.

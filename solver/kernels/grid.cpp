@@ -1,7 +1,5 @@
 #include "grid.hpp"
 
-#include "cholesky.hpp"
-
 namespace adhesis {
 
 double total(Numbers values) {
@@ -53,14 +51,6 @@ double advance(Changed stress, Changed displacement, Changed residual, Numbers d
     most = std::max(most, std::abs(residual[i]));
   }
   return most;
-}
-
-double inverse_form(Changed values, Numbers vector) {
-  const int n = int(vector.size());
-  Vector solved(vector.begin(), vector.end());
-  if (!factor_rows(values.data(), n, n)) return not_a_number;
-  solve_column(values.data(), n, n, solved.data());
-  return dot(solved.data(), vector.data(), n);
 }
 
 }  // namespace adhesis

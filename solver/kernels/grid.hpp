@@ -24,7 +24,4 @@ void update_direction(Changed direction, Numbers inside, Numbers correction, dou
 double advance(Changed stress, Changed displacement, Changed residual, Numbers direction,
                Numbers response, Numbers inside, double step);
 
-// bᵀA⁻¹b for a symmetric positive definite A (Cholesky); overwrites A.
-double inverse_form(Changed values, Numbers vector);
-
 }  // namespace adhesis

@@ -327,7 +327,7 @@ class EquilibriumPath(ByValue, ResultViews):
 
     @property
     def scale_of_errors(self) -> float:
-        """Energy in J/m² that the residual of the audit and the numerical error are compared with."""
+        """Energy in J/m² with which audit residual and numerical error are compared."""
         raise NotImplementedError
 
     @property
