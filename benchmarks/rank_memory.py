@@ -45,7 +45,6 @@ def imported(*names: str) -> Callable[[], object]:
 
 step("Python")(lambda: None)
 step("numpy")(imported("numpy"))
-step("scipy: what the solver uses")(imported("scipy.fft", "scipy.linalg"))
 step("mpi4py and h5py")(imported("mpi4py.MPI", "h5py"))
 packages = ("adhesis.ensemble.command.run", "adhesis.solver.sharp.method")
 step("solver and ensemble")(imported(*packages))

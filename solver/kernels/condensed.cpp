@@ -87,7 +87,7 @@ Vector HeldEdges::closing_by_pressure() const {
 // By reciprocity the mean opening, times 2π, follows n_e as C_e follows p, times C_e π/4.
 Vector HeldEdges::pressure_by_motion(const Vector& closing) const {
   const double weight = device_.separation_weight;
-  const double by_pressure = weight * response_.mean[1] - 2 * pi * device_.compliance;
+  const double by_pressure = response_.prescribed_by_pressure(device_);
   Vector out(closing);
   for (size_t c = 0; c < edges_.size(); ++c)
     out[c] *= 0.25 * pi * weight * response_.edges[edges_[c]].opening / by_pressure;

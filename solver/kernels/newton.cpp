@@ -42,8 +42,7 @@ void share_openings(Equilibrium& out, LinearResponse& response, const Flags& pin
   const Integers edges = indices(pinned);
   const HeldEdges held(response, edges, out.at, model.device);
   const Vector residual = held.residual(), closing = held.closing_by_pressure();
-  const double by_pressure =
-      model.device.separation_weight * response.mean[1] - 2 * pi * model.device.compliance;
+  const double by_pressure = response.prescribed_by_pressure(model.device);
   out.pinned_share.assign(out.ends.size(), not_a_number);
   out.pinned_rate = out.pinned_share;
   for (size_t c = 0; c < edges.size(); ++c) {

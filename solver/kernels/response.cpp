@@ -44,7 +44,7 @@ ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
   }
   // weight·mean - 2π compliance·p = 2π d
   const double weight = device.separation_weight;
-  const double by_pressure = weight * mean[1] - 2 * pi * device.compliance;
+  const double by_pressure = prescribed_by_pressure(device);
   ResponseSolution out;
   out.pressure = pressure_at(prescribed, device);
   const double rate = 2 * pi / by_pressure;  // dp/dd
@@ -90,9 +90,8 @@ void LinearResponse::update_softness(const Pair& motion, double by_pressure, con
 }
 
 double LinearResponse::pressure_at(double prescribed, const Device& device) const {
-  const double weight = device.separation_weight;
-  const double by_pressure = weight * mean[1] - 2 * pi * device.compliance;
-  return (2 * pi * prescribed - weight * mean[0]) / by_pressure;
+  const double by_separation = device.separation_weight * mean[0];
+  return (2 * pi * prescribed - by_separation) / prescribed_by_pressure(device);
 }
 
 Vector LinearResponse::potential_at(double pressure) const {

@@ -22,7 +22,7 @@ struct Edge {
   double opening = 0, residual = 0;    // C and C - C_c, C_c that of an edge that advances
   ValueAndSlope pinning_range = {};    // C_c of one that recedes less that, and its derivative by n
   bool recedes = false;                // whether it is behind its memory
-  double opening_by_pressure = 0;      // ∂C/∂p between held edges
+  double opening_by_pressure = 0;      // -∂C/∂p between held edges
   std::array<double, 2> tangent = {};  // ∂(C - C_c)/∂n of both edges of its gap, at the others' g
   bool held = false;                   // whether it stays where it is,
   double here = 0;                     // so far from the reference; 0 if it is not held
@@ -83,6 +83,11 @@ struct LinearResponse {
 
   // Solve for all edges, with d prescribed.
   ResponseSolution solve(double prescribed, const EdgeLaw& law, const Device& device);
+
+  // 2π ∂d/∂p, the edges following, in the last solution.
+  double prescribed_by_pressure(const Device& device) const {
+    return device.separation_weight * mean[1] - 2 * pi * device.compliance;
+  }
 
   // p with d prescribed, by the mean openings of the last solution.
   double pressure_at(double prescribed, const Device& device) const;
