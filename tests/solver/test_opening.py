@@ -20,7 +20,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
-from adhesis.solver.crack import Crack, griffith_length, largest_excess
+from adhesis.solver.crack import Crack, griffith_length, judge_maximum, largest_excess
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import (
     beyond_limit,
@@ -179,6 +179,18 @@ def test_a_crack_grows_by_the_field_with_the_crack():
     release = method.follower.cracks._release
     assert release(field, np.pi, 0.1 * griffith) == pytest.approx(0.1, rel=1e-2)
     assert release(field, np.pi, 20 * griffith) < 20 / 2
+
+
+def test_no_crack_is_tried_beyond_the_length_at_which_the_release_rate_falls():
+    tried: list[float] = []
+
+    def release(half: float) -> float:
+        tried.append(half)
+        return half / (1 + half**2)
+
+    crack = judge_maximum(0.0, 1.0, 1.0, 0.5, 1.0, release, 0.5, 10.0)
+    assert crack.value == pytest.approx(1 - math.sqrt(0.5 / 1.1), rel=1e-3)
+    assert 1.0 < tried[-1] < 1.3
 
 
 def test_an_energy_that_rises_by_a_barrier_is_no_error():
