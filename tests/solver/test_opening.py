@@ -95,11 +95,13 @@ def test_griffiths_crack_in_a_closed_trough_is_balanced():
         assert np.sign(found[:2]).tolist() == [sign, sign]
 
 
-def test_a_strength_that_is_never_reached_only_refines_the_steps_of_sharp():
+def test_a_strength_that_is_never_reached_asks_for_no_finer_steps():
     gamma, profile = 0.04, rough(ratio=3)
     zero_range, _ = loop_of(profile, math.inf, gamma)
     strong, _ = loop_of(profile, 1e12, gamma)
     assert strong.openings == 0
+    assert strong.method.field_tolerance == zero_range.method.field_tolerance
+    assert strong.method.energies < 1.1 * zero_range.method.energies
     assert [jump.kind for jump in strong.jumps] == [jump.kind for jump in zero_range.jumps]
     assert abs(strong.loss - zero_range.loss) < strong.loss_error + zero_range.loss_error
 
