@@ -112,7 +112,8 @@ def judge_maximum(
     if first > longest:
         return Crack(position, share, first / longest - 1)
     half, rate = [0.0], [0.0]
-    while first <= longest and max(rate) < GROWTH * share**2:
+    # G rises with the length up to where tension falls, or the crack takes part of the mean gap
+    while first <= longest and rate[-1] == max(rate) < GROWTH * share**2:
         half.append(first)
         rate.append(release(first))
         first *= _RATIO

@@ -376,21 +376,14 @@ void bind_response(nb::module_& m) {
       .value("AT_REST", DescentEvent::at_rest)
       .value("VANISHED", DescentEvent::vanished)
       .value("STEP_LIMIT", DescentEvent::step_limit)
-      .value("NO_FIELD", DescentEvent::no_field)
-      .value("OUTGROWN", DescentEvent::outgrown);
+      .value("NO_FIELD", DescentEvent::no_field);
   nb::class_<Descent>(m, "Descent")
       .def_ro("event", &Descent::event)
       .def_prop_ro(
           "gaps", [](const Descent& d) { return pairs_of(d.ends); }, new_array)
       .def_ro("steps", &Descent::steps)
+      .def_ro("set_ups", &Descent::set_ups)
       .def_ro("raced", &Descent::raced);
-  nb::class_<Running>(m, "Running")
-      .def(
-          "__init__",
-          [](Running* running, const Vector& start) {
-            new (running) Running{Flags(start.size()), start};
-          },
-          "start"_a);
   nb::class_<LinearResponse>(m, "LinearResponse")
       .def_prop_ro("gap_count", &LinearResponse::gap_count)
       .def_prop_ro("orders", [](const LinearResponse& r) { return r.nodes.orders; })
@@ -413,7 +406,7 @@ void bind_response(nb::module_& m) {
            "All others follow, but those at their memory, which are pinned.")
       .def("find_equilibrium", &find_equilibrium, "gaps"_a, "prescribed"_a, "reach"_a, "strict"_a,
            "law"_a, "model"_a, Unlocked())
-      .def("descend", &descend, "gaps"_a, "prescribed"_a, "most"_a, "equal_speeds"_a, "running"_a,
+      .def("descend", &descend, "gaps"_a, "start"_a, "prescribed"_a, "most"_a, "equal_speeds"_a,
            "law"_a, "model"_a, Unlocked());
   m.def("set_up_response", &set_up_response, "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a,
         "model"_a, Unlocked());

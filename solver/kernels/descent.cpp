@@ -156,13 +156,13 @@ bool may_race(const Integers& edges, const Matrix& tangent, const Vector& start,
 
 }  // namespace
 
-Descent descend(LinearResponse& response, Vector ends, double prescribed, int most_steps,
-                bool equal_speeds, Running& running, const EdgeLaw& law, const Model& model) {
+Descent descend(LinearResponse& response, Vector ends, const Vector& start, double prescribed,
+                int most_steps, bool equal_speeds, const EdgeLaw& law, const Model& model) {
   const Panels& panels = *model.panels;
   const Device& device = model.device;
-  Flags& runs = running.edges;
+  Flags runs(ends.size());
   Descent out;
-  double& reach = running.reach;
+  double reach = FIRST_REACH;  // of the next long step, in longest steps
   Flags held = held_edges(runs, ends, law);
   Integers edges = indices(held), modelled;
   Vector before = ends;
@@ -173,8 +173,15 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
   while (out.steps < most_steps) {
     check_signals();
     if (moved && !move_references(response, ends, held, pressure, prescribed, law, model)) {
-      out.event = DescentEvent::outgrown;
-      break;
+      auto anew = set_up_response(ends, prescribed, response.nodes.orders, law, model);
+      if (!anew) {
+        out.event = DescentEvent::no_field;
+        break;
+      }
+      ++out.set_ups;
+      response = std::move(*anew);
+      hold_edges(response, ends, held, law);
+      condense_gaps(response, Flags(response.gap_count(), true));
     }
     if (run_unbalanced(runs, response, law)) {
       held = held_edges(runs, ends, law);
@@ -244,7 +251,7 @@ Descent descend(LinearResponse& response, Vector ends, double prescribed, int mo
       break;
     }
   }
-  out.raced = law.critical > 0 && may_race(modelled, tangent, running.start, ends, law);
+  out.raced = law.critical > 0 && may_race(modelled, tangent, start, ends, law);
   out.ends = ends;
   return out;
 }

@@ -18,29 +18,23 @@ enum class DescentEvent {
   vanished,    // a gap or patch is below the smallest length
   step_limit,  // the steps that were allowed are used up
   no_field,    // the edges have no field
-  outgrown,    // some gap needs more nodes than the linear response has
 };
 
 struct Descent {
   DescentEvent event = DescentEvent::step_limit;
   Vector ends;
-  int steps = 0;  // solutions of the linear response
+  int steps = 0;    // solutions of the linear response
+  int set_ups = 0;  // of the response, where some gap came to need more nodes
   // Whether the order in which the edges ran may have decided where they ended: some took so much
   // force from others. Edges that increase each other's force end alike in any order.
   bool raced = false;
 };
 
-// What a descent knows of the way that its edges have come, also after it has outgrown a response.
-struct Running {
-  Flags edges;                 // those that run
-  Vector start;                // ends where they began to run
-  double reach = FIRST_REACH;  // of the next long step, in longest steps
-};
-
-// Descend until an event; `running.edges` follows. Without adhesion the edges are stable but where
-// patches come or go: all take Newton's steps, each edge within its limit. With equal speeds, for
-// comparison, each edge has the time Δτ in which its own force would move it by the longest step.
-Descent descend(LinearResponse& response, Vector ends, double prescribed, int most_steps,
-                bool equal_speeds, Running& running, const EdgeLaw& law, const Model& model);
+// Descend until an event; `start` is where the edges began to run. Without adhesion the edges are
+// stable but where patches come or go: all take Newton's steps, each edge within its limit. With
+// equal speeds, for comparison, each edge has the time Δτ in which its own force would move it by
+// the longest step.
+Descent descend(LinearResponse& response, Vector ends, const Vector& start, double prescribed,
+                int most_steps, bool equal_speeds, const EdgeLaw& law, const Model& model);
 
 }  // namespace adhesis

@@ -15,7 +15,6 @@ from adhesis.solver._kernels import (
     Equilibrium,
     Field,
     FieldModel,
-    Running,
     solve_field,
 )
 from adhesis.solver.model.profile import Array, Integers
@@ -230,23 +229,17 @@ class EdgeMechanics(EdgeProblem):
         equal_speeds: bool,
         start: Array,
     ) -> tuple[Descent | None, Integers | None, int]:
-        """Descend on linear responses; returns the orders that it came to and the steps left, too.
+        """Descend on the linear response; returns its orders at the end and the steps left, too.
 
         None if the edges have no field.
         """
-        running = Running(start)
-        while True:
-            near = self.kept.near(gaps, prescribed, orders)
-            if near is None:
-                return None, orders, most
-            end = near.descend(gaps, prescribed, most, equal_speeds, running, law, self.model)
-            self.count.descent_steps += end.steps
-            self.count.fields += end.steps
-            most -= end.steps
-            if end.event != DescentEvent.OUTGROWN:
-                return end, near.orders, most
-            gaps = end.gaps
-            self.kept.forget()
+        near = self.kept.near(gaps, prescribed, orders)
+        if near is None:
+            return None, orders, most
+        end = near.descend(gaps, start, prescribed, most, equal_speeds, law, self.model)
+        self.count.descent_steps += end.steps
+        self.count.fields += end.steps + end.set_ups
+        return end, near.orders, most - end.steps
 
     def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.

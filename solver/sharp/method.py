@@ -151,7 +151,7 @@ class SharpMethod(Method):
             tolerance = max(min(tolerance, PLACED_BY_PROFILE / ratio), ROUNDING)
         # Steps whose work is compared with the energy need an energy that is as exact.
         work = math.inf
-        if math.isfinite(problem.strength):
+        if problem.opens_by_roughness:
             share = min(WORK_OF_STEP * weak**WEAKNESS_POWER, LARGEST_WORK_OF_STEP)
             work = share * accuracy * problem.work_of_adhesion
             exact = max(work / problem.full_contact_energy, ROUNDING)

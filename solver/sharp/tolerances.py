@@ -126,10 +126,10 @@ LATE_REFINEMENT = 0.5
 """Of the allowed lateness: what a fold that was found too late is located to."""
 WORK_OF_STEP = 8e-4
 """Accuracy of the loss times γ, at strong adhesion: largest difference of the work and the change
-of energy over one step where patches open from inside. The loss is then a smaller part of the work
-than the rule of ``TRAPEZOID`` supposes, and between two folds the slopes at both ends hide the
-error. Steps of a loop err to the same side, so that a loop of steel with 2,000 steps needs this for
-an audit of 2e-5. With weak adhesion it falls as ``TRAPEZOID`` does."""
+of energy over one step where roughness opens patches from inside. The loss is then a smaller part
+of the work than the rule of ``TRAPEZOID`` supposes, and between two folds the slopes at both ends
+hide the error. Steps of a loop err to the same side, so that a loop of steel with 2,000 steps needs
+this for an audit of 2e-5. With weak adhesion it falls as ``TRAPEZOID`` does."""
 LARGEST_WORK_OF_STEP = 2e-5
 """Accuracy of the loss times γ: the largest value, however strong adhesion is."""
 WORK_RESOLVED = 0.01

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from adhesis.solver._kernels import Running, set_up_response
+from adhesis.solver._kernels import set_up_response
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.method import Method
 from adhesis.solver.model.problem import Problem
@@ -66,7 +66,7 @@ def test_a_signal_that_comes_in_a_long_kernel_ends_it(alarm):
 
     def descend() -> None:
         while not ended.is_set():
-            response.descend(ends, 1e-3, 100_000, False, Running(ends), edges.law, edges.model)
+            response.descend(ends, ends, 1e-3, 100_000, False, edges.law, edges.model)
 
     signal.setitimer(signal.ITIMER_REAL, 0.3)
     started = time.perf_counter()

@@ -20,7 +20,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
-from adhesis.solver.crack import Crack, griffith_length, largest_excess
+from adhesis.solver.crack import Crack, griffith_length, judge_maximum, largest_excess
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import (
     beyond_limit,
@@ -95,11 +95,13 @@ def test_griffiths_crack_in_a_closed_trough_is_balanced():
         assert np.sign(found[:2]).tolist() == [sign, sign]
 
 
-def test_a_strength_that_is_never_reached_only_refines_the_steps_of_sharp():
+def test_a_strength_that_is_never_reached_asks_for_no_finer_steps():
     gamma, profile = 0.04, rough(ratio=3)
     zero_range, _ = loop_of(profile, math.inf, gamma)
     strong, _ = loop_of(profile, 1e12, gamma)
     assert strong.openings == 0
+    assert strong.method.field_tolerance == zero_range.method.field_tolerance
+    assert strong.method.energies < 1.1 * zero_range.method.energies
     assert [jump.kind for jump in strong.jumps] == [jump.kind for jump in zero_range.jumps]
     assert abs(strong.loss - zero_range.loss) < strong.loss_error + zero_range.loss_error
 
@@ -179,6 +181,18 @@ def test_a_crack_grows_by_the_field_with_the_crack():
     release = method.follower.cracks._release
     assert release(field, np.pi, 0.1 * griffith) == pytest.approx(0.1, rel=1e-2)
     assert release(field, np.pi, 20 * griffith) < 20 / 2
+
+
+def test_no_crack_is_tried_beyond_the_length_at_which_the_release_rate_falls():
+    tried: list[float] = []
+
+    def release(half: float) -> float:
+        tried.append(half)
+        return half / (1 + half**2)
+
+    crack = judge_maximum(0.0, 1.0, 1.0, 0.5, 1.0, release, 0.5, 10.0)
+    assert crack.value == pytest.approx(1 - math.sqrt(0.5 / 1.1), rel=1e-3)
+    assert 1.0 < tried[-1] < 1.3
 
 
 def test_an_energy_that_rises_by_a_barrier_is_no_error():

@@ -50,8 +50,8 @@ class Resolution:
     bend : float
         Largest relative error of the trapezoidal rule over one step.
     work : float
-        Largest difference in J/m² of the work and the change of energy over one step, where patches
-        open from inside; infinite where they do not.
+        Largest difference in J/m² of the work and the change of energy over one step, where
+        roughness opens patches from inside; infinite where it does not.
     h_max : float
         q0 h_max.
     finest : float

@@ -104,7 +104,7 @@ class Follower:
         if jump is not None:
             history.commit(jump)
             return jump.at, jump.point
-        energy_residual = self._energy_residual if self.cracks.is_possible else None
+        energy_residual = self._energy_residual if math.isfinite(self.resolution.work) else None
         branch = StableBranch(
             self.edges, self.closing, self.resolution, point, target, energy_residual
         )
@@ -215,10 +215,11 @@ class Follower:
         trail.restart(0.0)
         fold, beyond = branch.fold_ahead
         for _ in range(MOST_OPENINGS):
-            finest = self.resolution.finest
+            finest = self.nucleation.tolerance
             touched, least = locate(self.nucleation, self._between, points, finest, clearance)
             opened = None
             if self.cracks.is_possible:
+                finest = self.resolution.finest
                 opened, _ = locate(self.cracks, self._between, points, finest, 0.0)
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)

@@ -15,8 +15,6 @@ any output grid: it is exact to rounding.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from adhesis.solver._kernels import sum_pull
@@ -83,7 +81,7 @@ def nodal_tension(problem: Problem) -> NodalTension:
     A strength may be a small part of the stress that flattens the profile. Parabolas on eight nodes
     to a wave miss a maximum by 1e-2 of that stress, on 32 by 4e-5.
     """
-    return NodalTension(problem.profile, 8 if math.isinf(problem.strength) else 32)
+    return NodalTension(problem.profile, 32 if problem.opens_by_roughness else 8)
 
 
 class NodalTension:
