@@ -149,9 +149,9 @@ std::tuple<Vector, Vector, Vector, Vector> rising(FineOpening fine) {
 // ∂(C_e - C_c)/∂n_f between some edges of these gaps. All others follow, but those at their memory.
 Matrix tangent_between(LinearResponse& r, const Vector& ends, const Integers& some,
                        double prescribed, const EdgeLaw& law, const Model& model) {
-  Flags held = at_memory(ends, law);
-  for (int e : some) held[e] = true;
-  condense_gaps(r, hold_edges(r, ends, held, law));
+  EdgeStates states = states_at(ends, law);
+  for (int e : some) states.held[e] = true;
+  condense_gaps(r, hold_edges(r, ends, states));
   const ResponseSolution now = r.solve(prescribed, law, model.device);
   Matrix out = HeldEdges(r, some, now, model.device).tangent();
   for (int c = 0; c < out.n; ++c) {
@@ -247,7 +247,7 @@ void bind_model(nb::module_& m) {
       .def(
           "free_edges",
           [](const EdgeLaw& law, const Vector& gaps) {
-            Flags free = at_memory(gaps, law);
+            Flags free = states_at(gaps, law).held;
             for (char& one : free) one = !one;
             return indices(free);
           },

@@ -91,12 +91,13 @@ bool cut(Vector& way, const std::vector<Gap>& gaps, const EdgeLaw& law) {
 
 // Mark the edges that run, those beside them, and those at their memory, which may be pinned: all
 // that are in the model of the openings.
-Flags held_edges(const Flags& runs, const Vector& ends, const EdgeLaw& law) {
+EdgeStates held_edges(const Flags& runs, const Vector& ends, const EdgeLaw& law) {
   const int count = int(runs.size());
-  Flags some = at_memory(ends, law);
+  EdgeStates out = states_at(ends, law);
+  Flags& some = out.held;
   for (int e = 0; e < count; ++e)
     if (runs[e]) some[e] = some[(e + 1) % count] = some[(e + count - 1) % count] = true;
-  return some;
+  return out;
 }
 
 // Let held edges flow through the model; `strongest` is the largest norm of forces so far.
@@ -163,8 +164,8 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
   Flags runs(ends.size());
   Descent out;
   double reach = FIRST_REACH;  // of the next long step, in longest steps
-  Flags held = held_edges(runs, ends, law);
-  Integers edges = indices(held), modelled;
+  EdgeStates states = held_edges(runs, ends, law);
+  Integers edges = indices(states.held), modelled;
   Vector before = ends;
   ModelFlow flow;
   Matrix tangent;
@@ -172,7 +173,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
   bool moved = true, judges = false;
   while (out.steps < most_steps) {
     check_signals();
-    if (moved && !move_references(response, ends, held, pressure, prescribed, law, model)) {
+    if (moved && !move_references(response, ends, states, pressure, prescribed, law, model)) {
       auto anew = set_up_response(ends, prescribed, response.nodes.orders, law, model);
       if (!anew) {
         out.event = DescentEvent::no_field;
@@ -180,15 +181,15 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       }
       ++out.set_ups;
       response = std::move(*anew);
-      hold_edges(response, ends, held, law);
+      hold_edges(response, ends, states);
       condense_gaps(response, Flags(response.gap_count(), true));
     }
     if (run_unbalanced(runs, response, law)) {
-      held = held_edges(runs, ends, law);
-      edges = indices(held);
+      states = held_edges(runs, ends, law);
+      edges = indices(states.held);
       moved = false;
     }
-    if (!moved) condense_gaps(response, hold_edges(response, ends, held, law));
+    if (!moved) condense_gaps(response, hold_edges(response, ends, states));
     ++out.steps;
     moved = false;
     const ResponseSolution now = response.solve(prescribed, law, device);
@@ -234,8 +235,8 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
         more = run_far(runs, response, way, ends, law);
     }
     if (more) {
-      held = held_edges(runs, ends, law);
-      edges = indices(held);
+      states = held_edges(runs, ends, law);
+      edges = indices(states.held);
       continue;
     }
     judges = !edges.empty();

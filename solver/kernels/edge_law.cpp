@@ -19,10 +19,13 @@ CriticalOpening critical_of(int edge, double theta, double opening, const EdgeLa
   return {critical, drift, false};
 }
 
-Flags at_memory(const Vector& ends, const EdgeLaw& law) {
-  Flags out(ends.size());
-  if (law.pins())
-    for (int e = 0; e < int(ends.size()); ++e) out[e] = way_from_memory(e, ends[e], law) == 0;
+EdgeStates states_at(const Vector& ends, const EdgeLaw& law) {
+  EdgeStates out = {Flags(ends.size()), Flags(ends.size())};
+  for (int e = 0; law.pins() && e < int(ends.size()); ++e) {
+    const double way = way_from_memory(e, ends[e], law);
+    out.held[e] = way == 0;
+    out.recedes[e] = way < 0;
+  }
   return out;
 }
 

@@ -136,8 +136,13 @@ struct CriticalOpening {
 
 CriticalOpening critical_of(int edge, double theta, double opening, const EdgeLaw& law);
 
-// Mark the edges at their memory; none where edges are not pinned.
-Flags at_memory(const Vector& ends, const EdgeLaw& law);
+// Which edges are held, and which of the others recede.
+struct EdgeStates {
+  Flags held, recedes;
+};
+
+// Hold the edges at their memory; none where edges are not pinned.
+EdgeStates states_at(const Vector& ends, const EdgeLaw& law);
 
 inline Vector move_edges(const Vector& ends, const Vector& motion) {
   Vector out(ends);

@@ -6,34 +6,31 @@ namespace adhesis {
 
 namespace {
 
-// Pin edges that come to their memory, and release those whose opening no longer holds them.
-//
-// Returns the ends with these at their memory, or a little to the side to which they are released;
-// `pinned` is changed likewise.
-Vector pin_edges(LinearResponse& response, const Vector& ends, Flags& pinned,
-                 const ResponseSolution& now, const EdgeLaw& law, const Model& model) {
+// Pin edges that come back to their memory, and release those whose opening no longer holds them;
+// returns whether there are any.
+bool pin_edges(LinearResponse& response, Vector& ends, EdgeStates& states,
+               const ResponseSolution& now, const EdgeLaw& law, const Model& model) {
+  auto& [pinned, recedes] = states;
   const Integers edges = indices(pinned);
   const Vector residual = HeldEdges(response, edges, now, model.device).residual();
   const Vector here = response.motion_to(ends);
-  Vector out = ends;
+  bool changed = false;
   for (int e = 0; e < int(ends.size()); ++e) {
-    const double way = way_from_memory(e, ends[e], law);
-    if (!pinned[e] && way * (way + now.motion[e] - here[e]) < 0) {
-      out[e] = law.memory[e];
-      pinned[e] = true;
-    }
+    const double way = outwards(e) * (ends[e] - law.memory[e]) + now.motion[e] - here[e];
+    if (pinned[e] || (recedes[e] ? way <= 0 : way >= 0)) continue;
+    ends[e] = law.memory[e];
+    pinned[e] = changed = true;
   }
   const double slack = law.force_error / law.critical;
   for (size_t c = 0; c < edges.size(); ++c) {
     const int e = edges[c];
     const double range = pinning_range(ends[e], law).value;
-    const double released = outwards(e) * law.newton_tolerance;
-    const bool advances = residual[c] < -slack;
-    if (!advances && !(residual[c] > range + slack)) continue;
-    out[e] = ends[e] + (advances ? released : -released);
+    recedes[e] = residual[c] > range + slack;
+    if (!recedes[e] && !(residual[c] < -slack)) continue;
     pinned[e] = false;
+    changed = true;
   }
-  return out;
+  return changed;
 }
 
 // Compute where the openings of pinned edges lie between both critical ones, and the rates.
@@ -58,7 +55,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
                              bool strict, const EdgeLaw& law, const Model& model) {
   const int edges = int(ends.size());
   Equilibrium out;
-  Flags pinned = at_memory(ends, law);
+  EdgeStates states = states_at(ends, law);
   Vector travelled(edges), step(edges), moved(edges);
   double last = infinity;
   bool judged_again = false;
@@ -66,21 +63,17 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
   while (true) {
     check_signals();
     ++out.corrections;
-    if (!move_references(response, ends, pinned, pressure, prescribed, law, model)) {
+    if (!move_references(response, ends, states, pressure, prescribed, law, model)) {
       out.is_outgrown = true;
       break;
     }
     out.at = response.solve(prescribed, law, model.device);
     pressure = out.at.pressure;
     if (!std::isfinite(pressure)) break;
-    if (law.pins()) {
-      const Vector before = ends;
-      ends = pin_edges(response, ends, pinned, out.at, law, model);
-      if (ends != before) {
-        if (out.corrections >= MOST_CORRECTIONS) break;
-        last = infinity;
-        continue;
-      }
+    if (law.pins() && pin_edges(response, ends, states, out.at, law, model)) {
+      if (out.corrections >= MOST_CORRECTIONS) break;
+      last = infinity;
+      continue;
     }
     if (strict && !out.at.stable) {
       if (judged_again || !any_outdated(response, ends, law)) break;
@@ -112,7 +105,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
   out.references = response.nodes.gaps;
   out.orders = response.nodes.orders;
   out.ends = ends;
-  if (out.found && law.pins()) share_openings(out, response, pinned, law, model);
+  if (out.found && law.pins()) share_openings(out, response, states.held, law, model);
   return out;
 }
 

@@ -85,7 +85,7 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
   return false;
 }
 
-bool move_references(LinearResponse& response, const Vector& ends, const Flags& held,
+bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
                      double pressure, double prescribed, const EdgeLaw& law, const Model& model) {
   const std::vector<Gap> gaps = map_gaps(ends);
   const std::vector<GaussRule>& rules = gauss_rules();
@@ -108,10 +108,10 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
   const std::vector<Gap> before = nodes.gaps;
   for (int k = 0; k < count; ++k)
     if (changed[k]) nodes.gaps[k] = gaps[k];
-  Flags both(held);
+  EdgeStates both(states);
   for (int e = 0; e < 2 * count; ++e)
-    if (far[e / 2]) both[e] = true;
-  const Flags others = hold_edges(response, ends, both, law);
+    if (far[e / 2]) both.held[e] = true;
+  const Flags others = hold_edges(response, ends, both);
   if (!any(changed)) {
     condense_gaps(response, others);
     return true;
@@ -138,7 +138,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
   if (any(far)) {
     // their potentials are not those of the old edges: solved with these held
     pressure = response.solve(prescribed, law, model.device).pressure;
-    hold_edges(response, ends, held, law);
+    hold_edges(response, ends, states);
     for (int k = 0; k < count; ++k)
       if (far[k]) response.linearise_in_current_potential(k, pressure, law);
     response.factor_runs(far);
@@ -146,17 +146,16 @@ bool move_references(LinearResponse& response, const Vector& ends, const Flags& 
   return true;
 }
 
-Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held,
-                 const EdgeLaw& law) {
+Flags hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states) {
+  const auto& [held, recedes] = states;
   const Vector motion = response.motion_to(ends);
   Flags changed(ends.size() / 2);
   for (int e = 0; e < int(ends.size()); ++e) {
     Edge& edge = response.edges[e];
     const double here = held[e] ? motion[e] : 0;
-    const bool recedes = law.pins() && way_from_memory(e, ends[e], law) < 0;
-    if (bool(held[e]) != edge.held || here != edge.here || recedes != edge.recedes)
+    if (bool(held[e]) != edge.held || here != edge.here || bool(recedes[e]) != edge.recedes)
       changed[e / 2] = true;
-    edge.recedes = recedes;
+    edge.recedes = recedes[e];
     edge.held = held[e];
     edge.here = here;
   }
@@ -172,7 +171,7 @@ void condense_gaps(LinearResponse& response, const Flags& some) {
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
                      const EdgeLaw& law, const Model& model) {
   const double pressure = response.pressure_at(prescribed, model.device);
-  if (!move_references(response, ends, at_memory(ends, law), pressure, prescribed, law, model))
+  if (!move_references(response, ends, states_at(ends, law), pressure, prescribed, law, model))
     return false;
   response.solve(prescribed, law, model.device);
   return true;

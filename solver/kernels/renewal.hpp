@@ -25,16 +25,15 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 
 // Move the references of gaps to these edges where they have departed from them.
 //
-// `held` marks the edges that are held from now on. `pressure` is p, with which the last solution
+// `states` are those of the edges from now on. `pressure` is p, with which the last solution
 // gives the potentials. Returns false where a gap or run needs more nodes than it has, or many gaps
 // are far from their references: then another response is to be set up.
-bool move_references(LinearResponse& response, const Vector& ends, const Flags& held,
+bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
                      double pressure, double prescribed, const EdgeLaw& law, const Model& model);
 
 // Hold some edges where they are, and no others, and note which of all recede; marks the gaps that
 // are to be condensed.
-Flags hold_edges(LinearResponse& response, const Vector& ends, const Flags& held,
-                 const EdgeLaw& law);
+Flags hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states);
 
 // Eliminate the edges of some gaps anew, and factor the runs that hold them.
 void condense_gaps(LinearResponse& response, const Flags& some);

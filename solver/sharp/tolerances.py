@@ -35,10 +35,6 @@ DESCENT_HANDS_OVER = 1e-3
 less have not left their branch."""
 ENDLESS = 100_000
 """Steps of one descent, or nucleations in one jump; more are an endless loop."""
-CONTINUED = 200
-"""How often a descent may lead to the next point of a branch; more are an endless loop."""
-RESTS = 20
-"""How often a descent may come to rest without a minimum that Newton's iteration finds."""
 OTHER_MINIMUM = 0.01
 """λ_min. Edges this far apart are those of different minima."""
 FINER_STEPS = 0.3
@@ -72,10 +68,6 @@ SHORTEST_CRACK = 0.02
 
 # ---------------------------------------------------------------- continuation of a branch
 
-AT_OPENING = 0.5
-"""Of the smallest step: a pinned edge that begins to move on a shorter way moves already. Before a
-kink the last state is a whole smallest step away; edges that have just begun to move together, and
-are pinned again by the error of an equilibrium, were a fortieth."""
 PREDICTED_MOTION = 0.15
 """λ_min. Longest predicted motion of the edge that leads in one step."""
 ORDER_RESOLVED = 0.1

@@ -13,11 +13,10 @@ from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.gap.ends import without_small
+from adhesis.solver.sharp.gap.ends import outward, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
-    AT_OPENING,
     LONGEST_STEP,
     ORDER_RESOLVED,
     PREDICTED_MOTION,
@@ -189,8 +188,6 @@ class StableBranch:
         The last accepted point.
     trail : Trail
         Accepted points since the last search for touches.
-    continued : int
-        Number of points that a descent led to.
     finest : float
         Separation to which a jump is located, in d: the smallest step, but across a fold or to the
         target.
@@ -212,7 +209,7 @@ class StableBranch:
         if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
-        self.trail, self.continued = Trail(point), 0
+        self.trail = Trail(point)
         self.finest, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = Predictor(point)
@@ -231,10 +228,11 @@ class StableBranch:
             reached = correct(self._edges, self._predictor, at)
             if reached is not None:
                 error = self._error(self._output, reached)
-                if error <= TRAPEZOID_FAR or abs(step) <= 2 * self._resolution.finest:
+                share = 0.5 if error > TRAPEZOID_FAR else self._share_to_turn(reached, step)
+                if share == 1 or abs(step) <= 2 * self._resolution.finest:
                     return self._accept(reached, step, error)
                 # a branch may bend more sharply than jumps are located
-                self._longest = 0.5 * abs(step)
+                self._longest = share * abs(step)
                 self.finest = min(self.finest, self._longest)
             elif abs(step) <= self.finest:
                 return Fold(self.point, at, self._two_folds)
@@ -258,7 +256,6 @@ class StableBranch:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.add(point, self._closing.between(self.point, point, self._target.branch))
         self.point, self._predictor = point, Predictor(point)
-        self.continued += 1
 
     def _next_step(self) -> float:
         """Return the next step in d: no edge is predicted to move far, and the target not passed.
@@ -281,12 +278,31 @@ class StableBranch:
         The branch has a kink there, and the state on either side belongs to the path.
         """
         finest = self.finest
-        distance = pinned.distance(step, AT_OPENING * finest)
+        distance = pinned.distance(step)
         if not distance < abs(step) + finest:
             return step
         self._begins_to_move = True
         size = distance - finest if distance > 2 * finest else distance + finest
         return step if size >= abs(step) else math.copysign(size, step)
+
+    def _share_to_turn(self, reached: Point, step: float) -> float:
+        """Return the share of a step at which an edge turns back, 1 if none does.
+
+        With two works of adhesion it is pinned where it turns; what it goes back in a step counts
+        up to the error of the field. An edge that is pinned where the step began turned midway.
+        """
+        if not self._edges.pins:
+            return 1.0
+        motion = outward(reached.gaps) * (reached.gaps - self.point.gaps).ravel()
+        start, end = step * self.point.rate, step * reached.rate
+        pinned = motion == 0
+        motion, end = np.where(pinned, start, motion), np.where(pinned, -start, end)
+        share = np.divide(start, start - end, out=np.zeros_like(start), where=start != end)
+        back = np.where(motion * end < 0, 0.5 * (1 - share) * np.abs(end), 0.0)
+        worst = int(np.argmax(back))
+        if back[worst] <= self._edges.field_error:
+            return 1.0
+        return float(np.clip(share[worst], 0.1, 0.9))
 
     def _accept(self, reached: Point, step: float, error: float) -> Accepted:
         gaps, smallest = reached.gaps, self._edges.smallest
@@ -336,8 +352,8 @@ class StableBranch:
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed.
 
-        Over stripes of the work of adhesion slopes at both ends are equal by chance: there their
-        difference from the mean slope counts, too.
+        Over stripes of the work of adhesion, and where edges begin to move and are pinned, slopes at
+        both ends are equal by chance: there their difference from the mean slope counts, too.
         """
         way = point.at - output.at
         # p = q0 h_max is σ~ = 1
@@ -346,7 +362,7 @@ class StableBranch:
         conjugate = point.separation - h_max if load else point.pressure
         scale = max(abs(conjugate), QUIET_STRESS * h_max)
         change = abs(way) * abs(point.slope - output.slope)
-        if self._edges.source.is_patterned:
+        if self._edges.source.is_patterned or self._edges.pins:
             before, here = (p.separation if load else p.pressure for p in (output, point))
             change = max(change, *(abs(here - before - way * p.slope) for p in (output, point)))
         return float(change / 12 / (self._resolution.bend * scale))

@@ -36,7 +36,6 @@ from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import (
-    CONTINUED,
     DESCENT_HANDS_OVER,
     EQUAL,
     LATE_REFINEMENT,
@@ -198,8 +197,6 @@ class Follower:
         if goes_on and after is not None:
             # Newton's iteration failed where there was no fold: the branch goes on.
             branch.continue_from(after)
-            if branch.continued > CONTINUED:
-                raise NoState("no equilibrium is found on a branch that goes on", fold.at)
             return None
         return jump
 

@@ -29,18 +29,12 @@ class PinnedEdges(NamedTuple):
     share: Array
     rate: Array
 
-    def distance(self, step: float, at_opening: float = 0.0) -> float:
-        """Return the way in d, along ``step``, after which an edge begins to move; inf if none.
-
-        An edge that is at its opening already, or on a way of ``at_opening``, has begun to move, by
-        less than Newton's iteration tells: it limits no step. If it did, edges that begin to move
-        together could hold each other back in turn.
-        """
+    def distance(self, step: float) -> float:
+        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
         rate = self.rate * np.sign(step)
         left = np.where(rate > 0, 1 - self.share, self.share)
         moving = np.isfinite(rate) & (rate != 0) & (left > 0)
-        ways = left[moving] / np.abs(rate[moving])
-        return float(ways.min(initial=np.inf, where=ways >= at_opening))
+        return float((left[moving] / np.abs(rate[moving])).min(initial=np.inf))
 
 
 @dataclass(frozen=True, eq=False)
