@@ -54,8 +54,6 @@ may differ and count as equal: of equal edges the first one leads."""
 
 # ---------------------------------------------------------------- nucleation
 
-CLOSING_BY_MOTION = 4.0
-"""The motion of one gap's edges counts so many times where it may close others, of many gaps."""
 OVERLAP = 1e-6
 """h_max. Smaller overlaps may remain in a state."""
 TRIAL_WIDTHS = 1.25

@@ -258,7 +258,7 @@ class Jumps:
                 continue
             least, minima = self.nucleation.minimum(point.field)
             if least > 0:
-                return point.with_clearance(least)
+                return point
             seeds = self.nucleation.choose_seeds(minima)
             grown = descend(point.field.gaps, seeds)
             if self.has_gained(point, grown, seeds):

@@ -39,8 +39,6 @@ class ContinuationData:
     ----------
     gaps : array, shape (L, 2)
         The ends of its gaps.
-    clearance : float
-        Of them (``Point.clearance``).
     branch_data : BranchData, optional
         If a path stopped at the state.
     searched : SearchedGaps
@@ -50,7 +48,6 @@ class ContinuationData:
     """
 
     gaps: Array
-    clearance: float
     branch_data: BranchData | None = None
     searched: SearchedGaps = field(default_factory=SearchedGaps)
     branch: Branch | None = None
@@ -125,14 +122,13 @@ class States:
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation, point.clearance)
+        return self.of_field(point.field, point.slope, separation)
 
     def of_field(
         self,
         gap_field: GapField,
         slope: float = float("nan"),
         separation: float | None = None,
-        clearance: float = 0.0,
     ) -> ContactState:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
@@ -152,7 +148,7 @@ class States:
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             tangent=slope * self._tangent_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gaps, clearance),
+            internal=ContinuationData(gaps),
         )
 
     def at_fixed_edges(
@@ -173,7 +169,7 @@ class States:
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             tangent=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=replace(state.internal, gaps=gap_field.gaps, clearance=0.0, branch_data=None),
+            internal=replace(state.internal, gaps=gap_field.gaps, branch_data=None),
         )
 
     def with_friction(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
