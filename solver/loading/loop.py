@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from time import process_time
 
@@ -132,41 +131,20 @@ class LoadingBranch:
         self.method = method
         axis = Axis(ends[-1], load_steps)
         self._drives = axis.between(0.0, ends[-1], [*ends, *axis.apart(marks, ends)])
-        self._turns = tuple(turns)
+        self._turns = turns
+        self._ahead = [*turns]  # those not yet left; the state lies at the first, or before it
         self._of_preloads = latest is not None
-        self._reached = -math.inf  # the last of the turning points
-        self._has_left = False  # whether the state lies beyond it
         self._passed = 0  # number of prescribed values reached
         self._record = Record(method, axis)
         self._record.begin("loading")
         self._seconds = 0.0
 
-    def advance_to(self, turn: float, progress: Progress | None = None) -> None:
-        """Follow the branch to a turning point, unless it is already there or beyond.
-
-        Raises
-        ------
-        ValueError
-            If ``turn`` is not one of its turning points.
-        PathError
-            If the branch cannot be followed so far.
-        """
-        if turn not in self._turns:
-            raise ValueError(f"{turn!r} is not a turning point of this loading branch")
-        started = process_time()
-        for stop in self._turns:
-            if self._reached < stop <= turn:
-                self._advance(stop, progress)
-        self._seconds += process_time() - started
-
-    def _advance(self, turn: float, progress: Progress | None) -> None:
-        """Follow the branch from one of its turning points to the next."""
+    def _advance_to(self, turn: float, progress: Progress | None) -> None:
+        """Follow the branch to the next of its turning points, unless it is there."""
         preload = turn if self._of_preloads else None
         self._record.progress = progress
         while not self._is_at(turn):
             self._passed += not self._record.step(self._drives[self._passed], preload)
-            self._has_left = True
-        self._reached, self._has_left = turn, False
 
     def _is_at(self, turn: float) -> bool:
         """Return whether a turning point is reached, or the branch has ended before a preload."""
@@ -208,9 +186,16 @@ class LoadingBranch:
         PathError
             As in :func:`run_loop`.
         """
-        self.advance_to(turn, progress)
-        if self._reached != turn or self._has_left:
+        if turn not in self._turns:
+            raise ValueError(f"{turn!r} is not a turning point of this loading branch")
+        if turn not in self._ahead:
             raise ValueError(f"this loading branch has passed {turn!r}")
+        started = process_time()
+        self._advance_to(self._ahead[0], progress)
+        while self._ahead[0] != turn:
+            del self._ahead[0]
+            self._advance_to(self._ahead[0], progress)
+        self._seconds += process_time() - started
         started = process_time() - self._seconds
         record = self._record.copy()
         record.on_state, record.progress = on_state, progress
