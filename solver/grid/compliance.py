@@ -26,8 +26,6 @@ _GROWTH = 1.8
 # Lengths up to this many nodes are exact, longer ones rounded in equal ratios.
 _EXACT_LENGTH = 24
 _RATIO = 1.08
-# Number of geometries cached without rounding, to save the time of rounding.
-_RECENT = 20_000
 
 
 @cache
@@ -86,7 +84,6 @@ class EdgeCompliance:
         # V over two blocks of nodes is then a combination of four values of F.
         slope = np.concatenate(([0.5 * kernel[0]], 0.5 * kernel[0] + np.cumsum(kernel[1:])))
         self._f = np.concatenate(([0.0], np.cumsum(slope)))
-        self._recent: dict[tuple[int, int, tuple[int, int, int] | None], float] = {}
         self._known: dict[tuple[int, ...], float] = {}
         self._pairs: dict[tuple[int, ...], Array] = {}
 
@@ -110,18 +107,6 @@ class EdgeCompliance:
             The nodes of all other patches are divided between both sides and added to the
             neighbours without gaps: far away only their number matters.
         """
-        geometry = (width, gap, neighbours)
-        known = self._recent.get(geometry)
-        if known is None:
-            if len(self._recent) >= _RECENT:
-                self._recent.clear()
-            known = self._recent[geometry] = self._rounded_value(width, gap, neighbours)
-        return known
-
-    def _rounded_value(
-        self, width: int, gap: int, neighbours: tuple[int, int, int] | None
-    ) -> float:
-        """Compute S of the geometry with rounded lengths."""
         if neighbours is None:
             key = self._rounded_patch(width)[:1]
         else:
