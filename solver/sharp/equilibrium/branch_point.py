@@ -9,7 +9,7 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField
-from adhesis.solver.sharp.gap.ends import move_edges, outward
+from adhesis.solver.sharp.gap.ends import move_edges
 from adhesis.solver.values import with_values
 
 
@@ -105,16 +105,6 @@ class Point:
         if not left.any():
             return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))
-
-    def interpolate(self, other: Point, at: float) -> Array:
-        """Interpolate the gaps at d = ``at`` between two points of one branch, by a cubic."""
-        span = other.at - self.at
-        t = (at - self.at) / span
-        sign = outward(self.gaps)
-        begin, end = ((sign * p.rate * span).reshape(-1, 2) * (t * (1 - t)) for p in (self, other))
-        straight = self.gaps + (other.gaps - self.gaps) * (t * t * (3 - 2 * t))
-        cubic: Array = straight + begin * (1 - t) - end * t
-        return cubic
 
     def extrapolate(self, at: float) -> Array:
         """Extrapolate the gaps to d = ``at``, along the tangent."""

@@ -86,7 +86,8 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
     def solve(clear: Point, hit: Point, at: float) -> Point | None:
         if clear.gaps is hit.gaps:
             return Point(at, edges.field(clear.gaps, at), clear.rate, math.nan)
-        gaps = clear.interpolate(hit, at)
+        share = (at - clear.at) / (hit.at - clear.at)
+        gaps = clear.gaps + share * (hit.gaps - clear.gaps)
         point = edges.equilibrium(gaps, at, reach, memory=clear.gaps)
         near = abs(at - clear.at) < abs(hit.at - at)
         for start in (clear, hit) if near else (hit, clear):
