@@ -68,14 +68,6 @@ class Criterion(Protocol[Seed]):
         ...
 
 
-def secant_share(clear_value: float, hit_value: float, tolerance: float) -> float:
-    """Return the share of the way from a clear point to a hit at which to try next.
-
-    By a secant to a fifth of the tolerance below zero, kept off both ends.
-    """
-    return min(max((clear_value + 0.2 * tolerance) / (clear_value - hit_value), 0.02), 0.98)
-
-
 def equilibrium_between(edges: EdgeMechanics) -> Solve:
     """Return a function that solves the equilibrium between two points of a branch.
 
@@ -109,24 +101,17 @@ def locate(
     None if it is not met at its end. The trail starts at a point known to be clear; between its
     points the search ends at ``resolution`` (d).
     """
-    hit = trail[-1]
-    hit_value, hit_candidates = criterion.minimum(hit.field)
-    if hit_value > 0:
+    if criterion.minimum(trail[-1].field)[0] > 0:
         return None
-    clear_value = math.nan
-    # over the points of the trail, then within one step of it
-    low, high = 0, len(trail) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        value, candidates = criterion.minimum(trail[middle].field)
-        if value > 0:
-            low, clear_value = middle, value
-        else:
-            high, hit, hit_candidates, hit_value = middle, trail[middle], candidates, value
-    clear = trail[low]
     # Each trial is expensive: the values at both ends show where to begin.
-    if low == 0:
-        clear_value, _ = criterion.minimum(clear.field)
+    clear, hit = trail[:2]
+    clear_value, _ = criterion.minimum(clear.field)
+    hit_value, hit_candidates = criterion.minimum(hit.field)
+    for point in trail[2:]:
+        if hit_value <= 0:
+            break
+        clear, clear_value, hit = hit, hit_value, point
+        hit_value, hit_candidates = criterion.minimum(hit.field)
     cleared = 0  # trials one after the other that were clear
     for _ in range(sys.float_info.mant_dig):
         if criterion.is_located(hit_value, abs(clear.at - hit.at) <= resolution):
@@ -134,19 +119,21 @@ def locate(
         share = 0.5
         # The least value may be that of another candidate than the hit: then a secant creeps.
         if clear_value > 0 and cleared < BISECTION_AFTER:
-            share = secant_share(clear_value, hit_value, criterion.tolerance)
+            # to a fifth of the tolerance below zero, and off both ends
+            share = (clear_value + 0.2 * criterion.tolerance) / (clear_value - hit_value)
+            share = min(max(share, 0.02), 0.98)
         trial = clear.at + (hit.at - clear.at) * share
         if trial in (clear.at, hit.at):  # there its value differs by the error of the field
             return Located(clear, criterion.choose_seeds(hit_candidates), 0.0)
-        point = solve(clear, hit, trial)
-        if point is None:
+        between = solve(clear, hit, trial)
+        if between is None:
             break
-        value, candidates = criterion.minimum(point.field)
+        value, candidates = criterion.minimum(between.field)
         cleared = cleared + 1 if value > 0 else 0
         if value > 0:
-            clear, clear_value = point, value
+            clear, clear_value = between, value
         else:
-            hit, hit_candidates, hit_value = point, candidates, value
+            hit, hit_candidates, hit_value = between, candidates, value
     criterion.validate_location(hit_value, hit.at)
     # estimate the distance from the exact location by a secant
     late = abs(clear.at - hit.at)
