@@ -54,19 +54,13 @@ def _fine_both(length: int) -> tuple[int, ...]:
     return tuple(sorted({*half, *(length - offset for offset in half)}))
 
 
-class _Rounded(dict[int, int]):
-    """Lengths on a scale of equal ratios, exact up to ``_EXACT_LENGTH``; computed when missing."""
-
-    def __missing__(self, length: int) -> int:
-        rounded = length
-        if length > _EXACT_LENGTH:
-            steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
-            rounded = round(_EXACT_LENGTH * _RATIO**steps)
-        self[length] = rounded
-        return rounded
-
-
-_rounded = _Rounded()
+@cache
+def _rounded(length: int) -> int:
+    """Round a length on a scale of equal ratios, exact up to ``_EXACT_LENGTH``."""
+    if length <= _EXACT_LENGTH:
+        return length
+    steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
+    return round(_EXACT_LENGTH * _RATIO**steps)
 
 
 class EdgeCompliance:
@@ -111,7 +105,7 @@ class EdgeCompliance:
             key = self._rounded_patch(width)[:1]
         else:
             near, far_gap, far = neighbours
-            key = tuple(_rounded[k] for k in (width, gap, near, far_gap, far))
+            key = tuple(_rounded(k) for k in (width, gap, near, far_gap, far))
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = self._compute(key)
@@ -119,7 +113,7 @@ class EdgeCompliance:
 
     def _rounded_patch(self, width: int) -> tuple[int, ...]:
         """Round the shorter of the only patch and the only gap; together they are the period."""
-        short = _rounded[min(width, self.n - width)]
+        short = _rounded(min(width, self.n - width))
         width = short if width <= self.n - width else self.n - short
         return width, self.n - width, 0, 0, 0
 
@@ -138,7 +132,7 @@ class EdgeCompliance:
         if before == 0 and after == 0:
             key = (0, *self._rounded_patch(width))
         else:
-            key = (0, *(_rounded[k] for k in (width, left, right, before, after)))
+            key = (0, *(_rounded(k) for k in (width, left, right, before, after)))
         known = self._pairs.get(key)
         if known is None:
             _, width, left, right, before, after = key
@@ -165,7 +159,7 @@ class EdgeCompliance:
         near, gap, far : int
             Nodes of the patch before the gap, of the gap, and of the patch after it.
         """
-        key = (1, *(_rounded[k] for k in (near, gap, far)))
+        key = (1, *(_rounded(k) for k in (near, gap, far)))
         known = self._pairs.get(key)
         if known is None:
             _, near, gap, far = key

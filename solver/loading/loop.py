@@ -100,15 +100,8 @@ class LoadingBranch:
 
     Raises
     ------
-    ValueError
-        If a cycle cannot be run (:func:`adhesis.solver.loading.cycle.check_cycle`), or a turning
-        point is given twice, or none.
-    TypeError
-        If the method is not a Method, or a value not a number.
-
-    References
-    ----------
-    docs/theory.md, "8. Paths and controls"
+    ValueError, TypeError
+        As in :func:`run_loops`.
     """
 
     def __init__(
@@ -169,10 +162,8 @@ class LoadingBranch:
         turn : float
         marks : sequence of float
             Further values at which a step of the unloading branch ends.
-        progress : callable, optional
-            See :data:`adhesis.solver.loading.path_record.Progress`.
-        on_state : callable, optional
-            Called with every state of the loop, in order, those of the loading branch too.
+        progress, on_state : callable, optional
+            As in :func:`run_loop`.
 
         Returns
         -------
@@ -234,8 +225,7 @@ def run_loops(
         Equal steps up to the largest, or latest, turning point; unloading branches use the same
         step.
     progress : callable or bool, optional
-        True shows a bar on a terminal, and lines elsewhere; a function is called as
-        :data:`adhesis.solver.loading.path_record.Progress` says.
+        As in :func:`run_loop`.
 
     Returns
     -------

@@ -76,12 +76,12 @@ class Follower:
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
-        self.nucleation.searched = SearchedGaps() if data is None else data.searched
         self.cracks.healed, self.nucleation.healed = [], []
-        self._came_on = None if data is None else data.branch
-        if data is None or data.branch_data is None:
+        self.nucleation.searched, self._came_on = SearchedGaps(), None
+        if data is None or data.stopped is None:
             return None
-        at, nearly, rate, slope, previous, pinned = data.branch_data
+        at, nearly, rate, slope, previous, pinned, searched, name = data.stopped
+        self.nucleation.searched, self._came_on = searched, name
         field = self.edges.field(data.gaps, at, nearly)
         return Point(at, field, rate, slope, previous, pinned)
 
@@ -129,14 +129,11 @@ class Follower:
     def _remember(self, history: History, branch: StableBranch, name: Branch) -> None:
         """Let the last state remember its point."""
         point = branch.point
-        data = ContinuationData(
-            point.field.gaps,
-            BranchData(
-                point.at, point.field.nearly, point.rate, point.slope, point.previous, point.pinned
-            ),
-            self.nucleation.searched,
-            name,
-        )
+        stopped = BranchData(
+            point.at, point.field.nearly, point.rate, point.slope, point.previous, point.pinned,
+            self.nucleation.searched, name,
+        )  # fmt: skip
+        data = ContinuationData(point.gaps, stopped)
         history.states[-1] = with_values(history.states[-1], internal=data)
 
     def _handle_accepted(

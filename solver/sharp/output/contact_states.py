@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,10 @@ from adhesis.solver.values import with_values
 
 
 class BranchData(NamedTuple):
-    """Point of a branch at which a path stopped: d, p and q0 s, and the rest of ``Point``."""
+    """Point of a branch at which a path stopped: d, p and q0 s, and the rest of ``Point``.
+
+    With the gaps as they were when they were last searched for touches, and the name of the branch.
+    """
 
     prescribed: float
     nearly: tuple[float, float]
@@ -29,28 +31,15 @@ class BranchData(NamedTuple):
     slope: float
     previous: PreviousPoint | None
     pinned: PinnedEdges | None
+    searched: SearchedGaps
+    branch: Branch
 
 
-@dataclass(frozen=True, eq=False)
-class ContinuationData:
-    """Data from which a path continues at a state.
-
-    Attributes
-    ----------
-    gaps : array, shape (L, 2)
-        The ends of its gaps.
-    branch_data : BranchData, optional
-        If a path stopped at the state.
-    searched : SearchedGaps
-        The gaps as they were when they were last searched for touches.
-    branch : {"loading", "unloading"}, optional
-        Branch on which the path stopped.
-    """
+class ContinuationData(NamedTuple):
+    """Gaps of a state, shape (L, 2), and the point at which a path stopped there, if one did."""
 
     gaps: Array
-    branch_data: BranchData | None = None
-    searched: SearchedGaps = field(default_factory=SearchedGaps)
-    branch: Branch | None = None
+    stopped: BranchData | None = None
 
 
 def loading_device(problem: Problem) -> LoadingDevice:
@@ -169,7 +158,7 @@ class States:
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             tangent=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=replace(state.internal, gaps=gap_field.gaps, branch_data=None),
+            internal=ContinuationData(gap_field.gaps),
         )
 
     def with_friction(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
