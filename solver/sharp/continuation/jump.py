@@ -210,8 +210,8 @@ class Jumps:
             return None
         if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
             return 0.0
-        ends = (self._after(before, end, at) for end in (point, rival))
-        return self.states.energy_difference(*ends)
+        ends = [self._after(before, end, at).potential for end in (point, rival)]
+        return abs(ends[1] - ends[0]) / self.states.period
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
         """State that a descent led to."""

@@ -59,6 +59,8 @@ class States:
         self.q0 = profile.q0
         self.period = profile.period
         self._half = problem.half_space.modulus / 2
+        per = self._half * self.q0
+        self._tangent_unit = 1 / per if problem.control.is_load else per  # dY/dx at dY/dd = 1
         m = np.arange(profile.coefficients.size)
         h = np.abs(profile.coefficients * self.q0) ** 2
         self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
@@ -88,12 +90,6 @@ class States:
         """
         touch = self.problem.profile.h_max * self.q0 if touch is None else touch
         return not self.problem.control.is_load and at < touch * (1 - 1e-12)
-
-    @property
-    def _tangent_unit(self) -> float:
-        """Value of dY/dx in SI units at dY/dd = 1."""
-        per = self._half * self.q0
-        return 1 / per if self.problem.control.is_load else per
 
     def detached_after(self, before: ContactState, at: float) -> ContactState:
         """Make the state after ``before`` has lost contact at d = ``at``.
@@ -197,10 +193,6 @@ class States:
         way, change = x[1] - x[0], after.tangent - before.tangent
         work = 0.5 * way * (y[0] + y[1]) - way**2 * change / 12
         return (after.potential - before.potential) / self.period + work
-
-    def energy_difference(self, one: ContactState, other: ContactState) -> float:
-        """Compute the difference of two energies, in J/m² of nominal area."""
-        return abs(other.potential - one.potential) / self.period
 
     def jump(
         self,
