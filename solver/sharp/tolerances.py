@@ -120,8 +120,6 @@ LATE_DROP = 0.5
 """Accuracy of the loss: a jump may be late by a work of this share of its drop."""
 LEAST_DROP = 2e-3
 """γ. Drops below this are taken as this when the lateness of a jump is judged."""
-LATE_REFINEMENT = 0.5
-"""Of the allowed lateness: what a fold that was found too late is located to."""
 WORK_OF_STEP = 8e-4
 """Accuracy of the loss times γ, at strong adhesion: largest difference of the work and the change
 of energy over one step where patches open from inside. The loss is then a smaller part of the work

@@ -37,7 +37,6 @@ from adhesis.solver.sharp.tolerances import (
     CONTINUED,
     DESCENT_HANDS_OVER,
     EQUAL,
-    LATE_REFINEMENT,
     LONGEST_STEP,
     SECOND_FOLD_DISPLACED,
 )
@@ -174,11 +173,11 @@ class Follower:
             if jump is not None:
                 return replace(jump, states=(self.states.of_point(point), *jump.states))
         last = history.states[-1] if history.states else None
-        jump, refined = self._fold_jump(last, fold, target, branch.finest)
-        after = None if jump is None else jump.point
-        if refined < branch.finest:
-            branch.refine(refined)
+        jump = self._fold_jump(last, fold, target, branch.finest)
+        if jump is None:
+            branch.refine(self.resolution.finest)
             return None
+        after = jump.point
         goes_on = fold.at != target.at and self._is_near(fold.point, after, DESCENT_HANDS_OVER)
         if goes_on and after is not None:
             # Newton's iteration failed where there was no fold: the branch goes on.
@@ -295,12 +294,8 @@ class Follower:
 
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float
-    ) -> tuple[ComputedJump | None, float]:
-        """Compute the jump at a fold.
-
-        Returns the jump, and the separation to which it is to be located: below ``finest`` it was
-        found too late for its drop, and there is none.
-        """
+    ) -> ComputedJump | None:
+        """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
         way = abs(fold.at - point.at)
         states: tuple[ContactState, ...] = ()
@@ -318,13 +313,12 @@ class Follower:
         drop = jump.jump.energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
         if late > allowed and finest > self.resolution.finest:
-            share = LATE_REFINEMENT * allowed / late
-            return None, max(share * min(way, finest), self.resolution.finest)
+            return None
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
-        return replace(jump, states=(*states, before, after), misplaced=misplaced), finest
+        return replace(jump, states=(*states, before, after), misplaced=misplaced)
 
     def _orders_of_folds(self, fold: Fold) -> EventOrders | None:
         """Return starts from which either of two folds comes first, if both may."""
