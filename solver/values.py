@@ -10,7 +10,7 @@ import numpy as np
 
 from adhesis.solver.views import NotebookDisplay
 
-T = TypeVar("T", bound="ByValue")
+T = TypeVar("T")
 
 _LONGEST_TUPLE = 4  # entries of a tuple that are shown in full
 

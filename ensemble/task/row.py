@@ -166,7 +166,7 @@ JUMPS = (
         lambda loop, jump: loop.problem.penetration(jump.separation),
     ),
     _jump("energy_drop", FLOAT, "J m-2", "energy drop per nominal area"),
-    _jump("patch_length", FLOAT, "m", "largest patch that the jump changed"),
+    _jump("patch_length", FLOAT, "m", "largest patch, before or after the jump"),
     _jump("contact_before", FLOAT, "1", "contact fraction before the jump"),
     _jump("contact_after", FLOAT, "1", "contact fraction after the jump"),
     _jump("patches_before", COUNT, "1", "patches before the jump"),

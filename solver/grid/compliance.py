@@ -25,8 +25,6 @@ _GROWTH = 1.8
 # Lengths up to this many nodes are exact, longer ones rounded in equal ratios.
 _EXACT_LENGTH = 24
 _RATIO = 1.08
-# Number of geometries cached without rounding, to save the time of rounding.
-_RECENT = 20_000
 
 
 @cache
@@ -55,19 +53,13 @@ def _fine_both(length: int) -> tuple[int, ...]:
     return tuple(sorted({*half, *(length - offset for offset in half)}))
 
 
-class _Rounded(dict[int, int]):
-    """Lengths on a scale of equal ratios, exact up to ``_EXACT_LENGTH``; computed when missing."""
-
-    def __missing__(self, length: int) -> int:
-        rounded = length
-        if length > _EXACT_LENGTH:
-            steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
-            rounded = round(_EXACT_LENGTH * _RATIO**steps)
-        self[length] = rounded
-        return rounded
-
-
-_rounded = _Rounded()
+@cache
+def _rounded(length: int) -> int:
+    """Round a length on a scale of equal ratios, exact up to ``_EXACT_LENGTH``."""
+    if length <= _EXACT_LENGTH:
+        return length
+    steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
+    return round(_EXACT_LENGTH * _RATIO**steps)
 
 
 class EdgeCompliance:
@@ -85,7 +77,6 @@ class EdgeCompliance:
         # V over two blocks of nodes is then a combination of four values of F.
         slope = np.concatenate(([0.5 * kernel[0]], 0.5 * kernel[0] + np.cumsum(kernel[1:])))
         self._f = np.concatenate(([0.0], np.cumsum(slope)))
-        self._recent: dict[tuple[int, int, tuple[int, int, int] | None], float] = {}
         self._known: dict[tuple[int, ...], float] = {}
         self._pairs: dict[tuple[int, ...], Array] = {}
 
@@ -109,23 +100,11 @@ class EdgeCompliance:
             The nodes of all other patches are divided between both sides and added to the
             neighbours without gaps: far away only their number matters.
         """
-        geometry = (width, gap, neighbours)
-        known = self._recent.get(geometry)
-        if known is None:
-            if len(self._recent) >= _RECENT:
-                self._recent.clear()
-            known = self._recent[geometry] = self._rounded_value(width, gap, neighbours)
-        return known
-
-    def _rounded_value(
-        self, width: int, gap: int, neighbours: tuple[int, int, int] | None
-    ) -> float:
-        """Compute S of the geometry with rounded lengths."""
         if neighbours is None:
             key = self._rounded_patch(width)[:1]
         else:
             near, far_gap, far = neighbours
-            key = tuple(_rounded[k] for k in (width, gap, near, far_gap, far))
+            key = tuple(_rounded(k) for k in (width, gap, near, far_gap, far))
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = self._compute(key)
@@ -133,7 +112,7 @@ class EdgeCompliance:
 
     def _rounded_patch(self, width: int) -> tuple[int, ...]:
         """Round the shorter of the only patch and the only gap; together they are the period."""
-        short = _rounded[min(width, self.n - width)]
+        short = _rounded(min(width, self.n - width))
         width = short if width <= self.n - width else self.n - short
         return width, self.n - width, 0, 0, 0
 
@@ -152,7 +131,7 @@ class EdgeCompliance:
         if before == 0 and after == 0:
             key = (0, *self._rounded_patch(width))
         else:
-            key = (0, *(_rounded[k] for k in (width, left, right, before, after)))
+            key = (0, *(_rounded(k) for k in (width, left, right, before, after)))
         known = self._pairs.get(key)
         if known is None:
             _, width, left, right, before, after = key
@@ -179,7 +158,7 @@ class EdgeCompliance:
         near, gap, far : int
             Nodes of the patch before the gap, of the gap, and of the patch after it.
         """
-        key = (1, *(_rounded[k] for k in (near, gap, far)))
+        key = (1, *(_rounded(k) for k in (near, gap, far)))
         known = self._pairs.get(key)
         if known is None:
             _, near, gap, far = key

@@ -11,7 +11,7 @@ the stress with s: σ = σ₀ - (s - s₀) σ₁, with s from the prescribed val
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,16 +96,12 @@ class Contact:
 
     def copy(self) -> Contact:
         """Return a copy that shares no array with this one."""
-        return Contact(
-            self.separation,
-            self.prescribed,
-            self.mask.copy(),
-            self.stress.copy(),
-            self.displacement.copy(),
-            self.residual,
-            self.elastic_energy,
-            self.energy_error,
-            self.response.copy() if self.response is not None else None,
+        return replace(
+            self,
+            mask=self.mask.copy(),
+            stress=self.stress.copy(),
+            displacement=self.displacement.copy(),
+            response=self.response.copy() if self.response is not None else None,
         )
 
     def at(self, prescribed: float, control: Control) -> Contact:
@@ -131,8 +127,8 @@ class ContactSolver:
 
     Attributes
     ----------
-    solves, iterations : int
-        Counters.
+    solves : int
+        Counter.
     """
 
     def __init__(
@@ -145,7 +141,6 @@ class ContactSolver:
         # Energy of closing that gap by one node, about γ dx.
         self._closing_energy = closing_gap**2 * elastic.modulus / (2 * EDGE_COMPLIANCE)
         self.solves = 0
-        self.iterations = 0
 
     def empty(self, separation: float) -> Contact:
         """Return a contact without contact nodes."""
@@ -262,7 +257,6 @@ class ContactSolver:
             # contact, where V is nearly singular for a uniform one.
             gain = elastic.dx * step * rz
             rz_before = rz
-            self.iterations += 1
         else:
             raise PathError(
                 f"method 'grid' does not solve the stress of {int(inside.sum())} contact nodes: "

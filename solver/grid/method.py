@@ -13,7 +13,7 @@ import numpy as np
 
 from adhesis.solver.grid.contact import Contact, ContactSolver
 from adhesis.solver.grid.lattice import Lattice
-from adhesis.solver.grid.path import Counters, Steps
+from adhesis.solver.grid.path import Steps
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import mask_of
 from adhesis.solver.method import ContactState, Fields, Method, MethodReport, Opening, Path
@@ -42,7 +42,7 @@ class GridReport(MethodReport):
     accuracy : float
     longest_step : int
         Largest displacement of an edge in one sweep, in nodes.
-    sweeps, rejected_sweeps, flips, solves, cg_iterations, substeps, bisections : int
+    sweeps, solves : int
     """
 
     nodes: int
@@ -50,12 +50,7 @@ class GridReport(MethodReport):
     accuracy: float
     longest_step: int
     sweeps: int
-    rejected_sweeps: int
-    flips: int
     solves: int
-    cg_iterations: int
-    substeps: int
-    bisections: int
 
 
 class GridMethod(Method):
@@ -111,7 +106,6 @@ class GridMethod(Method):
             loose=0.02,
             tight=1e-4,
         )
-        self.count = Counters()
 
     # ------------------------------------------------------------------ contract
 
@@ -123,7 +117,7 @@ class GridMethod(Method):
         """
         control = self.problem.control
         branch = self.problem.branch_to(state, prescribed)
-        steps = Steps(self.problem, self.relaxation, self.accuracy, branch, self.count)
+        steps = Steps(self.problem, self.relaxation, self.accuracy, branch)
         h_max = self.problem.profile.h_max
         if state.patches == 0:
             if prescribed > control.prescribed(h_max, 0.0):
@@ -179,12 +173,7 @@ class GridMethod(Method):
             accuracy=self.accuracy,
             longest_step=self.relaxation.longest_step,
             sweeps=self.relaxation.sweeps,
-            rejected_sweeps=self.relaxation.rejected,
-            flips=self.relaxation.flips,
             solves=self.solver.solves,
-            cg_iterations=self.solver.iterations,
-            substeps=self.count.substeps,
-            bisections=self.count.bisections,
         )
 
     # ------------------------------------------------------------------ states

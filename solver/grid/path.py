@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from adhesis.solver.grid.contact import Contact, Mask
@@ -25,14 +23,6 @@ _NEAREST = 1e-8  # of the range: resolution of the location of first touch
 _LEAST_DISPLACEMENT = 0.1  # shortest waves between edges of different minima
 _FEWEST_NODES_APART = 2
 _LONGEST = 0.05  # of the range: jumps hide in longer steps, where D is smooth by chance
-
-
-@dataclass
-class Counters:
-    """Numbers of accepted and of shortened sub-steps."""
-
-    substeps: int = 0
-    bisections: int = 0
 
 
 def first_width(problem: Problem) -> float:
@@ -61,14 +51,12 @@ class Steps:
         relaxation: Relaxation,
         accuracy: float,
         branch: Branch,
-        count: Counters,
     ) -> None:
         self.relaxation, self.lattice = relaxation, relaxation.lattice
         self.solver = relaxation.solver
         self.profile = problem.profile
         self.accuracy = accuracy
         self.branch = branch
-        self.count = count
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
         self.error = 0.0
@@ -135,10 +123,8 @@ class Steps:
                 target = prescribed
             after, located = self._substep(contact, target, abs(step) > self.least)
             if after is None:
-                self.count.bisections += 1
                 step *= self.share
                 continue
-            self.count.substeps += 1
             if not located:
                 self.error += self._unseen_drops(contact, after)
                 self._append(after)

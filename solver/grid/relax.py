@@ -76,7 +76,6 @@ class Relaxation:
         # smaller falls of the energy are within the error of S
         self.least_fall = 0.1 * least_release(lattice)
         self.sweeps = 0
-        self.rejected = 0
         self.flips = 0
 
     def relax(
@@ -262,7 +261,6 @@ class _Descent:
     def _undo(self) -> None:
         """Undo the last sweep and choose fewer edges or shorter steps for the next one."""
         assert self.anchor is not None
-        self.rules.rejected += 1
         if self.paired and len(self.moves) > 2:
             # Tied pairs impede each other: only one of them moves.
             self.one_pair = True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from time import process_time
 
@@ -101,15 +100,8 @@ class LoadingBranch:
 
     Raises
     ------
-    ValueError
-        If a cycle cannot be run (:func:`adhesis.solver.loading.cycle.check_cycle`), or a turning
-        point is given twice, or none.
-    TypeError
-        If the method is not a Method, or a value not a number.
-
-    References
-    ----------
-    docs/theory.md, "8. Paths and controls"
+    ValueError, TypeError
+        As in :func:`run_loops`.
     """
 
     def __init__(
@@ -132,41 +124,20 @@ class LoadingBranch:
         self.method = method
         axis = Axis(ends[-1], load_steps)
         self._drives = axis.between(0.0, ends[-1], [*ends, *axis.apart(marks, ends)])
-        self._turns = tuple(turns)
+        self._turns = turns
+        self._ahead = [*turns]  # those not yet left; the state lies at the first, or before it
         self._of_preloads = latest is not None
-        self._reached = -math.inf  # the last of the turning points
-        self._has_left = False  # whether the state lies beyond it
         self._passed = 0  # number of prescribed values reached
         self._record = Record(method, axis)
         self._record.begin("loading")
         self._seconds = 0.0
 
-    def advance_to(self, turn: float, progress: Progress | None = None) -> None:
-        """Follow the branch to a turning point, unless it is already there or beyond.
-
-        Raises
-        ------
-        ValueError
-            If ``turn`` is not one of its turning points.
-        PathError
-            If the branch cannot be followed so far.
-        """
-        if turn not in self._turns:
-            raise ValueError(f"{turn!r} is not a turning point of this loading branch")
-        started = process_time()
-        for stop in self._turns:
-            if self._reached < stop <= turn:
-                self._advance(stop, progress)
-        self._seconds += process_time() - started
-
-    def _advance(self, turn: float, progress: Progress | None) -> None:
-        """Follow the branch from one of its turning points to the next."""
+    def _advance_to(self, turn: float, progress: Progress | None) -> None:
+        """Follow the branch to the next of its turning points, unless it is there."""
         preload = turn if self._of_preloads else None
         self._record.progress = progress
         while not self._is_at(turn):
             self._passed += not self._record.step(self._drives[self._passed], preload)
-            self._has_left = True
-        self._reached, self._has_left = turn, False
 
     def _is_at(self, turn: float) -> bool:
         """Return whether a turning point is reached, or the branch has ended before a preload."""
@@ -191,10 +162,8 @@ class LoadingBranch:
         turn : float
         marks : sequence of float
             Further values at which a step of the unloading branch ends.
-        progress : callable, optional
-            See :data:`adhesis.solver.loading.path_record.Progress`.
-        on_state : callable, optional
-            Called with every state of the loop, in order, those of the loading branch too.
+        progress, on_state : callable, optional
+            As in :func:`run_loop`.
 
         Returns
         -------
@@ -208,9 +177,16 @@ class LoadingBranch:
         PathError
             As in :func:`run_loop`.
         """
-        self.advance_to(turn, progress)
-        if self._reached != turn or self._has_left:
+        if turn not in self._turns:
+            raise ValueError(f"{turn!r} is not a turning point of this loading branch")
+        if turn not in self._ahead:
             raise ValueError(f"this loading branch has passed {turn!r}")
+        started = process_time()
+        self._advance_to(self._ahead[0], progress)
+        while self._ahead[0] != turn:
+            del self._ahead[0]
+            self._advance_to(self._ahead[0], progress)
+        self._seconds += process_time() - started
         started = process_time() - self._seconds
         record = self._record.copy()
         record.on_state, record.progress = on_state, progress
@@ -249,8 +225,7 @@ def run_loops(
         Equal steps up to the largest, or latest, turning point; unloading branches use the same
         step.
     progress : callable or bool, optional
-        True shows a bar on a terminal, and lines elsewhere; a function is called as
-        :data:`adhesis.solver.loading.path_record.Progress` says.
+        As in :func:`run_loop`.
 
     Returns
     -------

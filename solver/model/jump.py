@@ -57,7 +57,7 @@ class Jump(NotebookDisplay):
     contact_before, contact_after : float
         Contact fractions.
     patch_length : float
-        Length in m of the largest patch that the jump changed, before or after it.
+        Length in m of the largest patch, before or after it.
     raced : bool
         True if the end state depends on the assumed speeds of the edges, on which of two events
         comes first that are too near to each other to tell, or on which of two mirror images is
@@ -114,9 +114,8 @@ class Jump(NotebookDisplay):
             Whether the solid falls off under a load, whose own work is then not counted: the drop
             is U before (:mod:`adhesis.solver.model.control`).
         """
-        kind, length = classify(before.edges, after.edges, period)
-        if barrier > 0:
-            kind = "opening"
+        edges = np.concatenate([before.edges, after.edges])
+        kind: JumpKind = "opening" if barrier > 0 else classify(before.edges, after.edges, period)
         return cls(
             branch=branch,
             separation=before.separation,
@@ -127,7 +126,7 @@ class Jump(NotebookDisplay):
             patches_after=after.patches,
             contact_before=before.contact_fraction,
             contact_after=after.contact_fraction,
-            patch_length=length,
+            patch_length=float((edges[:, 1] - edges[:, 0]).max(initial=0.0)),
             raced=raced,
             at_stake=at_stake,
             barrier=barrier,
@@ -139,8 +138,8 @@ class Jump(NotebookDisplay):
         return self.kind in SMALL_SCALE
 
 
-def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, float]:
-    """Classify a jump; returns its kind and the length (m) of the largest patch that it changed.
+def classify(before: Array, after: Array, period: float) -> JumpKind:
+    """Classify a jump.
 
     Parameters
     ----------
@@ -149,55 +148,28 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     period : float
         λ in m.
     """
-    touched_by, touching, length = _compare(before, after, period)
     if len(after) == 0:
-        return "pull-off", length
+        return "pull-off"
+    touching = _overlaps(after, before, period)
     if touching.min() == 0:
-        return "snap-in", length
+        return "snap-in"
     if touching.max() > 1:
-        return "merging", length
+        return "merging"
+    touched_by = _overlaps(before, after, period)
     if touched_by.min() == 0:
-        return "vanishing", length
+        return "vanishing"
     if touched_by.max() > 1:
-        return "splitting", length
+        return "splitting"
     grown = (after[:, 1] - after[:, 0]).sum() - (before[:, 1] - before[:, 0]).sum()
-    return ("spreading" if grown >= 0 else "receding"), length
+    return "spreading" if grown >= 0 else "receding"
 
 
-def _compare(before: Array, after: Array, period: float) -> tuple[Integers, Integers, float]:
-    """Count the overlaps of each patch before with those after, and the reverse.
-
-    Also returns the length of the largest patch, before or after, that is not the same in both.
-    """
-    touched_by, one = _overlapping(before, after, period)
-    touching, other = _overlapping(after, before, period)
-    length = max(
-        _longest_changed(before, after, touched_by, one, period),
-        _longest_changed(after, before, touching, other, period),
-    )
-    return touched_by, touching, length
-
-
-def _overlapping(patches: Array, others: Array, period: float) -> tuple[Integers, Integers]:
-    """Count, for each patch, the ``others`` that overlap it on the circle; returns the first too.
+def _overlaps(patches: Array, others: Array, period: float) -> Integers:
+    """Count, for each patch, the ``others`` that overlap it on the circle.
 
     Patches of one state do not overlap, so their left and right edges have the same order.
     """
     turns = np.concatenate([others - period, others, others + period])
     begin = np.searchsorted(turns[:, 1], patches[:, 0], side="right")
     behind = np.searchsorted(turns[:, 0], patches[:, 1])
-    return np.clip(behind - begin, 0, len(others)), begin % max(len(others), 1)
-
-
-def _longest_changed(
-    patches: Array, others: Array, hits: Integers, firsts: Integers, period: float
-) -> float:
-    """Measure the longest of the patches that are not one of the ``others``."""
-    length = patches[:, 1] - patches[:, 0]
-    single = np.flatnonzero(hits == 1)
-    other = others[firsts[single]]
-    offset = (patches[single, 0] - other[:, 0] + period / 2) % period - period / 2
-    change = length[single] - (other[:, 1] - other[:, 0])
-    changed = np.ones(len(patches), dtype=np.bool_)
-    changed[single] = np.maximum(np.abs(offset), np.abs(change)) >= 1e-12 * period
-    return float(length[changed].max(initial=0.0))
+    return np.asarray(np.clip(behind - begin, 0, len(others)), dtype=np.int64)

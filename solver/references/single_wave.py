@@ -176,6 +176,15 @@ class SingleWave:
             p1 = p1 * (1 + (self.steepest_slope * np.sin(2 * psi)) ** 2) ** 0.25
         return np.asarray(p1)
 
+    def _tension_rate(self, psi: Array) -> Array:
+        """Compute d ln p1/dψ."""
+        double = np.sin(2 * psi)
+        rate = 1 / double
+        if self.measure == "arc":
+            k2 = self.steepest_slope**2
+            rate = rate + k2 * double * np.cos(2 * psi) / (1 + k2 * double**2)
+        return np.asarray(rate)
+
     def mean_stress(self, a: ArrayLike) -> Array:
         """Compute p̄(a) in Pa at equilibrium, compression positive."""
         return np.asarray(self.full_contact_stress * self._angle(a)[1] - self.adhesive_tension(a))
@@ -192,12 +201,7 @@ class SingleWave:
         """Compute ds/da along the equilibrium branch; negative where it is stable at fixed s."""
         psi, _, log = self._angle(a)
         p = self.adhesive_tension(a) / self.full_contact_stress
-        dy = np.sin(2 * psi)
-        rate = 1 / dy
-        if self.measure == "arc":
-            k2 = self.steepest_slope**2
-            rate = rate + k2 * dy * np.cos(2 * psi) / (1 + k2 * dy**2)
-        slope = (dy - p * rate) * log - 2 * p / np.tan(psi)
+        slope = (np.sin(2 * psi) - p * self._tension_rate(psi)) * log - 2 * p / np.tan(psi)
         return np.asarray(np.pi * self.amplitude / self.period * slope)
 
     # ------------------------------------------------------------------ any a at any s
@@ -289,26 +293,15 @@ class SingleWave:
     @cached_property
     def loop(self) -> WaveLoop:
         """The exact loop at fixed separation; see :class:`WaveLoop`."""
-        a_in, a_out = self.touch_half_width, self.fold_half_width
-        return WaveLoop(
-            touch_half_width=a_in,
-            fold_half_width=a_out,
-            fold_separation=float(self.separation(a_out)),
-            fold_mean_stress=float(self.mean_stress(a_out)),
-            touch_drop=-float(self.energy(a_in)) / self.period,
-            fold_drop=float(self.energy(a_out)) / self.period,
-        )
+        return self._loop_between(self.touch_half_width, self.fold_half_width, np.inf)
 
     # ------------------------------------------------------------------ other controls
 
     def mean_stress_slope(self, a: ArrayLike) -> Array:
         """Compute dp̄/da along the branch, in Pa/m; positive where it is stable under load."""
         psi, _, _ = self._angle(a)
-        rate = 1 / np.sin(2 * psi)  # of ln p1, by ψ
-        if self.measure == "arc":
-            k2, double = self.steepest_slope**2, np.sin(2 * psi)
-            rate = rate + k2 * double * np.cos(2 * psi) / (1 + k2 * double**2)
-        slope = self.full_contact_stress * np.sin(2 * psi) - self.adhesive_tension(a) * rate
+        tension = self.adhesive_tension(a) * self._tension_rate(psi)
+        slope = self.full_contact_stress * np.sin(2 * psi) - tension
         return np.asarray(np.pi / self.period * slope)
 
     def displacement(self, a: ArrayLike, stiffness: float) -> Array:
@@ -373,6 +366,10 @@ class SingleWave:
         """
         a_in = self.half_width_under(stiffness, 0.0)
         a_out, _ = self.stable_range(stiffness)
+        return self._loop_between(a_in, a_out, stiffness)
+
+    def _loop_between(self, a_in: float, a_out: float, stiffness: float) -> WaveLoop:
+        """Make the loop with these half-widths after first touch and before the fold."""
 
         def spring(a: float) -> float:
             return 0.0 if stiffness == 0 else float(self.mean_stress(a)) ** 2 / (2 * stiffness)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache, wraps
 from threading import Lock, RLock
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 
@@ -21,26 +21,20 @@ F = TypeVar("F", bound=Callable[..., Any])
 _limit = Lock()
 
 
-class Shared(Protocol):
-    """An object whose decorated methods one thread at a time may call."""
-
-    in_use: AbstractContextManager[Any]
-
-
 def new_lock() -> AbstractContextManager[Any]:
     """Make a reentrant lock."""
     return RLock()
 
 
 def one_at_a_time(function: F) -> F:
-    """Let one thread at a time call the decorated methods of an object; the others wait.
+    """Let one thread at a time call the decorated methods of an object, by its lock ``in_use``.
 
     Methods reuse work arrays and plans in every call. Only counters and caches persist between
     calls, so the results do not depend on the threads, to the last bit.
     """
 
     @wraps(function)
-    def waiting(self: Shared, *args: Any, **options: Any) -> Any:
+    def waiting(self: Any, *args: Any, **options: Any) -> Any:
         with self.in_use:
             return function(self, *args, **options)
 

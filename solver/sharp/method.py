@@ -264,8 +264,6 @@ class SharpMethod(Method):
             gaps = state.internal.gaps
             if point is None:
                 point = self.edges.equilibrium(gaps, at, LONGEST_STEP * self.edges.wave)
-                if point is not None:
-                    point = point.with_clearance(state.internal.clearance)
             else:
                 at = point.at  # that of the state but for rounding
             if point is None:

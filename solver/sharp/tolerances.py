@@ -50,8 +50,6 @@ may differ and count as equal: of equal edges the first one leads."""
 
 # ---------------------------------------------------------------- nucleation
 
-CLOSING_BY_MOTION = 4.0
-"""The motion of one gap's edges counts so many times where it may close others, of many gaps."""
 OVERLAP = 1e-6
 """h_max. Smaller overlaps may remain in a state."""
 TRIAL_WIDTHS = 1.25
@@ -114,8 +112,6 @@ LATE_DROP = 0.5
 """Accuracy of the loss: a jump may be late by a work of this share of its drop."""
 LEAST_DROP = 2e-3
 """γ. Drops below this are taken as this when the lateness of a jump is judged."""
-LATE_REFINEMENT = 0.5
-"""Of the allowed lateness: what a fold that was found too late is located to."""
 WORK_OF_STEP = 8e-4
 """Accuracy of the loss times γ, at strong adhesion: largest difference of the work and the change
 of energy over one step where roughness opens patches from inside. The loss is then a smaller part

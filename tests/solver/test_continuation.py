@@ -31,7 +31,6 @@ class Curve:
     critical: float = 1.0
     wave: float = WAVE
     is_load: bool = False
-    closing_factor: float = 1.0
     asked: int = 0
     pins: bool = False
     source: ClassVar[Any] = SimpleNamespace(is_patterned=False)
@@ -43,7 +42,7 @@ class Curve:
         field = SimpleNamespace(gaps=gaps, nearly=(-at * at, at), separation=at)
         # n is the outward motion of the contact: the gap opens with d
         rate = np.full(2, -0.5 / float(np.sqrt(at - FOLD)))
-        return Point(at, cast(Any, field), rate, -2 * at, 0.0)
+        return Point(at, cast(Any, field), rate, -2 * at)
 
     def equilibrium(
         self, gaps: Any, at: float, reach: float, memory: Array | None = None
@@ -58,10 +57,9 @@ class Curve:
 
 def branch(curve: Curve, start: float, jump: float) -> StableBranch:
     """Make a branch that is followed down to 0, to a resolution of folds."""
-    closing = SimpleNamespace(between=lambda point, reached, name: abs(reached.at - point.at))
     resolution = Resolution(jump, 1e-3, np.inf, 1.0, 1e-9, 0.5, 0.0, 0.05)
     aim = Target(0.0, 0.0, "loading")
-    return StableBranch(cast(Any, curve), cast(Any, closing), resolution, curve.point(start), aim)
+    return StableBranch(cast(Any, curve), resolution, curve.point(start), aim)
 
 
 def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked():

@@ -99,7 +99,7 @@ def test_under_a_load_the_speeds_of_the_edges_decide_nothing():
 def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
     """Two folds lie so near to each other here that at a fixed separation both orders are."""
     asked = []
-    monkeypatch.setattr(Jumps, "_end_beyond", lambda *where: asked.append(where))
+    monkeypatch.setattr(Jumps, "_end_of", lambda *where: asked.append(where))
     profile = self_affine_profile(
         0.5, period=2e-3, n0=4, ratio=2, seed=453976, h_rms=1e-6, amplitudes="rayleigh"
     )

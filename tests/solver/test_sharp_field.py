@@ -13,7 +13,6 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField, respond_at_fixed_edges
-from adhesis.solver.sharp.field.opening_series import fine_opening
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 from tests.support.dense import solve_densely
@@ -107,7 +106,7 @@ def test_openings_equal_the_explicit_solution():
     theta, opening = explicit_openings(profile, gaps, separation)
     assert np.all(np.diff(theta, axis=1) > 0)
     for k in range(len(gaps)):
-        modes = fine_opening(field, k).modes
+        modes = field.fine_opening(k).modes
         inside = field.solution.sum_modes(k, theta[k, 1:-1], modes)
         assert np.abs(inside - opening[k, 1:-1]).max() < 1e-10 * np.abs(opening).max()
 
@@ -122,7 +121,7 @@ def test_a_narrow_gap_of_many_modes_opens_as_one_of_few(source, separation):
         chosen = solve_field(gaps, separation, model).orders
         solution = solve_field(gaps, separation, model, np.maximum(chosen, least))
         field = GapField(source, gaps, separation, lambda of=solution: of)
-        shape = fine_opening(field, 0)
+        shape = field.fine_opening(0)
         assert len(shape.theta) >= solution.offset[1]
         openings.append(np.interp(gaps[0].mean(), shape.theta, shape.opening))
     assert openings[1] == pytest.approx(openings[0], rel=1e-3)

@@ -15,7 +15,6 @@ from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import outward, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import ClosingBound
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
     ORDER_RESOLVED,
@@ -88,15 +87,12 @@ class Accepted:
     is_output : bool
         Whether its state belongs to the path: the trapezoidal rule needs it, or the target is
         reached.
-    may_touch : bool
-        Whether surfaces may have touched inside a gap since the last search.
     remaining : array, optional
         Where a gap has closed or a patch vanished: the gaps that are left.
     """
 
     point: Point
     is_output: bool
-    may_touch: bool
     remaining: Array | None
 
 
@@ -142,40 +138,12 @@ class Fold:
     with_another: TwoFolds | None = None
 
 
-class Trail:
-    """Accepted points since the last search for touches; at the first of them nothing overlaps.
-
-    Attributes
-    ----------
-    points : list of Point
-    clearance : float
-        Least clearance of a gap at the first point.
-    closed : float
-        Bound on how far a gap may have closed since.
-    """
-
-    def __init__(self, point: Point) -> None:
-        self.points = [point]
-        self.clearance, self.closed = point.clearance, 0.0
-
-    def add(self, point: Point, closed: float) -> None:
-        """Append a point; a gap has closed by at most ``closed`` since the last."""
-        self.points.append(point)
-        self.closed += closed
-
-    def restart(self, clearance: float) -> None:
-        """Begin anew after a search, at the last point."""
-        self.points = [self.points[-1]]
-        self.clearance, self.closed = clearance, 0.0
-
-
 class StableBranch:
     """A stable branch that is followed from a point towards a target.
 
     Parameters
     ----------
     edges : EdgeMechanics
-    closing : ClosingBound
     resolution : Resolution
     point : Point
     target : Target
@@ -186,8 +154,8 @@ class StableBranch:
     ----------
     point : Point
         The last accepted point.
-    trail : Trail
-        Accepted points since the last search for touches.
+    trail : list of Point
+        Accepted points from that at which touches were last searched for.
     finest : float
         Separation to which a jump is located, in d: the smallest step, but across a fold or to the
         target.
@@ -196,20 +164,19 @@ class StableBranch:
     def __init__(
         self,
         edges: EdgeMechanics,
-        closing: ClosingBound,
         resolution: Resolution,
         point: Point,
         target: Target,
         energy_residual: EnergyResidual | None = None,
     ) -> None:
         self._energy_residual = energy_residual
-        self._edges, self._closing, self._resolution = edges, closing, resolution
+        self._edges, self._resolution = edges, resolution
         self._target = target
         before = point.previous
         if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
-        self.trail = Trail(point)
+        self.trail = [point]
         self.finest, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = Predictor(point)
@@ -254,7 +221,7 @@ class StableBranch:
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
-        self.trail.add(point, self._closing.between(self.point, point, self._target.branch))
+        self.trail.append(point)
         self.point, self._predictor = point, Predictor(point)
 
     def _next_step(self) -> float:
@@ -307,13 +274,11 @@ class StableBranch:
     def _accept(self, reached: Point, step: float, error: float) -> Accepted:
         gaps, smallest = reached.gaps, self._edges.smallest
         remaining = without_small(gaps, smallest) if shortest_length(gaps) < smallest else None
-        closed = self._closing.between(self.point, reached, self._target.branch)
-        may_touch = self.trail.closed + closed >= self.trail.clearance or remaining is not None
         is_output = error > 1 or reached.at == self._target.at or self._begins_to_move
         point = reached.with_previous(
             PreviousPoint(self.point.at, self.point.rate, self.point.gaps)
         )
-        self.trail.add(point, closed)
+        self.trail.append(point)
         self.point = point
         self._work_before = (0.0, math.inf)
         if is_output:
@@ -324,7 +289,7 @@ class StableBranch:
             self._predictor = Predictor(point.with_previous(None) if kink else point)
             self._look_for_two_folds()
             self._longest = STEP_GROWTH * abs(self._free_step if kink else step)
-        return Accepted(point, is_output, may_touch, remaining)
+        return Accepted(point, is_output, remaining)
 
     def _look_for_two_folds(self) -> None:
         """Note whether two folds ahead are nearer to each other than jumps are located.

@@ -23,13 +23,11 @@ from adhesis.solver.sharp.continuation.jump import ComputedJump, EventOrders, Hi
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import positions, step_limits
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.gap.ends import move_edges
+from adhesis.solver.sharp.gap.ends import lengths_of, move_edges
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import (
-    ClosingBound,
     Located,
     equilibrium_between,
-    field_at_fixed_edges,
     locate,
 )
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
@@ -38,7 +36,6 @@ from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationD
 from adhesis.solver.sharp.tolerances import (
     DESCENT_HANDS_OVER,
     EQUAL,
-    LATE_REFINEMENT,
     LONGEST_STEP,
     SECOND_FOLD_DISPLACED,
 )
@@ -71,21 +68,20 @@ class Follower:
     ) -> None:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.cracks, self.resolution = cracks, resolution
-        self.closing = ClosingBound(edges)
         self._between = equilibrium_between(edges)
         self._came_on: Branch | None = None
         self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
-        self.nucleation.searched = SearchedGaps() if data is None else data.searched
         self.cracks.healed, self.nucleation.healed = [], []
-        self._came_on = None if data is None else data.branch
-        if data is None or data.branch_data is None:
+        self.nucleation.searched, self._came_on = SearchedGaps(), None
+        if data is None or data.stopped is None:
             return None
-        at, nearly, rate, slope, previous, pinned = data.branch_data
+        at, nearly, rate, slope, previous, pinned, searched, name = data.stopped
+        self.nucleation.searched, self._came_on = searched, name
         field = self.edges.field(data.gaps, at, nearly)
-        return Point(at, field, rate, slope, data.clearance, previous, pinned)
+        return Point(at, field, rate, slope, previous, pinned)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
         """Follow a stable branch to the target or through its next jump.
@@ -104,9 +100,7 @@ class Follower:
             history.commit(jump)
             return jump.at, jump.point
         energy_residual = self._energy_residual if math.isfinite(self.resolution.work) else None
-        branch = StableBranch(
-            self.edges, self.closing, self.resolution, point, target, energy_residual
-        )
+        branch = StableBranch(self.edges, self.resolution, point, target, energy_residual)
         while branch.point.at != target.at:
             event = branch.advance()
             if isinstance(event, Fold):
@@ -132,18 +126,12 @@ class Follower:
 
     def _remember(self, history: History, branch: StableBranch, name: Branch) -> None:
         """Let the last state remember its point."""
-        # What has not closed since the last search need not be searched again.
-        point = branch.point.with_clearance(max(branch.trail.clearance - branch.trail.closed, 0.0))
-        branch.point = point
-        data = ContinuationData(
-            point.field.gaps,
-            point.clearance,
-            BranchData(
-                point.at, point.field.nearly, point.rate, point.slope, point.previous, point.pinned
-            ),
-            self.nucleation.searched,
-            name,
-        )
+        point = branch.point
+        stopped = BranchData(
+            point.at, point.field.nearly, point.rate, point.slope, point.previous, point.pinned,
+            self.nucleation.searched, name,
+        )  # fmt: skip
+        data = ContinuationData(point.gaps, stopped)
         history.states[-1] = with_values(history.states[-1], internal=data)
 
     def _handle_accepted(
@@ -156,8 +144,7 @@ class Follower:
             fixed = self.edges.is_fixed and point.at == target.at
             output = self.states.of_point(point, target.prescribed if fixed else None)
         jump = None
-        # Every state that is handed out is searched; between states only if a gap may have closed.
-        if event.is_output or event.may_touch:
+        if event.is_output or event.remaining is not None:
             jump = self._nucleation_jump(branch, target)
         if output is not None and (jump is None or self._is_before(output, jump, target)):
             history.states.append(output)
@@ -177,22 +164,19 @@ class Follower:
         jump = self._nucleation_jump(branch, target)
         if jump is not None:
             return jump
-        touched = self._touch_before_fold(fold)
-        if touched is not None:
-            ahead, _ = branch.fold_ahead
-            apart = math.copysign(1.0, fold.at - fold.point.at) * (ahead - touched.point.at)
-            if apart > -self.resolution.order:  # else the fold comes first
-                beyond = fold.at if apart < self.resolution.order else None
-                touching = self._touch_jump(touched, beyond, target)
-                if touching is not None:
-                    before = self.states.of_point(fold.point)
-                    return replace(touching, states=(before, *touching.states))
+        if self._may_touch_before(fold):
+            point = fold.point
+            held = self.edges.field(point.gaps, fold.at)
+            branch.trail.append(Point(fold.at, held, point.rate, math.nan))
+            jump = self._nucleation_jump(branch, target)
+            if jump is not None:
+                return replace(jump, states=(self.states.of_point(point), *jump.states))
         last = history.states[-1] if history.states else None
-        jump, refined = self._fold_jump(last, fold, target, branch.finest)
-        after = None if jump is None else jump.point
-        if refined < branch.finest:
-            branch.refine(refined)
+        jump = self._fold_jump(last, fold, target, branch.finest)
+        if jump is None:
+            branch.refine(self.resolution.finest)
             return None
+        after = jump.point
         goes_on = fold.at != target.at and self._is_near(fold.point, after, DESCENT_HANDS_OVER)
         if goes_on and after is not None:
             # Newton's iteration failed where there was no fold: the branch goes on.
@@ -200,37 +184,46 @@ class Follower:
             return None
         return jump
 
+    def _may_touch_before(self, fold: Fold) -> bool:
+        """Return whether surfaces may touch on the last step to a fold, the edges being held."""
+        point = fold.point
+        way = abs(fold.at - point.at)
+        if not self.edges.is_fixed:
+            way *= max(1.0, abs(self.edges.response_before_fold(point).separation))
+        # the mean gap closes by the gaps alone, the faster the less of the period they take
+        closing = way * 2 * math.pi / lengths_of(point.gaps)[0].sum()
+        return bool(self.nucleation.minimum(point.field)[0] <= closing)
+
     def _nucleation_jump(self, branch: StableBranch, target: Target) -> ComputedJump | None:
         """Compute the jump where contact first appears in a gap, or a gap in contact; else None.
 
         The trail is searched for both; without a touch it begins anew.
         """
-        trail = branch.trail
-        if len(trail.points) == 1:
+        trail, start = branch.trail, branch.trail[0].at
+        if len(trail) == 1:
             return None
-        points, start, clearance = trail.points, trail.points[0].at, trail.clearance
-        trail.restart(0.0)
+        branch.trail = [branch.point]
         fold, beyond = branch.fold_ahead
         for _ in range(MOST_OPENINGS):
-            finest = self.nucleation.tolerance
-            touched, least = locate(self.nucleation, self._between, points, finest, clearance)
+            touched = locate(self.nucleation, self._between, trail, self.nucleation.tolerance)
             opened = None
             if self.cracks.is_possible:
-                finest = self.resolution.finest
-                opened, _ = locate(self.cracks, self._between, points, finest, 0.0)
+                opened = locate(self.cracks, self._between, trail, self.resolution.finest)
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
             ):
                 jump = self._opening_jump(opened, target)
             elif touched is not None:
-                may_fold = abs(fold - touched.point.at) < self.resolution.order
+                apart = math.copysign(1.0, target.at - start) * (fold - touched.point.at)
+                if apart < -self.resolution.order:
+                    return None  # the fold comes first
+                may_fold = apart < self.resolution.order
                 jump = self._touch_jump(touched, beyond if may_fold else None, target)
             else:
-                trail.restart(least)
                 return None
             if jump is not None:
                 return jump
-        raise NoState("contact opens, or nucleates, and goes back in turn", points[-1].at)
+        raise NoState("contact opens, or nucleates, and goes back in turn", trail[-1].at)
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
@@ -295,32 +288,10 @@ class Follower:
         late = self.states.work(before, jump.states[-1], touched.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 
-    def _touch_before_fold(self, fold: Fold) -> Located[Touch] | None:
-        """Locate a touch on the last step to a fold, its edges being held; None if there is none.
-
-        The fold lies somewhere on that step, too.
-        """
-        point = fold.point
-        low = self.nucleation.minimum(point.field)[0]
-        way = abs(fold.at - point.at)
-        if not self.edges.is_fixed:
-            response = self.edges.response_before_fold(point)
-            way *= max(1.0, abs(response.separation))
-        if low > self.closing.rate_at_fixed_edges(point) * way:
-            return None
-        solve = field_at_fixed_edges(self.edges)
-        trail = [point, solve(point, point, fold.at)]
-        found, _ = locate(self.nucleation, solve, trail, 0.0, low, self.nucleation.tolerance)
-        return None if found is None else replace(found, late=abs(fold.at - point.at))
-
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float
-    ) -> tuple[ComputedJump | None, float]:
-        """Compute the jump at a fold.
-
-        Returns the jump, and the separation to which it is to be located: below ``finest`` it was
-        found too late for its drop, and there is none.
-        """
+    ) -> ComputedJump | None:
+        """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
         way = abs(fold.at - point.at)
         states: tuple[ContactState, ...] = ()
@@ -338,13 +309,12 @@ class Follower:
         drop = jump.jump.energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
         if late > allowed and finest > self.resolution.finest:
-            share = LATE_REFINEMENT * allowed / late
-            return None, max(share * min(way, finest), self.resolution.finest)
+            return None
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
-        return replace(jump, states=(*states, before, after), misplaced=misplaced), finest
+        return replace(jump, states=(*states, before, after), misplaced=misplaced)
 
     def _orders_of_folds(self, fold: Fold) -> EventOrders | None:
         """Return starts from which either of two folds comes first, if both may."""

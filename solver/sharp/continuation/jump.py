@@ -171,7 +171,9 @@ class Jumps:
         at_stake = None
         try:
             if rivals:
-                rival = self._end_of_rival(rivals[0], at)
+                if isinstance(rivals[0], FullContact):
+                    raise rivals[0]
+                rival = self._end_of(rivals[0], at, equal_speeds=True)
                 at_stake = self._at_stake(before, point, rival, at)
             elif event_orders is not None and self._may_race:
                 at_stake = self._at_stake_beyond(before, point, event_orders)
@@ -190,9 +192,14 @@ class Jumps:
     ) -> float | None:
         """Difference in J/m² of the energies to which two events lead in either order, or None."""
         at = event_orders.beyond
-        both = None if point is None else self._end_beyond(at, point.gaps)
-        ends = (self._end_beyond(at, start) for start in event_orders.starts)
-        differences = [self._at_stake(before, both, end, at) for end in ends]
+
+        def end(start: Array) -> Point | None:
+            return self._end_of(self._relax(start, at)[0], at)
+
+        both = None if point is None else end(point.gaps)
+        differences = [
+            self._at_stake(before, both, end(start), at) for start in event_orders.starts
+        ]
         return max((one for one in differences if one is not None), default=None)
 
     def _at_stake(
@@ -203,8 +210,8 @@ class Jumps:
             return None
         if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
             return 0.0
-        ends = (self._after(before, end, at) for end in (point, rival))
-        return self.states.energy_difference(*ends)
+        ends = [self._after(before, end, at).potential for end in (point, rival)]
+        return abs(ends[1] - ends[0]) / self.states.period
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
         """State that a descent led to."""
@@ -212,25 +219,14 @@ class Jumps:
             return self.states.detached_after(before, at)
         return self.states.of_point(point)
 
-    def _end_of_rival(self, point: Rival, at: float) -> Point | None:
-        """Go on with equal speeds, from a minimum that they reached, until nothing touches."""
-        if isinstance(point, FullContact):
-            raise point
+    def _end_of(self, point: Point | None, at: float, equal_speeds: bool = False) -> Point | None:
+        """Go on from a minimum at d = ``at`` until nothing touches."""
 
         def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
             gaps = self.nucleation.insert_seeds(gaps, touching)
-            return self._relax(gaps, at, equal_speeds=True)[0]
+            return self._relax(gaps, at, equal_speeds=equal_speeds)[0]
 
         return self._nucleate_until_clear(point, at, relaxed)
-
-    def _end_beyond(self, at: float, start: Array) -> Point | None:
-        """Descend at a d next to that of an equilibrium, until nothing touches."""
-
-        def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
-            gaps = self.nucleation.insert_seeds(gaps, touching) if touching else gaps
-            return self._relax(gaps, at)[0]
-
-        return self._nucleate_until_clear(relaxed(start, []), at, relaxed)
 
     def _nucleate_until_clear(
         self,
@@ -258,7 +254,7 @@ class Jumps:
                 continue
             least, minima = self.nucleation.minimum(point.field)
             if least > 0:
-                return point.with_clearance(least)
+                return point
             seeds = self.nucleation.choose_seeds(minima)
             grown = descend(point.field.gaps, seeds)
             if self.has_gained(point, grown, seeds):
@@ -285,18 +281,12 @@ class Jumps:
         """Whether two descents led to one minimum."""
         if one is None or other is None:
             return one is other
-        return self._is_same(one.gaps, other.gaps)
+        return self.is_same(one.gaps, other.gaps)
 
-    def _is_same(self, here: Array, there: Array) -> bool:
+    def is_same(self, here: Array, there: Array) -> bool:
         """Whether gaps are those of one minimum."""
         apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.field_error)
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
-
-    def is_same(self, one: Array, other: Array) -> bool:
-        """Whether two equilibria are one to the accuracy at which they are known."""
-        return one.shape == other.shape and bool(
-            np.abs(one - other).max() < 10 * self.edges.field_error
-        )
 
     def _descend(
         self, gaps: Array, at: float, touches: list[Touch], rivals: list[Rival]
@@ -336,7 +326,7 @@ class Jumps:
         if isinstance(other, FullContact):
             return True
         # next to a fold the field's error may show a minimum where the edges are
-        if other is not None and self._is_same(other.gaps, start):
+        if other is not None and self.is_same(other.gaps, start):
             return False
         return not self._is_same_minimum(other, point)
 

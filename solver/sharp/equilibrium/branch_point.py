@@ -9,7 +9,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField
-from adhesis.solver.sharp.gap.ends import move_edges, outward
+from adhesis.solver.sharp.gap.ends import move_edges
+from adhesis.solver.values import with_values
 
 
 class PreviousPoint(NamedTuple):
@@ -50,8 +51,6 @@ class Point:
         dn/dd of every edge along the branch, n the outward motion of the contact.
     slope : float
         dY/dd along the branch: Y is p, under a load q0 s.
-    clearance : float
-        Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     previous : PreviousPoint, optional
         The point before it on its branch.
     pinned : PinnedEdges, optional
@@ -62,7 +61,6 @@ class Point:
     field: GapField
     rate: Array
     slope: float
-    clearance: float = 0.0
     previous: PreviousPoint | None = None
     pinned: PinnedEdges | None = None
 
@@ -81,19 +79,9 @@ class Point:
         """Separation q0 s, to the accuracy of the equilibrium."""
         return self.field.nearly[1]
 
-    def with_clearance(self, clearance: float) -> Self:
-        """Return this point with its clearance."""
-        return self._with("clearance", clearance)
-
     def with_previous(self, previous: PreviousPoint | None) -> Self:
         """Return this point with the one before it."""
-        return self._with("previous", previous)
-
-    def _with(self, name: str, value: object) -> Self:
-        point = object.__new__(type(self))  # copy() and replace() take ten times as long
-        point.__dict__.update(self.__dict__)
-        point.__dict__[name] = value
-        return point
+        return with_values(self, previous=previous)
 
     def fold_displacement(self, change: Array, by_prescribed: Array) -> float:
         """Estimate how far in d the next fold moves when the openings C change.
@@ -111,16 +99,6 @@ class Point:
         if not left.any():
             return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))
-
-    def interpolate(self, other: Point, at: float) -> Array:
-        """Interpolate the gaps at d = ``at`` between two points of one branch, by a cubic."""
-        span = other.at - self.at
-        t = (at - self.at) / span
-        sign = outward(self.gaps)
-        begin, end = ((sign * p.rate * span).reshape(-1, 2) * (t * (1 - t)) for p in (self, other))
-        straight = self.gaps + (other.gaps - self.gaps) * (t * t * (3 - 2 * t))
-        cubic: Array = straight + begin * (1 - t) - end * t
-        return cubic
 
     def extrapolate(self, at: float) -> Array:
         """Extrapolate the gaps to d = ``at``, along the tangent."""

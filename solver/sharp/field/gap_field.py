@@ -25,7 +25,12 @@ At an edge T ≈ C sqrt(r), r the distance from the edge in θ, and
     C = sqrt(2 dη/dθ) [f(±1) - (s^± - Σ_{n<M} (±1)^n s_n)],      K = (E*/4) C sqrt(2π/q0),
     G = K²/(2E*) = π E* C² / (16 q0).
 
-K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. The part of (1) that is
+K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. By Betti's theorem the
+elastic energy of one period is
+
+    U = (E*/(2 q0²)) · ½ [∫ S_full h~ dθ + ∫_gaps S_full T dθ - 2π q0 s p],      h~ = q0 h,
+
+the first term being that of full contact. The part of (1) that is
 each gap's own is assembled in ``kernels/equations.cpp``; ``kernels/field.cpp`` solves (1) on a tree
 of the gaps (``kernels/tree.hpp``).
 """
@@ -36,7 +41,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from adhesis.solver._kernels import Field
+from adhesis.solver._kernels import SHAPE_NODES, Field
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 
@@ -63,6 +68,19 @@ class FixedEdgeResponse(NamedTuple):
     pressure: float
     separation: float
     opening: Array
+
+
+class GapOpening(NamedTuple):
+    """Opening of one gap at its fine sine nodes, θ increasing.
+
+    ``opening`` is T, ``weight`` the Gauss-Chebyshev weight of ∫ T g dθ divided by T, ``modes`` the
+    b_n of ``kernels/opening.hpp``.
+    """
+
+    theta: Array
+    opening: Array
+    weight: Array
+    modes: Array
 
 
 def respond_at_fixed_edges(solution: Field) -> FixedEdgeResponse:
@@ -135,3 +153,7 @@ class GapField:
     def opening(self) -> Array:
         """C at each gap end, shape (L, 2)."""
         return self.solution.opening.reshape(-1, 2)
+
+    def fine_opening(self, k: int, per_wave: float = SHAPE_NODES) -> GapOpening:
+        """Evaluate the opening T of gap k at fine nodes."""
+        return GapOpening(*self.solution.fine_opening(k, per_wave))

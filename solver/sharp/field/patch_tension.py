@@ -21,8 +21,7 @@ from adhesis.solver._kernels import sum_pull
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.peaks import parabola_vertex
-from adhesis.solver.sharp.field.gap_field import GapField
-from adhesis.solver.sharp.field.opening_series import GapOpening, fine_opening
+from adhesis.solver.sharp.field.gap_field import GapField, GapOpening
 
 _COARSE = 4.0  # sine nodes per shortest wave of the openings at nodes; the verification has more
 _POINTS = 17  # points between the neighbours of a node at which its maximum is refined
@@ -42,7 +41,7 @@ class RefinedTension:
     @classmethod
     def of(cls, field: GapField) -> RefinedTension:
         """Evaluate the openings of all gaps of a field."""
-        return cls(field, [fine_opening(field, k) for k in range(len(field.gaps))])
+        return cls(field, [field.fine_opening(k) for k in range(len(field.gaps))])
 
     def at(self, theta: Array) -> Array:
         """Compute the tension at some positions on the contact."""
@@ -116,7 +115,7 @@ class NodalTension:
             nodes = np.arange(int(np.floor(left / step)) + 1, int(np.ceil(right / step)))
             if not nodes.size:
                 continue
-            fine = fine_opening(field, k, _COARSE)
+            fine = field.fine_opening(k, _COARSE)
             x = nodes * step
             # over its square roots the opening is smooth up to both ends
             smooth = fine.opening / np.sqrt((fine.theta - left) * (right - fine.theta))

@@ -21,14 +21,9 @@ def lengths_of(gaps: Array) -> tuple[Array, Array]:
     return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
 
 
-def outward(gaps: Array) -> Array:
-    """Return +1 at left gap ends, where contact grows to the right, else -1, shape (2L,)."""
-    return _signs(len(gaps))
-
-
 @cache
 def _signs(count: int) -> Array:
-    """Make the signs of :func:`outward` for ``count`` gaps, read-only."""
+    """Return +1 at left ends of gaps, where contact grows to the right, else -1, read-only."""
     sign = np.tile([1.0, -1.0], count)
     sign.setflags(write=False)
     return sign
@@ -36,7 +31,7 @@ def _signs(count: int) -> Array:
 
 def move_edges(gaps: Array, step: Array) -> Array:
     """Move the contact outwards by ``step`` at every edge."""
-    return np.asarray(gaps + (outward(gaps) * step).reshape(-1, 2))
+    return np.asarray(gaps + (_signs(len(gaps)) * step).reshape(-1, 2))
 
 
 def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:

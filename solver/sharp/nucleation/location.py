@@ -13,15 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-import numpy as np
-
-from adhesis.solver.model.jump import Branch
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
     BISECTION_AFTER,
-    CLOSING_BY_MOTION,
     LONGEST_STEP,
 )
 
@@ -72,20 +68,18 @@ class Criterion(Protocol[Seed]):
         ...
 
 
-def secant_share(clear_value: float, hit_value: float, tolerance: float) -> float:
-    """Return the share of the way from a clear point to a hit at which to try next.
-
-    By a secant to a fifth of the tolerance below zero, kept off both ends.
-    """
-    return min(max((clear_value + 0.2 * tolerance) / (clear_value - hit_value), 0.02), 0.98)
-
-
 def equilibrium_between(edges: EdgeMechanics) -> Solve:
-    """Return a function that solves the equilibrium between two points of a branch."""
+    """Return a function that solves the equilibrium between two points of a branch.
+
+    Of two that have the same edges, as at a fold, these are held.
+    """
     reach = LONGEST_STEP * edges.wave
 
     def solve(clear: Point, hit: Point, at: float) -> Point | None:
-        gaps = clear.interpolate(hit, at)
+        if clear.gaps is hit.gaps:
+            return Point(at, edges.field(clear.gaps, at), clear.rate, math.nan)
+        share = (at - clear.at) / (hit.at - clear.at)
+        gaps = clear.gaps + share * (hit.gaps - clear.gaps)
         point = edges.equilibrium(gaps, at, reach, memory=clear.gaps)
         near = abs(at - clear.at) < abs(hit.at - at)
         for start in (clear, hit) if near else (hit, clear):
@@ -96,109 +90,53 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
     return solve
 
 
-def field_at_fixed_edges(edges: EdgeMechanics) -> Callable[[Point, Point, float], Point]:
-    """Return a function that solves the field between two points that have the same edges."""
-
-    def solve(clear: Point, hit: Point, at: float) -> Point:
-        return Point(at, edges.field(clear.gaps, at), clear.rate, float("nan"))
-
-    return solve
-
-
 def locate(
     criterion: Criterion[Seed],
     solve: Solve,
     trail: list[Point],
     resolution: float,
-    clearance: float,
-    ignored: float = 0.0,
-) -> tuple[Located[Seed] | None, float]:
-    """Locate where along a trail a criterion begins to be met, as it is at its end, with the seeds.
+) -> Located[Seed] | None:
+    """Locate where along a trail a criterion begins to be met, with the seeds.
 
-    Else None and the least value at the end of the trail. The trail starts at a point known to be
-    clear, by ``clearance`` at least; between its points the search ends at ``resolution`` (d). A
-    value at its end that is less than ``ignored`` below zero is none.
+    None if it is not met at its end. The trail starts at a point known to be clear; between its
+    points the search ends at ``resolution`` (d).
     """
-    hit = trail[-1]
-    hit_value, hit_candidates = criterion.minimum(hit.field)
-    if hit_value > -ignored:
-        return None, hit_value
-    clear_value = np.nan
-    # over the points of the trail, then within one step of it
-    low, high = 0, len(trail) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        value, candidates = criterion.minimum(trail[middle].field)
-        if value > 0:
-            low, clear_value = middle, value
-        else:
-            high, hit, hit_candidates, hit_value = middle, trail[middle], candidates, value
-    clear = trail[low]
+    if criterion.minimum(trail[-1].field)[0] > 0:
+        return None
     # Each trial is expensive: the values at both ends show where to begin.
-    if low == 0 and clearance > 0:
-        clear_value = clearance
+    clear, hit = trail[:2]
+    clear_value, _ = criterion.minimum(clear.field)
+    hit_value, hit_candidates = criterion.minimum(hit.field)
+    for point in trail[2:]:
+        if hit_value <= 0:
+            break
+        clear, clear_value, hit = hit, hit_value, point
+        hit_value, hit_candidates = criterion.minimum(hit.field)
     cleared = 0  # trials one after the other that were clear
     for _ in range(sys.float_info.mant_dig):
         if criterion.is_located(hit_value, abs(clear.at - hit.at) <= resolution):
             break
         share = 0.5
         # The least value may be that of another candidate than the hit: then a secant creeps.
-        if np.isfinite(clear_value) and cleared < BISECTION_AFTER:
-            share = secant_share(clear_value, hit_value, criterion.tolerance)
+        if clear_value > 0 and cleared < BISECTION_AFTER:
+            # to a fifth of the tolerance below zero, and off both ends
+            share = (clear_value + 0.2 * criterion.tolerance) / (clear_value - hit_value)
+            share = min(max(share, 0.02), 0.98)
         trial = clear.at + (hit.at - clear.at) * share
         if trial in (clear.at, hit.at):  # there its value differs by the error of the field
-            return Located(clear, criterion.choose_seeds(hit_candidates), 0.0), 0.0
-        point = solve(clear, hit, trial)
-        if point is None:
+            return Located(clear, criterion.choose_seeds(hit_candidates), 0.0)
+        between = solve(clear, hit, trial)
+        if between is None:
             break
-        value, candidates = criterion.minimum(point.field)
+        value, candidates = criterion.minimum(between.field)
         cleared = cleared + 1 if value > 0 else 0
         if value > 0:
-            clear, clear_value = point, value
+            clear, clear_value = between, value
         else:
-            hit, hit_candidates, hit_value = point, candidates, value
+            hit, hit_candidates, hit_value = between, candidates, value
     criterion.validate_location(hit_value, hit.at)
     # estimate the distance from the exact location by a secant
     late = abs(clear.at - hit.at)
     if clear_value > hit_value:
         late *= -hit_value / (clear_value - hit_value)
-    return Located(hit, criterion.choose_seeds(hit_candidates), late), 0.0
-
-
-class ClosingBound:
-    """Upper estimates of the local closing of gaps, in units of q0 s.
-
-    Parameters
-    ----------
-    edges : EdgeMechanics
-    """
-
-    def __init__(self, edges: EdgeMechanics) -> None:
-        self._edges = edges
-        self._by_motion = CLOSING_BY_MOTION * edges.largest_opening / math.sqrt(edges.wave)
-
-    def between(self, point: Point, reached: Point, branch: Branch) -> float:
-        """Bound the closing of a gap from one point of a branch to the next."""
-        if branch == "loading":
-            return abs(reached.at - point.at) * self._rate(reached)
-        # While the mean gap widens only edges that run can close a gap elsewhere.
-        return self._by_motion * float(np.abs(reached.gaps - point.gaps).sum(axis=1).max())
-
-    def _rate(self, point: Point) -> float:
-        """Bound the closing of a gap along the branch per unit of d."""
-        rate = self.rate_at_fixed_edges(point)
-        if self._edges.is_fixed:
-            return rate
-        # d(q0 s)/dd along the branch, from d = weight q0 s - compliance p and dY/dd
-        device = self._edges.model.device
-        load = device.separation_weight == 0
-        mean = point.slope if load else 1 + device.compliance * point.slope
-        return float(rate * max(1.0, abs(mean)))
-
-    def rate_at_fixed_edges(self, point: Point) -> float:
-        """Bound the closing of a gap per unit of q0 s at fixed edges.
-
-        The mean gap closes by the gaps alone, the faster the less of the period they take.
-        """
-        gaps = point.gaps
-        return 2 * math.pi / float((gaps[:, 1] - gaps[:, 0]).sum())
+    return Located(hit, criterion.choose_seeds(hit_candidates), late)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,10 @@ from adhesis.solver.values import with_values
 
 
 class BranchData(NamedTuple):
-    """Point of a branch at which a path stopped: d, p and q0 s, and the rest of ``Point``."""
+    """Point of a branch at which a path stopped: d, p and q0 s, and the rest of ``Point``.
+
+    With the gaps as they were when they were last searched for touches, and the name of the branch.
+    """
 
     prescribed: float
     nearly: tuple[float, float]
@@ -29,31 +31,15 @@ class BranchData(NamedTuple):
     slope: float
     previous: PreviousPoint | None
     pinned: PinnedEdges | None
+    searched: SearchedGaps
+    branch: Branch
 
 
-@dataclass(frozen=True, eq=False)
-class ContinuationData:
-    """Data from which a path continues at a state.
-
-    Attributes
-    ----------
-    gaps : array, shape (L, 2)
-        The ends of its gaps.
-    clearance : float
-        Of them (``Point.clearance``).
-    branch_data : BranchData, optional
-        If a path stopped at the state.
-    searched : SearchedGaps
-        The gaps as they were when they were last searched for touches.
-    branch : {"loading", "unloading"}, optional
-        Branch on which the path stopped.
-    """
+class ContinuationData(NamedTuple):
+    """Gaps of a state, shape (L, 2), and the point at which a path stopped there, if one did."""
 
     gaps: Array
-    clearance: float
-    branch_data: BranchData | None = None
-    searched: SearchedGaps = field(default_factory=SearchedGaps)
-    branch: Branch | None = None
+    stopped: BranchData | None = None
 
 
 def loading_device(problem: Problem) -> LoadingDevice:
@@ -73,6 +59,8 @@ class States:
         self.q0 = profile.q0
         self.period = profile.period
         self._half = problem.half_space.modulus / 2
+        per = self._half * self.q0
+        self._tangent_unit = 1 / per if problem.control.is_load else per  # dY/dx at dY/dd = 1
         m = np.arange(profile.coefficients.size)
         h = np.abs(profile.coefficients * self.q0) ** 2
         self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
@@ -103,12 +91,6 @@ class States:
         touch = self.problem.profile.h_max * self.q0 if touch is None else touch
         return not self.problem.control.is_load and at < touch * (1 - 1e-12)
 
-    @property
-    def _tangent_unit(self) -> float:
-        """Value of dY/dx in SI units at dY/dd = 1."""
-        per = self._half * self.q0
-        return 1 / per if self.problem.control.is_load else per
-
     def detached_after(self, before: ContactState, at: float) -> ContactState:
         """Make the state after ``before`` has lost contact at d = ``at``.
 
@@ -125,14 +107,13 @@ class States:
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation, point.clearance)
+        return self.of_field(point.field, point.slope, separation)
 
     def of_field(
         self,
         gap_field: GapField,
         slope: float = float("nan"),
         separation: float | None = None,
-        clearance: float = 0.0,
     ) -> ContactState:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
@@ -152,7 +133,7 @@ class States:
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             tangent=slope * self._tangent_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gaps, clearance),
+            internal=ContinuationData(gaps),
         )
 
     def at_fixed_edges(
@@ -173,7 +154,7 @@ class States:
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             tangent=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=replace(state.internal, gaps=gap_field.gaps, clearance=0.0, branch_data=None),
+            internal=ContinuationData(gap_field.gaps),
         )
 
     def with_friction(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
@@ -212,10 +193,6 @@ class States:
         way, change = x[1] - x[0], after.tangent - before.tangent
         work = 0.5 * way * (y[0] + y[1]) - way**2 * change / 12
         return (after.potential - before.potential) / self.period + work
-
-    def energy_difference(self, one: ContactState, other: ContactState) -> float:
-        """Compute the difference of two energies, in J/m² of nominal area."""
-        return abs(other.potential - one.potential) / self.period
 
     def jump(
         self,

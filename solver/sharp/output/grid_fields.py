@@ -11,7 +11,6 @@ import numpy as np
 from adhesis.solver.method import Fields, Opening
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.sharp.field.gap_field import GapField
-from adhesis.solver.sharp.field.opening_series import fine_opening
 from adhesis.solver.sharp.field.patch_tension import RefinedTension
 
 _FINER = 8  # points of an opening, between which it is taken as linear, for each fine node
@@ -38,7 +37,7 @@ def fields_of(problem: Problem, field: GapField | None, separation: float, n: in
     openings = []
     for k, (left, right) in enumerate(field.gaps):
         inside = (position > left) & (position < right)
-        openings.append(fine_opening(field, k))
+        openings.append(field.fine_opening(k))
         gap[inside] = field.solution.sum_modes(k, position[inside], openings[k].modes)
         contact[inside] = False
     stress = np.zeros(n)
@@ -57,7 +56,7 @@ def openings_of(field: GapField, q0: float) -> list[Opening]:
     """Evaluate the opening of every gap in m, at points that are dense beside its edges."""
     out = []
     for k, (left, right) in enumerate(field.gaps):
-        modes = fine_opening(field, k).modes
+        modes = field.fine_opening(k).modes
         theta, sine_sum = field.solution.refine_opening(k, modes, _FINER)
         theta = np.concatenate([[left], theta, [right]])
         out.append(Opening(theta / q0, np.concatenate([[0.0], sine_sum, [0.0]]) / q0))
