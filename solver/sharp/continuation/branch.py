@@ -13,7 +13,7 @@ from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.gap.ends import outward, without_small
+from adhesis.solver.sharp.gap.ends import signs_of, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
@@ -260,7 +260,7 @@ class StableBranch:
         """
         if not self._edges.pins:
             return 1.0
-        motion = outward(reached.gaps) * (reached.gaps - self.point.gaps).ravel()
+        motion = signs_of(len(reached.gaps)) * (reached.gaps - self.point.gaps).ravel()
         start, end = step * self.point.rate, step * reached.rate
         pinned = motion == 0
         motion, end = np.where(pinned, start, motion), np.where(pinned, -start, end)
@@ -317,8 +317,8 @@ class StableBranch:
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed.
 
-        Over stripes of the work of adhesion, and where edges begin to move and are pinned, slopes at
-        both ends are equal by chance: there their difference from the mean slope counts, too.
+        Over stripes of the work of adhesion, and where edges begin to move and are pinned, slopes
+        at both ends are equal by chance: there their difference from the mean slope counts, too.
         """
         way = point.at - output.at
         # p = q0 h_max is σ~ = 1

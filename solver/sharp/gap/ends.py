@@ -22,7 +22,7 @@ def lengths_of(gaps: Array) -> tuple[Array, Array]:
 
 
 @cache
-def _signs(count: int) -> Array:
+def signs_of(count: int) -> Array:
     """Return +1 at left ends of gaps, where contact grows to the right, else -1, read-only."""
     sign = np.tile([1.0, -1.0], count)
     sign.setflags(write=False)
@@ -31,7 +31,7 @@ def _signs(count: int) -> Array:
 
 def move_edges(gaps: Array, step: Array) -> Array:
     """Move the contact outwards by ``step`` at every edge."""
-    return np.asarray(gaps + (_signs(len(gaps)) * step).reshape(-1, 2))
+    return np.asarray(gaps + (signs_of(len(gaps)) * step).reshape(-1, 2))
 
 
 def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
