@@ -18,9 +18,10 @@ To add a method, subclass :class:`Method` and keep these promises:
     a neighbouring minimum; inside a patch nothing opens unless the tension reaches a finite
     strength (``Problem.strength``); gaps may close, patches merge and vanish.
 4.  Where the path jumps, ``follow`` returns the states just before and just after, both at the
-    separation of the jump as the method located it, and a :class:`~adhesis.solver.model.jump.Jump`
-    whose energy drop is computed from the two energies, not from the load curve. Outside jumps the
-    states are dense enough for the rule of :mod:`adhesis.solver.loading.ledger`.
+    prescribed value of the jump as the method located it, and a
+    :class:`~adhesis.solver.model.jump.Jump` whose energy drop is computed from the two energies,
+    not from the load curve. Outside jumps the states are dense enough for the rule of
+    :mod:`adhesis.solver.loading.ledger`.
 5.  Same input, same bits: no clocks, no unseeded random numbers, no threads.
 6.  A state is immutable; ``follow`` may be called again from an older state (partial loops).
 7.  Every returned state lies on the path, and surfaces do not overlap in it: no gap is narrower

@@ -65,7 +65,7 @@ class LoopState(ByValue):
         Parameters
         ----------
         nodes : int, optional
-            By default those of the method's grid, or 32 for each of the shortest waves.
+            By default those of the method's grid, or at least 32 for each of the shortest waves.
 
         Raises
         ------

@@ -50,8 +50,8 @@ class Jump(NotebookDisplay):
     energy_drop : float
         U before minus U after (the potential W if the separation is not fixed), per unit nominal
         area, in J/m². Negative by at most the error of the energies, which then counts in the error
-        of the loss. At the loss of contact under a load it is U before, of either sign
-        (:mod:`adhesis.solver.model.control`).
+        of the loss, or by the barrier of an opening. At the loss of contact under a load it is U
+        before, of either sign (:mod:`adhesis.solver.model.control`).
     kind : JumpKind
     patches_before, patches_after : int
     contact_before, contact_after : float
@@ -64,7 +64,8 @@ class Jump(NotebookDisplay):
         taken.
     at_stake : float
         |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
-        at the other speeds or in the other order; 0 unless ``raced``.
+        at the other speeds or in the other order; 0 unless ``raced``, and where that end is a mirror
+        image or not known.
     barrier : float
         Of an opening, the energy per unit nominal area, in J/m², up to the crack that grows by
         itself, which adhesion of zero range has to be lifted over; else 0.

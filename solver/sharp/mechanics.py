@@ -107,11 +107,12 @@ class EdgeMechanics(EdgeProblem):
         strict: bool = True,
         memory: Array | None = None,
     ) -> Point | None:
-        """Return the stable equilibrium near these gaps, or None.
+        """Return the equilibrium near these gaps, a stable one if ``strict``, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
         equilibrium is not stable. ``orders`` are the least orders of the gaps. Unless
-        ``strict``, gaps that are nearly in equilibrium are taken as they are. ``memory`` is where
+        ``strict``, gaps that are nearly in equilibrium are taken as they are, stable or not: a
+        minimum next to a fold, or a saddle. ``memory`` is where
         the edges were in the state before, which matters with two works of adhesion; here if not
         given.
         """

@@ -72,7 +72,7 @@ class SharpReport(MethodReport):
     field_tolerance : float
         Relative accuracy of the field.
     jump_resolution : float
-        Separation to which a jump is located, over h_max.
+        To which a jump is located: separation over h_max, under a load σ~.
     fields, energies, openings, newton_steps, descent_steps : int
         See ``system.edge_problem.Counters``.
     """

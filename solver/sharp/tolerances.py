@@ -55,7 +55,7 @@ OVERLAP = 1e-6
 TRIAL_WIDTHS = 1.25
 """Ratio of the widths of seeds that are tried one after the other, where surfaces attract."""
 BISECTION_AFTER = 3
-"""Trials that find no overlap, one after the other: then one is a bisection."""
+"""Trials that find no overlap, one after the other: then all bisect, until one finds one."""
 
 # ---------------------------------------------------------------- opening from inside
 

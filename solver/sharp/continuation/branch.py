@@ -44,7 +44,7 @@ class Resolution:
     Attributes
     ----------
     jump : float
-        Separation to which a jump is located.
+        To which a jump is located, in d.
     bend : float
         Largest relative error of the trapezoidal rule over one step.
     work : float
@@ -85,8 +85,8 @@ class Accepted:
     ----------
     point : Point
     is_output : bool
-        Whether its state belongs to the path: the trapezoidal rule needs it, or the target is
-        reached.
+        Whether its state belongs to the path: the trapezoidal rule needs it, an edge begins to
+        move there, or the target is reached.
     remaining : array, optional
         Where a gap has closed or a patch vanished: the gaps that are left.
     """
@@ -128,7 +128,7 @@ class Fold:
     point : Point
         The last point of the branch.
     at : float
-        d a smallest step beyond it, or the target.
+        d a step beyond it: a smallest one, one across the fold, or to the target.
     with_another : TwoFolds, optional
         If a second one is near.
     """
@@ -225,7 +225,7 @@ class StableBranch:
         self.point, self._predictor = point, Predictor(point)
 
     def _next_step(self) -> float:
-        """Return the next step in d: no edge is predicted to move far, and the target not passed.
+        """Return the next step in d: the leading edge is not to move far, nor the target be passed.
 
         A step that leads across a fold may be shorter than the finest.
         """
@@ -294,8 +294,8 @@ class StableBranch:
     def _look_for_two_folds(self) -> None:
         """Note whether two folds ahead are nearer to each other than jumps are located.
 
-        By the last two predictions: next to a fold, where both edges are fast, the second one may
-        be seen too far away.
+        By the last two predictions that saw a second one: next to a fold, where both edges are
+        fast, it may be seen too far away, or not at all.
         """
         predictor, resolution = self._predictor, self._resolution.jump
         other = predictor.other_fold()

@@ -88,8 +88,8 @@ class EventOrders:
     starts: tuple[Array, ...]
 
 
-Rival = Point | None | FullContact
-"""Another end of a descent: a minimum, no contact, or full contact (with a stiffness)."""
+Rival = Point | None | FullContact | NoState
+"""Another end of a descent: a minimum, no contact, full contact (with a stiffness), or none found."""
 
 
 class Jumps:
@@ -171,16 +171,14 @@ class Jumps:
         at_stake = None
         try:
             if rivals:
-                if isinstance(rivals[0], FullContact):
+                if isinstance(rivals[0], Exception):
                     raise rivals[0]
                 rival = self._end_of(rivals[0], at, equal_speeds=True)
                 at_stake = self._at_stake(before, point, rival, at)
             elif event_orders is not None and self._may_race:
                 at_stake = self._at_stake_beyond(before, point, event_orders)
-        except FullContact:  # elsewhere, but with no energy that could be compared
+        except (FullContact, NoState):  # elsewhere, or unknown where: no energy to be compared
             at_stake = 0.0
-        except NoState:  # a comparison that does not come to rest is no failure of the path
-            pass
         left = start if known is None else known.gaps
         if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
             at_stake = 0.0
@@ -305,10 +303,8 @@ class Jumps:
         others: list[Rival] = []
         try:
             others.append(self._relax(gaps, at, equal_speeds=True)[0])
-        except FullContact as full:
-            others.append(full)
-        except NoState:
-            pass  # a comparison that does not come to rest is no failure of the path
+        except (FullContact, NoState) as unknown:
+            others.append(unknown)
         with suppress(NoState, FullContact):
             finer, _ = self._relax(gaps, at, share=FINER_STEPS)
             if point and finer and not self._is_same_minimum(point, finer):
@@ -323,7 +319,7 @@ class Jumps:
 
     def _is_rival(self, other: Rival, start: Array, point: Point | None) -> bool:
         """Whether a descent from some gaps ended elsewhere than at a minimum."""
-        if isinstance(other, FullContact):
+        if isinstance(other, Exception):
             return True
         # next to a fold the field's error may show a minimum where the edges are
         if other is not None and self.is_same(other.gaps, start):

@@ -70,7 +70,7 @@ class Predictor:
         return self._points.predict_gaps(on, self._leading)
 
     def reach(self, most: float, finest: float) -> float:
-        """Step along which no edge is expected to move further than ``most``.
+        """Step along which the edge that leads is expected to move no further than ``most``.
 
         Towards a fold it leads near to it, and from next to it (``finest``) across.
         """

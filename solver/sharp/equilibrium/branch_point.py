@@ -40,7 +40,7 @@ class PinnedEdges(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A stable equilibrium on a branch.
+    """A stable equilibrium on a branch, or the field of its edges at another d next to it.
 
     Attributes
     ----------

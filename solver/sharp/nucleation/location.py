@@ -1,8 +1,9 @@
 """Locate on a branch where contact appears in a gap, or a gap in contact.
 
-Both are the same search: a criterion has a value for every field, positive while nothing nucleates,
-and the first point of a branch is located at which it is not positive. ``nucleation.Nucleation`` is
-the criterion of touches, ``opening.Cracks`` that of gaps that open inside patches.
+Both are the same search: a criterion has a value for every field, positive while nothing nucleates;
+where it is not at the end of a trail of points, the place is located from which on it is not.
+``nucleation.Nucleation`` is the criterion of touches, ``opening.Cracks`` that of gaps that open
+inside patches.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Solve = Callable[[Point, Point, float], Point | None]
 
 @dataclass(frozen=True, eq=False)
 class Located(Generic[Seed]):
-    """Point of a branch at which something nucleates, its seeds, and the lateness in d at most."""
+    """Point of a branch at which something nucleates, its seeds, and how late it is in d."""
 
     point: Point
     seeds: list[Seed]

@@ -2,9 +2,10 @@
 
 Contact nucleates where the opening has closed to zero. With adhesion a touching point grows at
 once, along a path on which the energy only falls, to its first equilibrium; on the parabola κx²/2
-that is (16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width is put
-at the touching point; the descent does the rest. Without adhesion a patch has no width at first
-touch: its seed is put when the overlap is large enough for the narrowest patch that is followed.
+that is (16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width, but
+no longer than ``LONGEST_STEP``, is put at the touching point; the descent does the rest. Without
+adhesion a patch has no width at first touch: its seed is put when the overlap is large enough for
+the narrowest patch that is followed.
 
 Surfaces of a finite range of adhesion δ jump together from there on. In a minimum in which the
 opening has closed to δ, and which is not in the range of an edge already, a seed is put that grows:
@@ -78,7 +79,8 @@ class Nucleation:
     range : float
         Of adhesion, in units of 1/q0.
     healed : list of (position, 1/opening)
-        Touches whose patches did not hold: none is tried there unless the opening is smaller.
+        Touches whose patches did not hold: none is tried there in the same load step unless the
+        opening is smaller.
     heals : int
         Number of touches that did not hold, so far.
     """
