@@ -165,24 +165,29 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
   Descent out;
   double reach = FIRST_REACH;  // of the next long step, in longest steps
   EdgeStates states = held_edges(runs, ends, law);
-  Integers edges = indices(states.held), modelled;
+  Integers edges = indices(states.held), modelled, orders;
   Vector before = ends;
   ModelFlow flow;
   Matrix tangent;
   double pressure = response.pressure_at(prescribed, device), strongest = 0;
   bool moved = true, judges = false;
+  // Set the response up anew where the edges are, with these least orders; false without a field.
+  const auto set_up = [&](const Integers& least) {
+    auto anew = set_up_response(ends, prescribed, least, law, model);
+    if (!anew) return false;
+    ++out.set_ups;
+    response = std::move(*anew);
+    hold_edges(response, ends, states);
+    condense_gaps(response, Flags(response.gap_count(), true));
+    return true;
+  };
   while (out.steps < most_steps) {
     check_signals();
     if (moved && !move_references(response, ends, states, pressure, prescribed, law, model)) {
-      auto anew = set_up_response(ends, prescribed, response.nodes.orders, law, model);
-      if (!anew) {
+      if (!set_up(response.nodes.orders)) {
         out.event = DescentEvent::no_field;
         break;
       }
-      ++out.set_ups;
-      response = std::move(*anew);
-      hold_edges(response, ends, states);
-      condense_gaps(response, Flags(response.gap_count(), true));
     }
     if (run_unbalanced(runs, response, law)) {
       states = held_edges(runs, ends, law);
@@ -210,7 +215,8 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       reach = std::max(next_reach(reach, length, error), MODEL_SHORT_STEP);
       if (error > 1 && length > 1.5 * MODEL_SHORT_STEP) {
         ends = before;
-        moved = true;
+        // back to the same field: another's error may show a minimum here
+        moved = response.nodes.orders == orders || !set_up(orders);
         continue;
       }
     }
@@ -242,6 +248,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
     judges = !edges.empty();
     moved = true;
     before = ends;
+    orders = response.nodes.orders;
     ends = move_edges(ends, way);
     if (shortest_length(ends) < law.smallest) {
       out.event = DescentEvent::vanished;

@@ -22,8 +22,8 @@
 // - energy: that of the contact is the integral of w of advancing edges over its patches. An edge
 //   that recedes dissipates the integral of the difference: friction, in a column of its own.
 //
-// What a law has to keep. Of laws written in Python points 1 to 3 are checked at some places, before a
-// path is followed (adhesion.py):
+// What a law has to keep. Of laws written in Python points 1 to 3 are checked at some places,
+// before a path is followed (adhesion.py):
 //
 // 1. w is positive, of period 2π, and smooth over the shortest wave that `StressSource.top` states:
 //    steps of a descent are a twentieth of that wave, and predictors are of third order.

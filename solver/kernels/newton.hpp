@@ -6,7 +6,7 @@
 namespace adhesis {
 
 struct Equilibrium {
-  bool found = false;        // whether an equilibrium was found within reach, a stable one if strict
+  bool found = false;        // whether one was found within reach, stable if strict
   bool is_outgrown = false;  // whether a gap or run needs more nodes than the response has
   Vector ends;
   Vector potential;  // of the other gaps at the reference nodes, as G

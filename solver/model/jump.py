@@ -64,8 +64,8 @@ class Jump(NotebookDisplay):
         taken.
     at_stake : float
         |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
-        at the other speeds or in the other order; 0 unless ``raced``, and where that end is a mirror
-        image or not known.
+        at the other speeds or in the other order; 0 unless ``raced``, or where that end is a
+        mirror image or not known.
     barrier : float
         Of an opening, the energy per unit nominal area, in J/m², up to the crack that grows by
         itself, which adhesion of zero range has to be lifted over; else 0.

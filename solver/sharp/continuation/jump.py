@@ -89,7 +89,7 @@ class EventOrders:
 
 
 Rival = Point | None | FullContact | NoState
-"""Another end of a descent: a minimum, no contact, full contact (with a stiffness), or none found."""
+"""Another end of a descent: a minimum, no contact, full contact (with a stiffness), or unknown."""
 
 
 class Jumps:
