@@ -19,11 +19,11 @@ CriticalOpening critical_of(int edge, double theta, double opening, const EdgeLa
   return {critical, drift, false};
 }
 
-EdgeStates states_at(const Vector& ends, const EdgeLaw& law) {
+EdgeStates states_at(const Vector& ends, const EdgeLaw& law, double within) {
   EdgeStates out = {Flags(ends.size()), Flags(ends.size())};
   for (int e = 0; law.pins() && e < int(ends.size()); ++e) {
-    const double way = way_from_memory(e, ends[e], law);
-    out.held[e] = way == 0;
+    const double way = outwards(e) * (ends[e] - law.memory[e]);
+    out.held[e] = std::abs(way) <= within;
     out.recedes[e] = way < 0;
   }
   return out;

@@ -141,8 +141,11 @@ struct EdgeStates {
   Flags held, recedes;
 };
 
-// Hold the edges at their memory; none where edges are not pinned.
-EdgeStates states_at(const Vector& ends, const EdgeLaw& law);
+// Hold the edges within a length of their memory; none where edges are not pinned.
+EdgeStates states_at(const Vector& ends, const EdgeLaw& law, double within);
+inline EdgeStates states_at(const Vector& ends, const EdgeLaw& law) {
+  return states_at(ends, law, 0.5 * law.newton_tolerance);
+}
 
 inline Vector move_edges(const Vector& ends, const Vector& motion) {
   Vector out(ends);

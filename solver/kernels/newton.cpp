@@ -55,7 +55,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
                              bool strict, const EdgeLaw& law, const Model& model) {
   const int edges = int(ends.size());
   Equilibrium out;
-  EdgeStates states = states_at(ends, law);
+  EdgeStates states = states_at(ends, law, 0);  // one that is predicted to move is not held
   Vector travelled(edges), step(edges), moved(edges);
   double last = infinity;
   bool judged_again = false;

@@ -387,7 +387,7 @@ def result_of(
     if problem.work_of_adhesion > 0 and not error < abs(loss):
         raise PathError(
             f"the loss is not resolved: {loss:.3g} J/m² with a numerical error of {error:.2g} "
-            "J/m², as large as itself; a finer accuracy, more nodes, or the other method may "
+            f"J/m², as large as itself; a finer accuracy, more nodes{problem.or_other_method} may "
             "resolve it"
         )
     turn = record.branches.index("unloading")  # the turning point's state stands in both branches

@@ -161,6 +161,12 @@ class Problem(ByValue):
         """Work of adhesion of an edge that recedes less that of one that advances, in J/m²."""
         return self.gamma_open - self.work_of_adhesion
 
+    @property
+    def or_other_method(self) -> str:
+        """Return an alternative to end an advice with, empty where ``sharp`` alone knows the law."""
+        sharp_alone = self.pinning > 0 or math.isfinite(self.strength)
+        return "" if sharp_alone else " or the other method"
+
     def _check_open(self) -> None:
         """Refuse a work of adhesion on opening that is the smaller one, or beside a strength."""
         if self.work_of_adhesion_open is None:

@@ -18,7 +18,6 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
-from adhesis.solver.sharp.continuation import follower
 from adhesis.solver.sharp.continuation.branch import StableBranch
 from tools.hostile import draw
 
@@ -230,13 +229,33 @@ def test_edges_that_begin_to_move_together_do_not_hold_each_other_back(monkeypat
     assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error
 
 
-def test_a_branch_that_goes_on_without_an_end_is_refused(monkeypatch):
-    monkeypatch.setattr(follower, "CONTINUED", 30)
+def test_edges_that_move_by_less_than_newtons_tolerance_are_followed():
+    """One that receded so little had the opening of one that advances, and the path was refused."""
     scene = draw(5202, 90, "open")
     problem = scene.problem()
-    with pytest.raises(adhesis.PathError, match="no equilibrium is found on a branch that goes on"):
+    coarse, fine = (
         run_loop(
-            make_method("sharp", problem, accuracy=scene.accuracy),
+            make_method("sharp", problem, accuracy=accuracy),
             load_steps=scene.load_steps,
             **scene.turn(problem),
         )
+        for accuracy in (scene.accuracy, 1e-5)
+    )
+    assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error + fine.loss_error
+
+
+def test_an_edge_that_turns_back_within_a_step_is_pinned_where_it_was_furthest():
+    """A jump of unloading came 9e-5 h_max early: the loss was 5.9e-5 off, 3.4e-5 was stated."""
+    scene = draw(5202, 32, "open")
+    problem = scene.problem()
+    coarse, fine = (
+        run_loop(
+            make_method("sharp", problem, accuracy=accuracy),
+            load_steps=scene.load_steps,
+            **scene.turn(problem),
+        )
+        for accuracy in (1e-4, 1e-6)
+    )
+    assert coarse.loss == pytest.approx(fine.loss, rel=1e-5)
+    assert coarse.loss_from_drops == pytest.approx(fine.loss_from_drops, rel=1e-5)
+    assert coarse.loss_error < 2e-5 * coarse.loss
