@@ -75,6 +75,7 @@ class Follower:
         self.closing = ClosingBound(edges)
         self._between = equilibrium_between(edges)
         self._came_on: Branch | None = None
+        self._refused_at = math.nan  # d where patches last did not hold
         self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
@@ -215,7 +216,7 @@ class Follower:
         trail.restart(0.0)
         fold, beyond = branch.fold_ahead
         for _ in range(MOST_OPENINGS):
-            finest = self.nucleation.tolerance
+            finest = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
             touched, least = locate(self.nucleation, self._between, points, finest, clearance)
             opened = None
             if self.cracks.is_possible:
@@ -294,9 +295,14 @@ class Follower:
         )  # fmt: skip
         gained = self.jumps.has_gained(point, jump.point, touched.seeds)
         if not gained and self.nucleation.heal(touched.seeds):
+            self._refused_at = point.at
             return None
-        late = self.states.work(before, jump.states[-1], touched.late)
-        return replace(jump, states=(before, *jump.states), misplaced=late)
+        misplaced = self.states.work(before, jump.states[-1], touched.late)
+        if self.nucleation.were_refused(touched.seeds):
+            # they held from somewhere there on, where no energy is lost
+            since = self.states.work(before, jump.states[-1], abs(point.at - self._refused_at))
+            misplaced += min(since, abs(jump.jump.energy_drop))
+        return replace(jump, states=(before, *jump.states), misplaced=misplaced)
 
     def _touch_before_fold(self, fold: Fold) -> Located[Touch] | None:
         """Locate a touch on the last step to a fold, its edges being held; None if there is none.

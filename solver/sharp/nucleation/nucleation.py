@@ -154,12 +154,11 @@ class Nucleation:
         least, count, found, self.searched = search(field.solution, self.searched, self._lengths)
         self.edges.count.openings += count
         theta, opening, widths, rim, clearance = found
-        near = HEALED_PLACE * self.edges.wave
         touching: Any = ()
         if self.range > 0:
             touching = np.flatnonzero((opening > 0) & (clearance <= 0) & (rim > self.range))
         for i in touching:
-            if has_healed(theta[i], 1 / opening[i], self.healed, near, 2 * np.pi):
+            if self._has_healed(theta[i], opening[i]):
                 clearance[i] = opening[i]
                 continue
             at = field.gaps, field.prescribed, theta[i : i + 1]
@@ -212,6 +211,14 @@ class Nucleation:
             np.array([t.theta for t in touches]),
             np.array([t.width for t in touches]),
         )
+
+    def were_refused(self, touches: list[Touch]) -> bool:
+        """Return whether patches at these places did not hold from further away."""
+        return any(self._has_healed(touch.theta, math.inf) for touch in touches)
+
+    def _has_healed(self, theta: float, opening: float) -> bool:
+        near = HEALED_PLACE * self.edges.wave
+        return has_healed(theta, 1 / opening, self.healed, near, 2 * np.pi)
 
     def heal(self, touches: list[Touch]) -> bool:
         """Record touches whose patches did not hold; returns whether there are any.
