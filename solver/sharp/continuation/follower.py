@@ -75,7 +75,6 @@ class Follower:
         self.closing = ClosingBound(edges)
         self._between = equilibrium_between(edges)
         self._came_on: Branch | None = None
-        self._refused_at = math.nan  # d where patches last did not hold
         self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
@@ -289,19 +288,17 @@ class Follower:
         """
         point = touched.point
         before = self.states.of_point(point)
+        since = self.nucleation.way_since_healed(touched.seeds, point.at)
         jump = self.jumps.compute(
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,
             event_orders=None if beyond is None else EventOrders(beyond, (point.field.gaps,)),
         )  # fmt: skip
         gained = self.jumps.has_gained(point, jump.point, touched.seeds)
-        if not gained and self.nucleation.heal(touched.seeds):
-            self._refused_at = point.at
+        if not gained and self.nucleation.heal(touched.seeds, point.at):
             return None
-        misplaced = self.states.work(before, jump.states[-1], touched.late)
-        if self.nucleation.were_refused(touched.seeds):
-            # they held from somewhere there on, where no energy is lost
-            since = self.states.work(before, jump.states[-1], abs(point.at - self._refused_at))
-            misplaced += min(since, abs(jump.jump.energy_drop))
+        # they hold from somewhere since they last did not, where no energy is lost
+        late, since = (self.states.work(before, jump.states[-1], x) for x in (touched.late, since))
+        misplaced = late + min(since, abs(jump.jump.energy_drop))
         return replace(jump, states=(before, *jump.states), misplaced=misplaced)
 
     def _touch_before_fold(self, fold: Fold) -> Located[Touch] | None:

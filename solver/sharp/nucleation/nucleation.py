@@ -81,6 +81,8 @@ class Nucleation:
         Touches whose patches did not hold: none is tried there unless the opening is smaller.
     heals : int
         Number of touches that did not hold, so far.
+    healed_at : float
+        d of the last of them.
     """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
@@ -88,7 +90,7 @@ class Nucleation:
         self.searched = SearchedGaps()
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
-        self.heals = 0
+        self.heals, self.healed_at = 0, math.nan
         self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
@@ -212,22 +214,23 @@ class Nucleation:
             np.array([t.width for t in touches]),
         )
 
-    def were_refused(self, touches: list[Touch]) -> bool:
-        """Return whether patches at these places did not hold from further away."""
-        return any(self._has_healed(touch.theta, math.inf) for touch in touches)
+    def way_since_healed(self, touches: list[Touch], at: float) -> float:
+        """Return the way in d since patches at these places last did not hold; 0 if they did."""
+        healed = any(self._has_healed(touch.theta, math.inf) for touch in touches)
+        return abs(at - self.healed_at) if healed else 0.0
 
     def _has_healed(self, theta: float, opening: float) -> bool:
         near = HEALED_PLACE * self.edges.wave
         return has_healed(theta, 1 / opening, self.healed, near, 2 * np.pi)
 
-    def heal(self, touches: list[Touch]) -> bool:
-        """Record touches whose patches did not hold; returns whether there are any.
+    def heal(self, touches: list[Touch], at: float) -> bool:
+        """Record touches whose patches did not hold at d = ``at``; returns whether there are any.
 
         Surfaces that overlap touch in any case.
         """
         if self.range > 0:
             healed = [(touch.theta, 1 / touch.opening) for touch in touches if touch.opening > 0]
             self.healed += healed
-            self.heals += len(healed)
+            self.heals, self.healed_at = self.heals + len(healed), at
             return bool(healed)
         return False
