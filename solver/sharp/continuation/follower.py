@@ -80,7 +80,7 @@ class Follower:
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
         self.nucleation.searched = SearchedGaps() if data is None else data.searched
-        self.cracks.healed, self.nucleation.healed = [], []
+        self.nucleation.healed = []
         self._came_on = None if data is None else data.branch
         if data is None or data.branch_data is None:
             return None
@@ -224,16 +224,15 @@ class Follower:
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
             ):
-                jump = self._opening_jump(opened, target)
-            elif touched is not None:
-                may_fold = abs(fold - touched.point.at) < self.resolution.order
-                jump = self._touch_jump(touched, beyond if may_fold else None, target)
-            else:
+                return self._opening_jump(opened, target)
+            if touched is None:
                 trail.restart(least)
                 return None
+            may_fold = abs(fold - touched.point.at) < self.resolution.order
+            jump = self._touch_jump(touched, beyond if may_fold else None, target)
             if jump is not None:
                 return jump
-        raise NoState("contact opens, or nucleates, and goes back in turn", points[-1].at)
+        raise NoState("contact nucleates, and goes back in turn", points[-1].at)
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
@@ -243,18 +242,15 @@ class Follower:
         """Compute the jump at the start of a branch where patches open at once; else None."""
         if not self.cracks.is_possible:
             return None
-        while True:
-            least, found = self.cracks.minimum(point.field)
-            if least > 0:
-                return None
-            opened = Located(point, self.cracks.choose_seeds(found), 0.0)
-            jump = self._opening_jump(opened, target)
-            if jump is not None:
-                self._check_openings(history, jump)
-                return jump
+        least, found = self.cracks.minimum(point.field)
+        if least > 0:
+            return None
+        jump = self._opening_jump(Located(point, self.cracks.choose_seeds(found), 0.0), target)
+        self._check_openings(history, jump)
+        return jump
 
-    def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump | None:
-        """Compute the jump from a point at which patches open inside; None if they heal."""
+    def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
+        """Compute the jump from a point at which patches open inside."""
         point, gaps = opened.point, opened.point.field.gaps
         before = self.states.of_point(point)
         jump = self.jumps.compute(
@@ -266,8 +262,7 @@ class Follower:
             barrier=sum(crack.barrier for crack in opened.seeds),
         )
         if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
-            self.cracks.heal(opened.seeds)
-            return None
+            raise NoState("a crack that grows at both tips closes again", point.at)
         late = self.states.work(before, jump.states[-1], opened.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 

@@ -28,10 +28,8 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.crack import (
     GROWTH,
-    HEALED_PLACE,
     IN_PATCH,
     LONGEST_TRIAL_HALF_LENGTH,
-    has_healed,
 )
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
@@ -39,7 +37,12 @@ from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.tolerances import OVERLAP, TRIAL_WIDTHS
+from adhesis.solver.sharp.tolerances import (
+    HEALED_OPENING,
+    HEALED_PLACE,
+    OVERLAP,
+    TRIAL_WIDTHS,
+)
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class Nucleation:
         Overlap that is allowed in a state, in units of 1/q0.
     range : float
         Of adhesion, in units of 1/q0.
-    healed : list of (position, 1/opening)
+    healed : list of (position, opening)
         Touches whose patches did not hold: none is tried there unless the opening is smaller.
     heals : int
         Number of touches that did not hold, so far.
@@ -221,7 +224,11 @@ class Nucleation:
 
     def _has_healed(self, theta: float, opening: float) -> bool:
         near = HEALED_PLACE * self.edges.wave
-        return has_healed(theta, 1 / opening, self.healed, near, 2 * np.pi)
+        return any(
+            abs((theta - place + np.pi) % (2 * np.pi) - np.pi) < near
+            and opening > HEALED_OPENING * before
+            for place, before in self.healed
+        )
 
     def heal(self, touches: list[Touch], at: float) -> bool:
         """Record touches whose patches did not hold at d = ``at``; returns whether there are any.
@@ -229,7 +236,7 @@ class Nucleation:
         Surfaces that overlap touch in any case.
         """
         if self.range > 0:
-            healed = [(touch.theta, 1 / touch.opening) for touch in touches if touch.opening > 0]
+            healed = [(touch.theta, touch.opening) for touch in touches if touch.opening > 0]
             self.healed += healed
             self.heals, self.healed_at = self.heals + len(healed), at
             return bool(healed)
