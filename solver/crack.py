@@ -34,10 +34,6 @@ EQUAL_TENSIONS = 1e-4
 """Maxima of tension that differ by less, in units of the strength, open together."""
 NEAR_STRENGTH = 0.8
 """Smaller maxima of tension, in units of the strength, are not judged."""
-HEALED_TENSION = 1.01
-"""A crack that closed again is tried again from this multiple of its tension on."""
-HEALED_PLACE = 0.05
-"""A maximum within so many shortest waves of a crack that closed again is at the same place."""
 MOST_MAXIMA = 32
 """Maxima of tension of one field that are refined."""
 MOST_OPENINGS = 1000
@@ -137,17 +133,3 @@ def largest_excess(cracks: list[Crack]) -> list[Crack]:
     """Return the crack that opens first, and those that equal it; none if none opens."""
     least = min((crack.value for crack in cracks), default=1.0)
     return [crack for crack in cracks if crack.value <= min(least + EQUAL_TENSIONS, 0.0)]
-
-
-def has_healed(
-    position: float, drive: float, healed: list[tuple[float, float]], near: float, period: float
-) -> bool:
-    """Return whether what nucleated within ``near`` of a place went back, at about this drive.
-
-    The drive, and those of the positions that ``healed`` lists, are tensions, or what else grows.
-    """
-    for place, before in healed:
-        distance = (position - place + period / 2) % period - period / 2
-        if abs(distance) < near and drive < HEALED_TENSION * before:
-            return True
-    return False

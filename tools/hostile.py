@@ -221,7 +221,7 @@ def follow(
             missed = 0.0 if found["not held"] else missed_by(method, states)
             if missed > _MISSED * method.nucleation.range + method.nucleation.tolerance:
                 wrong.append(f"a touch is missed by {missed / method.nucleation.range:.1e} ranges")
-            found |= {"excess": excess, "late": late, "healed": method.follower.cracks.heals}
+            found |= {"excess": excess, "late": late}
             if late > _TENSION:
                 wrong.append(f"a patch is late to open by {late:.1e} of the strength")
             found["flagged"] = any("the tension inside patches" in w for w in loop.warnings)
@@ -241,7 +241,6 @@ def tension_of(
     It is left out where the second is an opening: at the first nothing opened there yet.
     """
     openings = method.follower.cracks
-    openings.healed = []
     largest = late = 0.0
     for state in _staying(loop, states):
         field = method.edges.field(state.internal.gaps, method.states.prescribed_of(state))

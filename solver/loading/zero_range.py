@@ -71,8 +71,7 @@ DOUBTFUL_LOSS = 20.0
 """Loss over γ A_max/A0 above which a loss is doubtful (docs/zero-range.md)."""
 
 DOUBTFUL_EXCESS = 1.01
-"""Tension inside patches over a finite strength above which a loss is doubtful: a hundredth is
-the excess at which a crack that closed again is retried (``solver.crack.HEALED_TENSION``)."""
+"""Tension inside patches over a finite strength above which a loss is doubtful."""
 
 SMEARED = 0.05
 """Share of the loss of zero range that cohesive zones at edges change, over (δ/``edge_range``)⁴:

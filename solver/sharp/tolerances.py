@@ -54,6 +54,10 @@ OVERLAP = 1e-6
 """h_max. Smaller overlaps may remain in a state."""
 TRIAL_WIDTHS = 1.25
 """Ratio of the widths of seeds that are tried one after the other, where surfaces attract."""
+HEALED_PLACE = 0.05
+"""λ_min. A touch so near to one that did not hold is at the same place."""
+HEALED_OPENING = 0.99
+"""Of the opening at which a touch did not hold: from there on it is tried again."""
 BISECTION_AFTER = 3
 """Trials that find no overlap, one after the other: then all bisect, until one finds one."""
 

@@ -68,9 +68,9 @@ def opening_summary(found: list[dict[str, Any]]) -> str:
     return (
         f"{sum(f['openings'] for f in opened)} openings in {len(opened)} loops, at ranges of "
         f"{min(ranges, default=0):.1e} to {max(ranges, default=0):.1e} m; "
-        f"{sum(f.get('healed', 0) for f in found)} cracks closed again; the tension inside patches "
-        f"exceeds the strength by 1 % where no crack grows in {np.sum(excess > 1.01)} loops, by a "
-        f"tenth in {np.sum(excess > 1.1)}, at most {excess.max():.2f} times; "
+        f"the tension inside patches exceeds the strength by 1 % where no crack grows in "
+        f"{np.sum(excess > 1.01)} loops, by a tenth in {np.sum(excess > 1.1)}, at most "
+        f"{excess.max():.2f} times; "
         f"{sum(f.get('flagged', False) for f in found)} losses are doubtful for it; "
         f"{sum(f.get('not held', 0) for f in found)} touches did not hold at first"
     )

@@ -74,7 +74,7 @@ class Follower:
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
-        self.cracks.healed, self.nucleation.healed = [], []
+        self.nucleation.healed = []
         self.nucleation.searched, self._came_on = SearchedGaps(), None
         if data is None or data.stopped is None:
             return None
@@ -205,25 +205,25 @@ class Follower:
         branch.trail = [branch.point]
         fold, beyond = branch.fold_ahead
         for _ in range(MOST_OPENINGS):
-            touched = locate(self.nucleation, self._between, trail, self.nucleation.tolerance)
+            finest = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
+            touched = locate(self.nucleation, self._between, trail, finest)
             opened = None
             if self.cracks.is_possible:
                 opened = locate(self.cracks, self._between, trail, self.resolution.finest)
             if opened is not None and (
                 touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
             ):
-                jump = self._opening_jump(opened, target)
-            elif touched is not None:
-                apart = math.copysign(1.0, target.at - start) * (fold - touched.point.at)
-                if apart < -self.resolution.order:
-                    return None  # the fold comes first
-                may_fold = apart < self.resolution.order
-                jump = self._touch_jump(touched, beyond if may_fold else None, target)
-            else:
+                return self._opening_jump(opened, target)
+            if touched is None:
                 return None
+            apart = math.copysign(1.0, target.at - start) * (fold - touched.point.at)
+            if apart < -self.resolution.order:
+                return None  # the fold comes first
+            may_fold = apart < self.resolution.order
+            jump = self._touch_jump(touched, beyond if may_fold else None, target)
             if jump is not None:
                 return jump
-        raise NoState("contact opens, or nucleates, and goes back in turn", trail[-1].at)
+        raise NoState("contact nucleates, and goes back in turn", trail[-1].at)
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
@@ -233,18 +233,15 @@ class Follower:
         """Compute the jump at the start of a branch where patches open at once; else None."""
         if not self.cracks.is_possible:
             return None
-        while True:
-            least, found = self.cracks.minimum(point.field)
-            if least > 0:
-                return None
-            opened = Located(point, self.cracks.choose_seeds(found), 0.0)
-            jump = self._opening_jump(opened, target)
-            if jump is not None:
-                self._check_openings(history, jump)
-                return jump
+        least, found = self.cracks.minimum(point.field)
+        if least > 0:
+            return None
+        jump = self._opening_jump(Located(point, self.cracks.choose_seeds(found), 0.0), target)
+        self._check_openings(history, jump)
+        return jump
 
-    def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump | None:
-        """Compute the jump from a point at which patches open inside; None if they heal."""
+    def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
+        """Compute the jump from a point at which patches open inside."""
         point, gaps = opened.point, opened.point.field.gaps
         before = self.states.of_point(point)
         jump = self.jumps.compute(
@@ -256,8 +253,7 @@ class Follower:
             barrier=sum(crack.barrier for crack in opened.seeds),
         )
         if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
-            self.cracks.heal(opened.seeds)
-            return None
+            raise NoState("a crack that grows at both tips closes again", point.at)
         late = self.states.work(before, jump.states[-1], opened.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 
@@ -278,15 +274,18 @@ class Follower:
         """
         point = touched.point
         before = self.states.of_point(point)
+        since = self.nucleation.way_since_healed(touched.seeds, point.at)
         jump = self.jumps.compute(
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,
             event_orders=None if beyond is None else EventOrders(beyond, (point.field.gaps,)),
         )  # fmt: skip
         gained = self.jumps.has_gained(point, jump.point, touched.seeds)
-        if not gained and self.nucleation.heal(touched.seeds):
+        if not gained and self.nucleation.heal(touched.seeds, point.at):
             return None
-        late = self.states.work(before, jump.states[-1], touched.late)
-        return replace(jump, states=(before, *jump.states), misplaced=late)
+        # they hold from somewhere since they last did not, where no energy is lost
+        late, since = (self.states.work(before, jump.states[-1], x) for x in (touched.late, since))
+        misplaced = late + min(since, abs(jump.jump.energy_drop))
+        return replace(jump, states=(before, *jump.states), misplaced=misplaced)
 
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float

@@ -257,7 +257,7 @@ class Jumps:
             grown = descend(point.field.gaps, seeds)
             if self.has_gained(point, grown, seeds):
                 point = grown
-            elif not self.nucleation.heal(seeds):
+            elif not self.nucleation.heal(seeds, at):
                 if adhesive and least < -self.nucleation.tolerance:
                     break
                 return point

@@ -29,10 +29,8 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.crack import (
     GROWTH,
-    HEALED_PLACE,
     IN_PATCH,
     LONGEST_TRIAL_HALF_LENGTH,
-    has_healed,
 )
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
@@ -40,7 +38,12 @@ from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.tolerances import OVERLAP, TRIAL_WIDTHS
+from adhesis.solver.sharp.tolerances import (
+    HEALED_OPENING,
+    HEALED_PLACE,
+    OVERLAP,
+    TRIAL_WIDTHS,
+)
 
 
 @dataclass(frozen=True)
@@ -78,11 +81,13 @@ class Nucleation:
         Overlap that is allowed in a state, in units of 1/q0.
     range : float
         Of adhesion, in units of 1/q0.
-    healed : list of (position, 1/opening)
+    healed : list of (position, opening)
         Touches whose patches did not hold: none is tried there in the same load step unless the
         opening is smaller.
     heals : int
         Number of touches that did not hold, so far.
+    healed_at : float
+        d of the last of them.
     """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
@@ -90,7 +95,7 @@ class Nucleation:
         self.searched = SearchedGaps()
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
-        self.heals = 0
+        self.heals, self.healed_at = 0, math.nan
         self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
@@ -156,12 +161,11 @@ class Nucleation:
         least, count, found, self.searched = search(field.solution, self.searched, self._lengths)
         self.edges.count.openings += count
         theta, opening, widths, rim, clearance = found
-        near = HEALED_PLACE * self.edges.wave
         touching: Any = ()
         if self.range > 0:
             touching = np.flatnonzero((opening > 0) & (clearance <= 0) & (rim > self.range))
         for i in touching:
-            if has_healed(theta[i], 1 / opening[i], self.healed, near, 2 * np.pi):
+            if self._has_healed(theta[i], opening[i]):
                 clearance[i] = opening[i]
                 continue
             at = field.gaps, field.prescribed, theta[i : i + 1]
@@ -215,14 +219,27 @@ class Nucleation:
             np.array([t.width for t in touches]),
         )
 
-    def heal(self, touches: list[Touch]) -> bool:
-        """Record touches whose patches did not hold; returns whether there are any.
+    def way_since_healed(self, touches: list[Touch], at: float) -> float:
+        """Return the way in d since patches at these places last did not hold; 0 if they did."""
+        healed = any(self._has_healed(touch.theta, math.inf) for touch in touches)
+        return abs(at - self.healed_at) if healed else 0.0
+
+    def _has_healed(self, theta: float, opening: float) -> bool:
+        near = HEALED_PLACE * self.edges.wave
+        return any(
+            abs((theta - place + np.pi) % (2 * np.pi) - np.pi) < near
+            and opening > HEALED_OPENING * before
+            for place, before in self.healed
+        )
+
+    def heal(self, touches: list[Touch], at: float) -> bool:
+        """Record touches whose patches did not hold at d = ``at``; returns whether there are any.
 
         Surfaces that overlap touch in any case.
         """
         if self.range > 0:
-            healed = [(touch.theta, 1 / touch.opening) for touch in touches if touch.opening > 0]
+            healed = [(touch.theta, touch.opening) for touch in touches if touch.opening > 0]
             self.healed += healed
-            self.heals += len(healed)
+            self.heals, self.healed_at = self.heals + len(healed), at
             return bool(healed)
         return False

@@ -11,13 +11,11 @@ import math
 import numpy as np
 
 from adhesis.solver.crack import (
-    HEALED_PLACE,
     IN_PATCH,
     LONGEST_TRIAL_HALF_LENGTH,
     MOST_MAXIMA,
     NEAR_STRENGTH,
     Crack,
-    has_healed,
     judge_maximum,
     largest_excess,
 )
@@ -48,10 +46,6 @@ class Cracks:
         σ_th in units of E*/2; infinite where nothing opens.
     tolerance : float
         Share of the strength by which a tension may exceed it.
-    healed : list of (position, tension)
-        Cracks that closed again: nothing opens there unless the tension is larger.
-    heals : int
-        Number of cracks that closed again, so far.
     """
 
     tolerance = STRENGTH_EXCEEDED
@@ -59,8 +53,6 @@ class Cracks:
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.edges = edges
         self.strength = problem.strength / (problem.half_space.modulus / 2)
-        self.healed: list[tuple[float, float]] = []
-        self.heals = 0
         self._nodal = nodal_tension(problem) if self.is_possible else None
 
     @property
@@ -80,14 +72,11 @@ class Cracks:
         if not nodes:
             return 1 - NEAR_STRENGTH, []
         refined = RefinedTension.of(field)
-        near = HEALED_PLACE * self.edges.wave
         found = []
         for node in nodes:
             maximum = refined.maximum(node * self._nodal.step, self._nodal.step)
             if maximum is not None:
-                crack = self._crack_at(field, refined, *maximum)
-                if not has_healed(crack.position, crack.tension, self.healed, near, 2 * np.pi):
-                    found.append(crack)
+                found.append(self._crack_at(field, refined, *maximum))
         return min((crack.value for crack in found), default=1 - NEAR_STRENGTH), found
 
     def choose_seeds(self, candidates: list[Crack]) -> list[Crack]:
@@ -98,11 +87,6 @@ class Cracks:
         """Return the gaps with these cracks inserted."""
         centres = np.array([crack.position for crack in cracks])
         return with_gaps(gaps, centres, np.array([crack.length for crack in cracks]))
-
-    def heal(self, cracks: list[Crack]) -> None:
-        """Record cracks that closed again."""
-        self.healed += [(crack.position, crack.tension) for crack in cracks]
-        self.heals += len(cracks)
 
     def is_located(self, value: float, near: bool) -> bool:
         """Return whether a maximum with this value is located finely enough.
