@@ -281,6 +281,8 @@ class Follower:
         d.
         """
         point = touched.point
+        if self.edges.critical > 0 and touched.seeds[0].opening < -self.nucleation.tolerance:
+            raise NoState("surfaces overlap, and no first touch is found", point.at)
         before = self.states.of_point(point)
         jump = self.jumps.compute(
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,

@@ -55,16 +55,8 @@ class Criterion(Protocol[Seed]):
     def is_located(self, value: float, near: bool) -> bool:
         """Return whether a point with this value is located finely enough.
 
-        Parameters
-        ----------
-        value : float
-        near : bool
-            Whether a point with a positive value is as near as the resolution.
+        ``near`` states whether one with a positive value is as near as the resolution.
         """
-        ...
-
-    def validate_location(self, value: float, at: float) -> None:
-        """Raise if a point located at d = ``at`` with this value cannot be used."""
         ...
 
 
@@ -134,7 +126,6 @@ def locate(
             clear, clear_value = between, value
         else:
             hit, hit_candidates, hit_value = between, candidates, value
-    criterion.validate_location(hit_value, hit.at)
     # estimate the distance from the exact location by a secant
     late = abs(clear.at - hit.at)
     if clear_value > hit_value:
