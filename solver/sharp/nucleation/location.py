@@ -16,10 +16,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.tolerances import (
-    BISECTION_AFTER,
-    LONGEST_STEP,
-)
+from adhesis.solver.sharp.tolerances import BISECTION_AFTER
 
 Seed = TypeVar("Seed")
 
@@ -65,7 +62,7 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
 
     Of two that have the same edges, as at a fold, these are held.
     """
-    reach = LONGEST_STEP * edges.wave
+    reach = edges.longest_step
 
     def solve(clear: Point, hit: Point, at: float) -> Point | None:
         if clear.gaps is hit.gaps:
