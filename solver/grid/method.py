@@ -68,12 +68,6 @@ class GridMethod(Method):
         of nodes is rounded up to a power of two, by default at least 1024.
     chosen : str, optional
         See ``method.Method``.
-
-    Raises
-    ------
-    ValueError
-        If accuracy does not lie between 0 and 1, or the grid is too coarse: fewer than 8 nodes per
-        shortest wave.
     """
 
     name: ClassVar[str] = "grid"
@@ -91,8 +85,6 @@ class GridMethod(Method):
         chosen: str | None = None,
     ) -> None:
         super().__init__(problem, chosen=chosen)
-        if not 0 < accuracy < 1:
-            raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1")
         profile = problem.profile
         self.accuracy = accuracy
         self.nodes = _node_count(problem.highest_harmonic, accuracy, nodes_per_wave)
@@ -189,21 +181,10 @@ class GridMethod(Method):
 
 
 def _node_count(harmonic: int, accuracy: float, nodes_per_wave: int | None) -> int:
-    """Compute the number of nodes of the grid.
-
-    Raises
-    ------
-    ValueError
-        If the grid is too coarse.
-    """
+    """Compute the number of nodes of the grid."""
     if nodes_per_wave is None:
         per_wave = min(max(_FIRST_ORDER / accuracy, _FEWEST_NODES_PER_WAVE), _MOST_NODES_PER_WAVE)
         wanted = max(round(per_wave) * harmonic, _FEWEST_NODES)
-    elif nodes_per_wave != int(nodes_per_wave) or nodes_per_wave < _FEWEST_NODES_PER_WAVE:
-        raise ValueError(
-            f"nodes_per_wave is {nodes_per_wave!r}: it must be a whole number of at least "
-            f"{_FEWEST_NODES_PER_WAVE}, or the grid is too coarse for the shortest wave"
-        )
     else:
-        wanted = int(nodes_per_wave) * harmonic
+        wanted = nodes_per_wave * harmonic
     return 1 << (wanted - 1).bit_length()

@@ -33,12 +33,7 @@ from adhesis.solver.sharp.nucleation.location import (
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import (
-    DESCENT_HANDS_OVER,
-    EQUAL,
-    LONGEST_STEP,
-    SECOND_FOLD_DISPLACED,
-)
+from adhesis.solver.sharp.tolerances import EQUAL, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 
@@ -177,7 +172,7 @@ class Follower:
             branch.refine(self.resolution.finest)
             return None
         after = jump.point
-        goes_on = fold.at != target.at and self._is_near(fold.point, after, DESCENT_HANDS_OVER)
+        goes_on = fold.at != target.at and self._is_near(fold.point, after)
         if goes_on and after is not None:
             # Newton's iteration failed where there was no fold: the branch goes on.
             branch.continue_from(after)
@@ -273,6 +268,8 @@ class Follower:
         d.
         """
         point = touched.point
+        if self.edges.critical > 0 and touched.seeds[0].opening < -self.nucleation.tolerance:
+            raise NoState("surfaces overlap, and no first touch is found", point.at)
         before = self.states.of_point(point)
         since = self.nucleation.way_since_healed(touched.seeds, point.at)
         jump = self.jumps.compute(
@@ -341,8 +338,8 @@ class Follower:
         point = fold.point
         if not self.jumps.mirror.is_symmetric(point.gaps):
             return point.gaps, self._orders_of_folds(fold)
-        reach = LONGEST_STEP * self.edges.wave
-        saddle = self.edges.equilibrium(point.extrapolate(fold.at), fold.at, reach, strict=False)
+        start, reach = point.extrapolate(fold.at), self.edges.longest_step
+        saddle = self.edges.equilibrium(start, fold.at, reach, strict=False)
         if saddle is not None:
             ways = self.edges.ways_off_saddle(saddle.gaps, fold.at, self.edges.law_at(point.gaps))
             if ways:
@@ -371,8 +368,8 @@ class Follower:
         """
         return abs(before.mean_stress) * 2 * abs(point.slope) * way / self.states.q0
 
-    def _is_near(self, point: Point, after: Point | None, share: float) -> bool:
-        """Whether no edge moved by as much as this ``share`` of λ_min in a descent."""
+    def _is_near(self, point: Point, after: Point | None) -> bool:
+        """Whether no edge left the reach of Newton's iteration in a descent."""
         if after is None or after.gaps.shape != point.gaps.shape:
             return False
-        return bool(np.abs(after.gaps - point.gaps).max() < share * self.edges.wave)
+        return bool(np.abs(after.gaps - point.gaps).max() < self.edges.law.rest_step)

@@ -16,12 +16,7 @@ from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
-from adhesis.solver.sharp.tolerances import (
-    ENDLESS,
-    FINER_STEPS,
-    LONGEST_STEP,
-    OTHER_MINIMUM,
-)
+from adhesis.solver.sharp.tolerances import ENDLESS, FINER_STEPS, OTHER_MINIMUM
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +325,7 @@ class Jumps:
         self, gaps: Array, at: float, *, equal_speeds: bool = False, share: float = 1.0
     ) -> tuple[Point | None, bool]:
         """Descend until nothing vanishes; returns also whether edges may have raced."""
-        reach, races = LONGEST_STEP * self.edges.wave, False
+        reach, races = self.edges.longest_step, False
         while len(gaps):
             found, raced = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds, share=share)
             races = races or raced

@@ -17,10 +17,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.tolerances import (
-    BISECTION_AFTER,
-    LONGEST_STEP,
-)
+from adhesis.solver.sharp.tolerances import BISECTION_AFTER
 
 Seed = TypeVar("Seed")
 
@@ -56,16 +53,8 @@ class Criterion(Protocol[Seed]):
     def is_located(self, value: float, near: bool) -> bool:
         """Return whether a point with this value is located finely enough.
 
-        Parameters
-        ----------
-        value : float
-        near : bool
-            Whether a point with a positive value is as near as the resolution.
+        ``near`` states whether one with a positive value is as near as the resolution.
         """
-        ...
-
-    def validate_location(self, value: float, at: float) -> None:
-        """Raise if a point located at d = ``at`` with this value cannot be used."""
         ...
 
 
@@ -74,7 +63,7 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
 
     Of two that have the same edges, as at a fold, these are held.
     """
-    reach = LONGEST_STEP * edges.wave
+    reach = edges.longest_step
 
     def solve(clear: Point, hit: Point, at: float) -> Point | None:
         if clear.gaps is hit.gaps:
@@ -135,7 +124,6 @@ def locate(
             clear, clear_value = between, value
         else:
             hit, hit_candidates, hit_value = between, candidates, value
-    criterion.validate_location(hit_value, hit.at)
     # estimate the distance from the exact location by a secant
     late = abs(clear.at - hit.at)
     if clear_value > hit_value:

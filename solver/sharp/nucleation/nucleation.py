@@ -34,7 +34,6 @@ from adhesis.solver.crack import (
 )
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
-from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -205,11 +204,6 @@ class Nucleation:
         Within the range a value may fall at once, where surfaces part beside a minimum.
         """
         return value > -0.5 * self.tolerance or (near and value > -self.range)
-
-    def validate_location(self, value: float, at: float) -> None:
-        """Raise if surfaces overlap at the touch that was located."""
-        if value < -self.tolerance - self.range and self.edges.critical > 0:
-            raise NoState("surfaces overlap, and no first touch is found", at)
 
     def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:
         """Return the gaps with a seed patch at each touch."""

@@ -95,9 +95,6 @@ class Cracks:
         """
         return near or value > -0.5 * self.tolerance
 
-    def validate_location(self, value: float, at: float) -> None:
-        """Accept every point: see :meth:`is_located`."""
-
     def _crack_at(
         self, field: GapField, refined: RefinedTension, theta: float, tension: float
     ) -> Crack:
