@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
-from adhesis.ensemble.command.streams import write_line
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import log
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
-    from adhesis.ensemble.campaign.tasks import Task, Tasks
+    from adhesis.ensemble.campaign.tasks import Task
+    from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.progress import Summary
-    from adhesis.ensemble.run.session import Engine, Options
+    from adhesis.ensemble.run.session import Engine
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
@@ -120,7 +120,7 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
         if comm.size == 1:
             raise
         if comm.rank == 0:
-            write_line(f"adhesis run: {error}")
+            log(f"adhesis run: {error}")
         if not wait_for_all(comm, _ALL_ARRIVE):  # the error is of this rank alone
             _end_job(comm, exit_codes.BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
         return exit_codes.BAD_INPUT if comm.rank == 0 else exit_codes.DONE
@@ -150,7 +150,7 @@ def _checked_ranks(ranks: int) -> int:
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     """End every rank: the others know nothing of this one's error and would wait for ever."""
     if sentence:
-        write_line(sentence)
+        log(sentence)
     comm.Abort(code)
 
 
@@ -161,8 +161,9 @@ def _run(
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
+    from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.ranks import together
-    from adhesis.ensemble.run.session import Options, run_campaign
+    from adhesis.ensemble.run.session import run_campaign
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
@@ -249,10 +250,6 @@ def _tell_price(
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
 
-    def prepare(tasks: Tasks) -> None:
-        for task in tasks:
-            engine.check(campaign, task)
-
     heard = time.monotonic()
 
     def tried(task: Task, seconds: float) -> None:
@@ -264,7 +261,7 @@ def _tell_price(
     estimate = price(
         *(campaign, path, part),
         compute=lambda c, t: engine.compute(c, t, None),
-        prepare=prepare,
+        check=engine.check,
         on_pilot=tried,
     )
     print(estimate)

@@ -66,13 +66,6 @@ def standard_streams() -> Iterator[None]:
         sys.stdout, sys.stderr = before
 
 
-def write_line(text: str) -> None:
-    """Write one line to stderr in one piece, so that lines of several processes do not mix."""
-    clear = "\r\x1b[K" if sys.stderr.isatty() else ""  # a progress line may stand there
-    sys.stderr.write(f"{clear}{' '.join(text.splitlines())}\n")
-    sys.stderr.flush()
-
-
 def _stream(like: Any, binary: io.BufferedWriter, by_line: bool = False) -> io.TextIOWrapper:
     if like is not None:
         like.flush()

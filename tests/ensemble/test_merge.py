@@ -142,7 +142,7 @@ def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tm
     assert "p2.h5 is damaged or truncated, or another program has changed" in refused([two], out)
     write_head(two)
     sentence = refused([two], out)
-    assert "p2.h5 is damaged: its tasks are not those of its campaign (seed of row 3 is" in sentence
+    assert "p2.h5 is damaged: its seed is not that of its campaign (" in sentence
     two.write_bytes(two.read_bytes()[:5000])
     assert "damaged or truncated" in refused([one, two], out)
     assert "merged into itself" in refused([one, out], out)
