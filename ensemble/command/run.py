@@ -105,14 +105,20 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
 
     Tests pass another engine than loops.
     """
-    from adhesis.ensemble.run.ranks import OneRank, wait_for_all, world
+    from adhesis.ensemble.run.launch import check_ranks
+    from adhesis.ensemble.run.ranks import OneRank, launched, wait_for_all, world
 
     started = time.time()
     comm: Any = OneRank()
     processes = 0
     try:
         if args.ranks is not None and not args.dry_run:
-            processes = _checked_ranks(args.ranks) - 1
+            check_ranks("--ranks", args.ranks)
+            if launched()[0] > 1:
+                raise InputError(
+                    "--ranks starts ranks of its own: leave it out under mpirun or srun"
+                )
+            processes = args.ranks - 1
         comm = world()
         code = _run(args, comm, processes, started, engine)
         return code if comm.rank == 0 else exit_codes.DONE
@@ -135,16 +141,6 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
         if code == exit_codes.WRITE_FAILED:
             os._exit(code)  # at an orderly exit HDF5 would try to write again, and crash
         return code
-
-
-def _checked_ranks(ranks: int) -> int:
-    from adhesis.ensemble.run.launch import check_ranks
-    from adhesis.ensemble.run.ranks import launched
-
-    check_ranks("--ranks", ranks)
-    if launched()[0] > 1:
-        raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
-    return ranks
 
 
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
@@ -190,7 +186,10 @@ def _run(
         return exit_codes.RESUME
     if comm.rank == 0:
         _report_end(campaign, path, summary, options)
-    return _code(summary, options)
+    too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
+    if summary.pending and not too_many:
+        return exit_codes.RESUME
+    return exit_codes.SOME_FAILED if summary.failed else exit_codes.DONE
 
 
 def _check_out(args: argparse.Namespace, path: Path) -> None:
@@ -231,13 +230,6 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Optio
         log(
             f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {_again(options)}"
         )
-
-
-def _code(summary: Summary, options: Options) -> int:
-    too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
-    if summary.pending and not too_many:
-        return exit_codes.RESUME
-    return exit_codes.SOME_FAILED if summary.failed else exit_codes.DONE
 
 
 def _tell_price(
