@@ -7,7 +7,6 @@ succeeds in its eyes; the error of the first that did not is raised by :meth:`Di
 
 from __future__ import annotations
 
-import errno
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,16 +15,7 @@ from typing import Any
 
 import h5py
 
-from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.solver.runtime.uninterrupted import signals_held
-
-# The disk or a limit is at fault, and not the name or its permissions.
-_OF_THE_SYSTEM = {*(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO), errno.EMFILE, errno.ENFILE}
-
-
-def refusal(error: OSError) -> type[InputError | WriteError]:
-    """Return the kind of error by which a file that cannot be written is reported."""
-    return WriteError if error.errno in _OF_THE_SYSTEM else InputError
 
 
 class DiskFile(io.FileIO):

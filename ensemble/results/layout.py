@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part
-from adhesis.ensemble.errors import InputError, reason
+from adhesis.ensemble.errors import InputError, reason, refusal
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.disk_file import opened, refusal
+from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT, Dataset

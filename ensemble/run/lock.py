@@ -26,13 +26,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, refusal
 from adhesis.ensemble.escape import one_line
 from adhesis.ensemble.outputs import target_of
 from adhesis.solver.checks import counted
 
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}
-_FULL = {errno.ENOSPC, errno.EDQUOT}
 # Without O_NONBLOCK, opening a pipe in place of the lock file would block.
 _SAFELY = os.O_NOFOLLOW | os.O_NONBLOCK
 _MAX_RECORD = 4096  # bytes
@@ -126,8 +125,7 @@ class RunLock:
             except OSError as error:
                 if error.errno in (errno.ELOOP, errno.ENXIO, errno.EISDIR):
                     raise self._no_lock() from None
-                kind = WriteError if error.errno in _FULL else InputError
-                raise kind(f"{self.path} cannot be written: {error.strerror}") from error
+                raise refusal(error)(f"{self.path} cannot be written: {error.strerror}") from error
             found = os.fstat(descriptor)
             # With a second name (hard link) it may be a file of the user's: the record would
             # overwrite it.

@@ -37,27 +37,29 @@ class Selection:
     """Rows to compute again."""
 
     status: Literal["failed", "all"]
-    # By the name of an attribute of tasks; if there are any, only tasks with one of them
+    # By the name of a column of tasks; if there are any, only tasks with one of them
     values: Mapping[str, Collection[float]] = field(default_factory=dict)
 
-    def check(self, tasks: Sequence[Task]) -> None:
+    def check(self, tasks: Tasks) -> None:
         """Refuse values that the campaign does not have (InputError)."""
         for name, chosen in self.values.items():
-            known = {getattr(task, name) for task in tasks}
+            known = np.unique(tasks.column(name)).tolist()
             for value in chosen:
                 if value not in known:
-                    values = ", ".join(f"{v:g}" for v in sorted(known)[:_MOST_SHOWN])
+                    values = ", ".join(f"{v:g}" for v in known[:_MOST_SHOWN])
                     more = ", …" if len(known) > _MOST_SHOWN else ""
                     raise InputError(
                         f"{parameter(name)} is {value:g}: this campaign has no such task, "
                         f"only {values}{more}"
                     )
 
-    def takes(self, task: Task, status: int) -> bool:
-        """Whether a row is selected."""
-        return (status == FAILED or (self.status == "all" and status == DONE)) and all(
-            getattr(task, name) in chosen for name, chosen in self.values.items() if chosen
-        )
+    def rows(self, tasks: Tasks, status: NDArray[np.uint8]) -> list[int]:
+        """Return the rows that are selected, by the status of each task."""
+        selected = np.isin(status, (FAILED, DONE) if self.status == "all" else FAILED)
+        for name, chosen in self.values.items():
+            if chosen:
+                selected &= np.isin(tasks.column(name), list(chosen))
+        return np.flatnonzero(selected).tolist()
 
 
 @dataclass(frozen=True)
@@ -156,8 +158,7 @@ def prepare(
         if again:
             say(f"{results.damage()}{_AGAIN}")
         if redo is not None:
-            states = zip(results.tasks(), status.tolist(), strict=True)
-            chosen = [row for row, (task, state) in enumerate(states) if redo.takes(task, state)]
+            chosen = redo.rows(results.tasks(), status)
             say(f"{path}: {counted(len(chosen), 'task')} to be computed again")
             again += chosen
         status[again] = PENDING
