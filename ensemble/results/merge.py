@@ -7,6 +7,7 @@ anew and renamed: a kill leaves the old one.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -75,6 +76,8 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         taken = sum(int(source.taken.sum()) for source in sources)
         if there is None:
             create(out, campaign, attributes=attributes, sources=sources)
+        elif taken and not os.access(out, os.W_OK):
+            raise InputError(f"{out} cannot be written: permission denied")
         elif taken:
             stays = there.status() != schema.DAMAGED
             for source in sources:
