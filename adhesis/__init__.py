@@ -12,11 +12,12 @@ line alone, such as ``adhesis --help``, load neither numpy nor the solver.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 from adhesis._version import __version__ as __version__
-from adhesis.solver import views as _views
 
+# As type checkers know it. The module typing would load for longer than all that is needed before a
+# command can be interrupted without a traceback.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from adhesis._campaign import Campaign
     from adhesis._open import open as open
@@ -113,8 +114,10 @@ __all__ = [
     "stripes",
 ]
 
-# Figures and films of results are made outside of the mechanics, and loaded when they are made.
-_views.maker = lambda: import_module("adhesis.ensemble.loop.views")
+
+def _views() -> object:
+    """Return what makes figures and films of results: outside of the mechanics, and loaded late."""
+    return import_module("adhesis.ensemble.loop.views")
 
 
 def __getattr__(name: str) -> object:

@@ -189,7 +189,8 @@ class Campaign:
         from adhesis._open import open as open_results
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run.launch import check_ranks
-        from adhesis.ensemble.run.session import Options, run_campaign
+        from adhesis.ensemble.run.plan import Options
+        from adhesis.ensemble.run.session import run_campaign
 
         check_ranks("ranks", ranks)
         say = log if progress else lambda text: None

@@ -61,6 +61,15 @@ class WriteError(_Printable):
     """An output or stdout could not be written: what was written before is sound."""
 
 
+# The disk or a limit is at fault, and not the name or its permissions.
+_OF_THE_SYSTEM = {*(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO), errno.EMFILE, errno.ENFILE}
+
+
+def refusal(error: OSError) -> type[InputError | WriteError]:
+    """Return the kind of error by which a file that cannot be written is reported."""
+    return WriteError if error.errno in _OF_THE_SYSTEM else InputError
+
+
 class Terminated(KeyboardInterrupt):
     """SIGTERM was received, or SIGHUP of a terminal that closes."""
 

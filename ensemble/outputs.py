@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
 _MOST_LINKS = 40  # of a chain, as of Linux
 _NEW_TERMINAL = os.makedev(5, 2)  # /dev/ptmx: opening it makes a terminal
-# Files and folders that are being written, for a signal that ends the process at once.
+# Folders that are being written to, for a signal that ends the process at once.
 _unfinished: set[Path] = set()
 _STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
 
@@ -211,18 +211,8 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         with _open_device(target) as file:
             yield file
         return
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=".writing-")
-    _unfinished.add(Path(name))
-    try:
-        with os.fdopen(handle, "wb") as file:
-            yield file
-        os.chmod(name, 0o666 & ~_umask())  # mkstemp makes files private; results are for sharing
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    finally:
-        _unfinished.discard(Path(name))
+    with _staging(target.parent) as folder, (folder / target.name).open("wb") as file:
+        yield file
 
 
 def write_new(option: str, path: Path, content: Callable[[], bytes]) -> None:
@@ -263,16 +253,23 @@ def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
     (OSError). An older file of ``names`` that is not written now is removed.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    with _staging(folder) as staging:
+        yield staging
+        older = set(names) - {path.name for path in staging.iterdir()}
+    for name in older:
+        (folder / name).unlink(missing_ok=True)
+
+
+@contextmanager
+def _staging(folder: Path) -> Iterator[Path]:
+    """Make a folder inside another one; at the end its files are moved there, all or none."""
     staging = Path(tempfile.mkdtemp(dir=folder, prefix=".writing-"))
     _unfinished.add(staging)
     spare = os.open(staging, os.O_RDONLY)  # to empty it by, where no more files may be opened
     try:
         yield staging
-        written = sorted(staging.iterdir())
-        for path in written:
+        for path in sorted(staging.iterdir()):
             os.replace(path, folder / path.name)
-        for name in set(names) - {path.name for path in written}:
-            (folder / name).unlink(missing_ok=True)
     finally:
         os.close(spare)
         with suppress(OSError):  # shutil.rmtree opens several files
@@ -288,15 +285,9 @@ def _remove_folder(folder: Path) -> None:
 
 def remove_unfinished() -> None:
     """Remove what is being written, before a signal ends the process."""
-    for path in _unfinished:
+    for folder in sorted(_unfinished, reverse=True):  # one in another one comes first
         with suppress(OSError):
-            _remove_folder(path) if path.is_dir() else path.unlink()
-
-
-def _umask() -> int:
-    umask = os.umask(0)
-    os.umask(umask)
-    return umask
+            _remove_folder(folder)
 
 
 def _in_place(target: Path) -> bool:

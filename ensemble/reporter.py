@@ -20,8 +20,10 @@ _REWRITE = "\r\x1b[K"
 
 
 def log(text: str) -> None:
-    """Write a line to stderr, unbuffered, its control characters spelled out."""
-    print(printable(text), file=sys.stderr, flush=True)
+    """Write one line to stderr, in one piece, so that lines of several processes do not mix."""
+    clear = _REWRITE if sys.stderr.isatty() else ""  # a progress line may stand there
+    sys.stderr.write(f"{clear}{printable(' '.join(text.splitlines()))}\n")
+    sys.stderr.flush()
 
 
 class Display:

@@ -1,11 +1,18 @@
-"""Look up the versions of installed packages and of the code that runs."""
+"""Look up the versions of packages and code, and record how a JSON document came about."""
 
 from __future__ import annotations
 
+import hashlib
 import platform
+import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
+
+from adhesis.ensemble.quantities import units_of
+from adhesis.ensemble.regular_file import open_regular
 
 _PACKAGES = ("adhesis", "numpy", "scipy", "pyfftw", "h5py", "mpi4py")
 
@@ -155,3 +162,33 @@ def _short(library: str) -> str:
     """Cut an MPI's description of itself, which can be a page of build options, to its name."""
     lines = library.strip("\0 \n").splitlines() or ["unknown"]
     return " ".join(lines[0].split(", ident")[0].split())
+
+
+def input_record(path: Path | None) -> dict[str, Any] | None:
+    """Return name, size and checksum of an input file; None for none."""
+    if path is None:
+        return None
+    with open_regular(path) as file:
+        checksum = hashlib.file_digest(file, "sha256").hexdigest()
+        return {"file": str(path), "bytes": file.tell(), "sha256": checksum}
+
+
+def provenance(
+    words: Sequence[str],
+    source: Mapping[str, Any] | None,
+    seed: int | None,
+    document: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return the entry ``provenance`` of a document.
+
+    ``words`` are command and options as they were given, ``source`` is the :func:`input_record`,
+    and ``seed`` that of a random profile.
+    """
+    return {
+        **software(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": shlex.join(["adhesis", *words]),
+        "input": source,
+        "seed": seed,
+        "units": units_of(document),
+    }

@@ -1,7 +1,7 @@
 """Declare figures, films, tables, files and displays of results, which another module makes.
 
-``adhesis`` names the module that makes them in :data:`maker` when it is imported; that module, and
-matplotlib with it, is loaded when a result is first shown.
+``adhesis`` names the module that makes them; that module, and matplotlib with it, is loaded when a
+result is first shown.
 """
 
 from __future__ import annotations
@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 
-def _unset() -> Any:
-    raise ImportError("import adhesis first: it names the module that shows results")
+def maker() -> Any:
+    """Return the module that makes them."""
+    import adhesis
 
-
-maker: Callable[[], Any] = _unset
-"""Return the module that makes them; ``adhesis/__init__.py`` sets it."""
+    return adhesis._views()
 
 
 class NotebookDisplay:

@@ -10,7 +10,7 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -329,36 +329,18 @@ def _check_slopes(campaign: Campaign) -> None:
     """
     table = campaign.profile
     (norm,) = table.normalisation
-    names = ("period", "n0", "ratio", "rolloff", norm)
-    lists = {name: values for _, name, values in campaign.lists}
-    axes = [campaign.sweep.hurst, *(lists.get(n, (getattr(table, n),)) for n in names)]
-    rising = (-1, -1, 1, 1, 1, 1)  # how the slope changes along each
-    corners = [
-        tuple(max(axis, key=lambda v: sign * v) for axis, sign in zip(axes, signs, strict=True))
-        for signs in (rising, [-sign for sign in rising])
-    ]
-    try:
-        for corner in corners:
-            _check_slope(names, corner)
-    except ValueError:  # keys that vary together need not meet in a corner
-        keys = [axis.name for axis in campaign.axes]
-        for cell in campaign.cells:
-            here = dict(zip(keys, cell, strict=True))
-            values = (here["hurst"], *(here.get(name, getattr(table, name)) for name in names))
-            try:
-                _check_slope(names, values)
-            except ValueError as error:
-                raise InputError(
-                    f"[profile] {norm} is {shown(values[-1])} with period "
-                    f"{shown(values[1])}, so the {error}"
-                ) from None
-
-
-def _check_slope(names: Sequence[str], values: Sequence[float]) -> None:
-    """Check the slope of the spectrum with these values of H and of the keys of these names."""
-    hurst, *rest = values
-    spectrum: dict[str, Any] = dict(zip(names, rest, strict=True))
-    check_slope(math.sqrt(self_affine_profile(hurst, seed=0, **spectrum).m2))
+    names, keys = ("period", "n0", "ratio", "rolloff", norm), [axis.name for axis in campaign.axes]
+    cells = (dict(zip(keys, cell, strict=True)) for cell in campaign.cells)
+    spectra = {(c["hurst"], *(c.get(name, getattr(table, name)) for name in names)) for c in cells}
+    for hurst, *values in sorted(spectra):
+        spectrum: dict[str, Any] = dict(zip(names, values, strict=True))
+        try:
+            check_slope(math.sqrt(self_affine_profile(hurst, seed=0, **spectrum).m2))
+        except ValueError as error:
+            raise InputError(
+                f"[profile] {norm} is {shown(spectrum[norm])} with period "
+                f"{shown(spectrum['period'])}, so the {error}"
+            ) from None
 
 
 def _check_turning_point(campaign: Campaign) -> None:

@@ -39,9 +39,13 @@ def looks(first: int, batch: int, most: int) -> list[int]:
     return sorted({*range(first, most, batch), most})
 
 
-def fewest(at: Sequence[int]) -> int:
-    """Return the fewest realisations after which a cell can have enough, by its looks."""
-    first = next((place for place, count in enumerate(at) if count >= LEAST), len(at) - 1)
+def fewest(at: Sequence[int], narrow_from: float = LEAST) -> int:
+    """Return after how many realisations a cell has enough, by its looks.
+
+    Its interval is narrow enough from so many realisations on; by default, from the first look on.
+    """
+    least = max(narrow_from, LEAST)
+    first = next((place for place, count in enumerate(at) if count >= least), len(at) - 1)
     return at[min(first + LOOKS_IN_A_ROW, len(at)) - 1]
 
 

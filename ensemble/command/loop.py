@@ -18,7 +18,6 @@ from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, write_json
-from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -27,6 +26,7 @@ from adhesis.ensemble.trace.options import (
     trace_of,
     what_was_read,
 )
+from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver.checks import plain
 from adhesis.solver.loading.loop import run_loop, run_loops
 from adhesis.solver.loading.loop_result import LoopResult

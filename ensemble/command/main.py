@@ -20,7 +20,8 @@ from types import FrameType
 
 from adhesis.ensemble import errors, exit_codes
 from adhesis.ensemble.command.parser import Parser
-from adhesis.ensemble.command.streams import standard_streams, write_line
+from adhesis.ensemble.command.streams import standard_streams
+from adhesis.ensemble.reporter import log
 from adhesis.ensemble.run.interrupt import in_main_thread
 from adhesis.ensemble.run.launch import ONE_THREAD
 from adhesis.ensemble.run.ranks import launched
@@ -80,7 +81,7 @@ def main(argv: list[str] | None = None) -> int:
             time.sleep(_RANK_0_FIRST)
         if sentence:
             program = f"adhesis {name}" if name in COMMANDS else "adhesis"
-            write_line(f"{program}: {sentence}")
+            log(f"{program}: {sentence}")
     return code
 
 

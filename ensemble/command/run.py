@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
-from adhesis.ensemble.command.streams import write_line
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import log
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
-    from adhesis.ensemble.campaign.tasks import Task, Tasks
+    from adhesis.ensemble.campaign.tasks import Task
+    from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.progress import Summary
-    from adhesis.ensemble.run.session import Engine, Options
+    from adhesis.ensemble.run.session import Engine
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
@@ -105,14 +105,20 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
 
     Tests pass another engine than loops.
     """
-    from adhesis.ensemble.run.ranks import OneRank, wait_for_all, world
+    from adhesis.ensemble.run.launch import check_ranks
+    from adhesis.ensemble.run.ranks import OneRank, launched, wait_for_all, world
 
     started = time.time()
     comm: Any = OneRank()
     processes = 0
     try:
         if args.ranks is not None and not args.dry_run:
-            processes = _checked_ranks(args.ranks) - 1
+            check_ranks("--ranks", args.ranks)
+            if launched()[0] > 1:
+                raise InputError(
+                    "--ranks starts ranks of its own: leave it out under mpirun or srun"
+                )
+            processes = args.ranks - 1
         comm = world()
         code = _run(args, comm, processes, started, engine)
         return code if comm.rank == 0 else exit_codes.DONE
@@ -120,7 +126,7 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
         if comm.size == 1:
             raise
         if comm.rank == 0:
-            write_line(f"adhesis run: {error}")
+            log(f"adhesis run: {error}")
         if not wait_for_all(comm, _ALL_ARRIVE):  # the error is of this rank alone
             _end_job(comm, exit_codes.BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
         return exit_codes.BAD_INPUT if comm.rank == 0 else exit_codes.DONE
@@ -137,20 +143,10 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
         return code
 
 
-def _checked_ranks(ranks: int) -> int:
-    from adhesis.ensemble.run.launch import check_ranks
-    from adhesis.ensemble.run.ranks import launched
-
-    check_ranks("--ranks", ranks)
-    if launched()[0] > 1:
-        raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
-    return ranks
-
-
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     """End every rank: the others know nothing of this one's error and would wait for ever."""
     if sentence:
-        write_line(sentence)
+        log(sentence)
     comm.Abort(code)
 
 
@@ -161,8 +157,9 @@ def _run(
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
+    from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.ranks import together
-    from adhesis.ensemble.run.session import Options, run_campaign
+    from adhesis.ensemble.run.session import run_campaign
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
@@ -189,7 +186,10 @@ def _run(
         return exit_codes.RESUME
     if comm.rank == 0:
         _report_end(campaign, path, summary, options)
-    return _code(summary, options)
+    too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
+    if summary.pending and not too_many:
+        return exit_codes.RESUME
+    return exit_codes.SOME_FAILED if summary.failed else exit_codes.DONE
 
 
 def _check_out(args: argparse.Namespace, path: Path) -> None:
@@ -232,13 +232,6 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Optio
         )
 
 
-def _code(summary: Summary, options: Options) -> int:
-    too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
-    if summary.pending and not too_many:
-        return exit_codes.RESUME
-    return exit_codes.SOME_FAILED if summary.failed else exit_codes.DONE
-
-
 def _tell_price(
     campaign: Campaign, path: Path, args: argparse.Namespace, engine: Engine | None
 ) -> int:
@@ -248,10 +241,6 @@ def _tell_price(
 
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
-
-    def prepare(tasks: Tasks) -> None:
-        for task in tasks:
-            engine.check(campaign, task)
 
     heard = time.monotonic()
 
@@ -264,7 +253,7 @@ def _tell_price(
     estimate = price(
         *(campaign, path, part),
         compute=lambda c, t: engine.compute(c, t, None),
-        prepare=prepare,
+        check=engine.check,
         on_pilot=tried,
     )
     print(estimate)

@@ -12,36 +12,26 @@ from typing import Any
 from adhesis.ensemble.errors import WriteError, reason
 
 
-class _Stdout(io.FileIO):
-    """File descriptor of stdout: the first failure raises, what follows is dropped.
+class _Output(io.FileIO):
+    """File descriptor of stdout or stderr: a message on stderr that cannot be written is lost.
 
-    Otherwise the interpreter would try to write the rest when it ends, and report that failure,
-    too.
+    The first failure of stdout raises, what follows is dropped. Otherwise the interpreter would try
+    to write the rest when it ends, and report that failure, too.
     """
 
     _failed = False
 
     def write(self, data: Any, /) -> int:
-        if self._failed:
-            return memoryview(data).nbytes
         try:
-            return super().write(data) or 0
-        except BrokenPipeError:
-            self._failed = True
-            raise
+            if not self._failed:
+                return super().write(data) or 0
         except OSError as error:
-            self._failed = True
-            raise WriteError(f"stdout could not be written: {reason(error)}") from None
-
-
-class _Stderr(io.FileIO):
-    """File descriptor of stderr: a message that cannot be written is lost, and nothing else."""
-
-    def write(self, data: Any, /) -> int:
-        try:
-            return super().write(data) or 0
-        except OSError:
-            return memoryview(data).nbytes
+            self._failed = self.fileno() == 1
+            if isinstance(error, BrokenPipeError) and self._failed:
+                raise
+            if self._failed:
+                raise WriteError(f"stdout could not be written: {reason(error)}") from None
+        return memoryview(data).nbytes
 
 
 @contextlib.contextmanager
@@ -54,9 +44,9 @@ def standard_streams() -> Iterator[None]:
     _open_closed_descriptors()
     before = sys.stdout, sys.stderr
     if sys.stdout is sys.__stdout__:
-        sys.stdout = _stream(sys.stdout, io.BufferedWriter(_Stdout(1, "w", closefd=False)))
+        sys.stdout = _stream(sys.stdout, io.BufferedWriter(_Output(1, "w", closefd=False)))
     if sys.stderr is sys.__stderr__:
-        sys.stderr = _stream(sys.stderr, io.BufferedWriter(_Stderr(2, "w", closefd=False)), True)
+        sys.stderr = _stream(sys.stderr, io.BufferedWriter(_Output(2, "w", closefd=False)), True)
     try:
         yield
     finally:
@@ -64,13 +54,6 @@ def standard_streams() -> Iterator[None]:
             with contextlib.suppress(WriteError, OSError, ValueError):
                 stream.flush()
         sys.stdout, sys.stderr = before
-
-
-def write_line(text: str) -> None:
-    """Write one line to stderr in one piece, so that lines of several processes do not mix."""
-    clear = "\r\x1b[K" if sys.stderr.isatty() else ""  # a progress line may stand there
-    sys.stderr.write(f"{clear}{' '.join(text.splitlines())}\n")
-    sys.stderr.flush()
 
 
 def _stream(like: Any, binary: io.BufferedWriter, by_line: bool = False) -> io.TextIOWrapper:

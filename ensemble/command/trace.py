@@ -9,7 +9,6 @@ from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.exit_codes import SOME_FAILED
 from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
-from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.quantities import (
     WORK_OF_ADHESION,
     drive_text,
@@ -33,6 +32,7 @@ from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import pattern_of, prepared_of, trace_of, what_was_read
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Plan, make_plan
+from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver.model.half_space import HalfSpace
 
 

@@ -126,18 +126,23 @@ def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
             command = [*launch, *python("-m", "adhesis.ensemble.doctor.probe", scratch)]
             if launch:
                 command.append("together")
-            failure = _failure_of(command, python_environment(launch_environment(_RANKS)))
+            code, output = _run(command)
+            failure = "" if code == 0 else f"did not end within {_TIME_LIMIT:.0f} s"
+            if code:
+                # of several processes, the first page has the reason, of one the last lines
+                lines = first_lines(output) if launch else last_lines(output)
+                failure = f"ended with {code}: {lines}"
             reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
             return _Probe([report for report in reports if report], failure)
     except (OSError, WriteError) as error:
         return _Probe([], f"cannot be started: {error}")
 
 
-def _failure_of(command: list[str], env: dict[str, str]) -> str:
-    """Run a command to its end or the time limit; return its failure, empty if there is none."""
+def _run(command: list[str]) -> tuple[int | None, str]:
+    """Return the exit code of a command and what it wrote; None if it passed the time limit."""
     process = subprocess.Popen(
         command,
-        env=env,
+        env=python_environment(launch_environment(_RANKS)),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -156,12 +161,8 @@ def _failure_of(command: list[str], env: dict[str, str]) -> str:
             process.communicate()
         if not isinstance(error, subprocess.TimeoutExpired):
             raise
-        return f"did not end within {_TIME_LIMIT:.0f} s"
-    if process.returncode:
-        # of several processes, the first page has the reason, of one its traceback's last lines
-        lines = first_lines(output) if "together" in command else last_lines(output)
-        return f"ended with {process.returncode}: {lines}"
-    return ""
+        return None, ""
+    return process.returncode, output
 
 
 def _read_report(path: Path) -> dict[str, Any]:
@@ -228,17 +229,9 @@ def _writing(probe: _Probe) -> Check:
 
 def _mpirun_version(mpirun: str) -> str:
     try:
-        done = subprocess.run(
-            [mpirun, "--version"],
-            env=launch_environment(_RANKS),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=_TIME_LIMIT,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
+        _, output = _run([mpirun, "--version"])
+    except OSError as error:
         return str(error)
-    lines = [" ".join(line.split()) for line in done.stdout.splitlines()]
+    lines = [" ".join(line.split()) for line in output.splitlines()]
     # The version is in the first line of Open MPI, in the second of MPICH's Hydra.
     return next((line for line in lines if any(c.isdigit() for c in line)), "")

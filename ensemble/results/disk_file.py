@@ -7,47 +7,26 @@ succeeds in its eyes; the error of the first that did not is raised by :meth:`Di
 
 from __future__ import annotations
 
-import errno
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any
 
 import h5py
 
-from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.solver.runtime.uninterrupted import signals_held
 
-# The disk or a limit is at fault, and not the name or its permissions.
-_OF_THE_SYSTEM = {*(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO), errno.EMFILE, errno.ENFILE}
 
-
-def refusal(error: OSError) -> type[InputError | WriteError]:
-    """Return the kind of error by which a file that cannot be written is reported."""
-    return WriteError if error.errno in _OF_THE_SYSTEM else InputError
-
-
-class DiskFile(io.RawIOBase):
+class DiskFile(io.FileIO):
     """A file object for h5py, of a new file on disk ("x+b") or an old one ("r+b")."""
 
-    def __init__(self, path: Path, mode: Literal["x+b", "r+b"]) -> None:
-        self._file = path.open(mode, buffering=0)
-        self._error: OSError | None = None
+    _error: OSError | None = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Close the file; what could not be written comes before an error that followed from it."""
         self.close()
-        if error is None or isinstance(error, (OSError, RuntimeError)):
+        if kind is None or issubclass(kind, (OSError, RuntimeError)):
             self.check()
 
     def check(self) -> None:
@@ -58,59 +37,42 @@ class DiskFile(io.RawIOBase):
     def close(self) -> None:
         """Close the file, after h5py has closed its own."""
         try:
-            if hasattr(self, "_file"):  # Python closes the object also if it could not be opened
-                self._file.close()
+            super().close()
         except OSError as error:  # some disks report only now that they are full
             self._error = self._error or error
-        super().close()
 
-    def seek(self, offset: int, whence: int = 0) -> int:
-        """Move to a place."""
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        """Return the place."""
-        return self._file.tell()
-
-    def readinto(self, buffer: Any) -> int:
-        """Read from here."""
-        return self._file.readinto(buffer) or 0
-
-    def write(self, data: Any) -> int:
+    def write(self, data: Any, /) -> int:
         """Write here."""
         rest = memoryview(data).cast("B")
         length = rest.nbytes
         try:
             while rest.nbytes:
-                rest = rest[self._file.write(rest) :]
+                rest = rest[super().write(rest) :]
         except OSError as error:
             self._error = self._error or error
         return length
 
-    def truncate(self, size: int | None = None) -> int:
+    def truncate(self, size: int | None = None, /) -> int:
         """Set the length of the file."""
         try:
-            return self._file.truncate(size)
+            return super().truncate(size)
         except OSError as error:
             self._error = self._error or error
             return size or 0
 
-    def flush(self) -> None:
-        """Do nothing: nothing is held back."""
-
 
 @contextmanager
-def opened(path: Path, mode: Literal["x+b", "r+b"]) -> Iterator[tuple[h5py.File, DiskFile]]:
-    """Open a results file to write, new or old, by one process.
+def opened(path: Path) -> Iterator[h5py.File]:
+    """Open a new results file to write, by one process.
 
     Signals are held back while HDF5 opens and closes it: what a handler raises would be an error of
     the disk to HDF5. OSError also at the end, if something could not be written.
     """
-    with DiskFile(path, mode) as disk:
+    with DiskFile(path, "x+b") as disk:
         with signals_held():
-            file = h5py.File(disk, "w" if mode == "x+b" else "r+")
+            file = h5py.File(disk, "w")
         try:
-            yield file, disk
+            yield file
         finally:
             with signals_held():
                 file.close()

@@ -1,39 +1,39 @@
 """Laying a results file out: at full size, all or nothing, rows of an older file copied in.
 
-What makes it survive a kill at any moment:
-
-- The file is laid out at full size under another name, flushed to disk and renamed, so that it is
-  either there whole or not at all. A full disk is met here, before the first task.
-- Datasets are contiguous and allocated, so that writing a row changes no metadata.
-- A row is written before its status; a row whose status says "done" is whole.
-- A campaign that grew gets a new file with the old rows copied in, renamed over the old one.
+It is made under another name, flushed to disk and renamed. Datasets are contiguous and allocated,
+so that writing a row changes no metadata (docs/results-file.md, "How it is written").
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part
-from adhesis.ensemble.errors import InputError, reason
+from adhesis.ensemble.errors import InputError, reason, refusal
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.copy_rows import Source, copy_dataset
-from adhesis.ensemble.results.disk_file import opened, refusal
+from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.task.dataset import Dataset, sizes_of
+from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.runtime.uninterrupted import signals_held
+
+_BLOCK_BYTES = 16 * 2**20
+
+Rows = NDArray[np.intp]
 
 
 def check_results_file(option: str, path: Path) -> None:
@@ -70,59 +70,52 @@ def create(
     campaign: Campaign,
     *,
     part: Part = WHOLE,
-    versions: Mapping[str, str] | None = None,
-    grown_from: Results | None = None,
+    attributes: Mapping[str, Any] | None = None,
+    sources: Sequence[Source] = (),
 ) -> None:
     """Lay out a results file at full size, by one process; all or nothing.
 
-    It is replaced if it exists; of a symbolic link, the file that it leads to. Of ``grown_from``, a
-    file of a campaign that this one extends, the rows are copied. Signals are held back meanwhile:
-    h5py would drop what their handlers raise. InputError if the file cannot be written or the disk
-    is too small, WriteError if the disk does not take it.
+    It is replaced if it exists; of a symbolic link, the file that it leads to. ``attributes`` are
+    root attributes beside those that the campaign decides. InputError if the file cannot be written
+    or the disk is too small, WriteError if the disk does not take it.
     """
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
     if unfinished.is_dir() and not unfinished.is_symlink():
         raise InputError(f"{path} cannot be written: there is a directory {unfinished}, remove it")
-    with signals_held():
-        try:
-            check_space(path, campaign, part)
-            # Made anew, so that a link of that name is removed and not followed.
-            unfinished.unlink(missing_ok=True)
-            with opened(unfinished, "x+b") as (file, _):
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    try:
+        check_space(path, campaign, part)
+        # Made anew, so that a link of that name is removed and not followed.
+        unfinished.unlink(missing_ok=True)
+        with opened(unfinished) as file:
+            with signals_held():  # h5py would drop what their handlers raise
                 reserve_head(file)
                 _lay_out(file, campaign, part)
-                _describe(file, campaign, part, versions or {}, grown_from)
-                if grown_from is not None:
-                    _copy_rows(grown_from, file, campaign)  # a part does not grow
-            write_head(unfinished)
-            with unfinished.open("rb") as handle:
-                os.fsync(handle.fileno())
-            unfinished.replace(path)
-        except OSError as error:
-            raise refusal(error)(f"{path} cannot be written: {reason(error)}") from error
-        finally:
-            with suppress(OSError):  # what another user has put there meanwhile
-                unfinished.unlink(missing_ok=True)
+                file.attrs.update(schema.fixed_attributes(campaign, part))
+                file.attrs.update({"created": now, "laid_out": now} | dict(attributes or {}))
+            copy_rows(sources, file)
+        write_head(unfinished)
+        with unfinished.open("rb") as handle:
+            os.fsync(handle.fileno())
+        unfinished.replace(path)
+    except OSError as error:
+        raise refusal(error)(f"{path} cannot be written: {reason(error)}") from error
+    finally:
+        with suppress(OSError):  # what another user has put there meanwhile
+            unfinished.unlink(missing_ok=True)
 
 
 def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
-    laid_out = schema.scales(campaign, part)
-    sizes = sizes_of(laid_out)
-    for scale in laid_out:
-        dataset = file.create_dataset(scale.name, data=scale.values)
-        dataset.make_scale(scale.name)
-        dataset.attrs.update(schema.description(scale))
-    for column in schema.datasets(campaign):
-        dataset = _allocate(file, column, schema.shape_of(column, sizes))
-        dataset.attrs.update(schema.description(column))
+    for column, shape, values in schema.members(campaign, part):
+        dataset = _allocate(file, column, shape)
+        if not column.dims:
+            dataset.make_scale(column.name)
+        dataset.attrs.update(column.described)
         for axis, dim in enumerate(column.dims):
             dataset.dims[axis].attach_scale(file[dim])
-    tasks = campaign.tasks(part)
-    for column in schema.TASK_DATASETS:
-        file[column.name][...] = tasks.column(column.name)
-    for name, column in zip(tasks.names, schema.axis_datasets(campaign), strict=True):
-        file[column.name][...] = tasks.column(name)
+        if values is not None:
+            dataset[...] = values()
 
 
 def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.Dataset:
@@ -139,27 +132,62 @@ def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.
     return h5py.Dataset(h5py.h5d.create(file.id, column.name.encode(), kind, space, plist))
 
 
-def _describe(
-    file: h5py.File,
-    campaign: Campaign,
-    part: Part,
-    versions: Mapping[str, str],
-    old: Results | None,
+# ---------------------------------------------------------------------- rows of other files
+
+
+def rows_in(campaign: Campaign, file: Results) -> Rows:
+    """Return the row in a whole campaign, from which the file's has grown, of each of its tasks."""
+    cells = campaign.tasks().of_cells()
+    place = {campaign.identity(task): number for number, task in enumerate(cells)}
+    tasks, here = file.tasks(), file.tasks().of_cells()
+    there = np.zeros(len(tasks.cells), np.intp)
+    there[here.cell_of()] = [place[file.campaign.identity(task)] for task in here]
+    rows: Rows = there[tasks.cell_of()] * campaign.realisations + tasks.column("realisation")
+    return rows
+
+
+class Source:
+    """A file to take rows from, and where they go in the file of a whole campaign."""
+
+    def __init__(self, results: Results, campaign: Campaign, taken: NDArray[np.bool_]) -> None:
+        self.results = results
+        self.target = rows_in(campaign, results)  # row of each row, ascending
+        self.taken = taken  # rows that this file gives
+        self._kept_rows = results.column(KEPT)
+        # A task that kept its fields does so in a grown campaign: realisations are only added.
+        self._kept = np.searchsorted(schema.kept_rows(campaign), self.target[self._kept_rows])
+
+    def row_of(self, target: int) -> int:
+        """Row of a task, by its row in the merged file."""
+        return int(np.searchsorted(self.target, target))
+
+    def places(self, dataset: Dataset) -> tuple[Rows, NDArray[np.bool_]]:
+        """Return the places of the rows of a dataset, and which of them are given."""
+        if dataset.dims[0] == KEPT:
+            return self._kept, self.taken[self._kept_rows]
+        return self.target, self.taken
+
+
+def copy_rows(sources: Sequence[Source], file: h5py.File) -> None:
+    """Copy what each source gives; signals are held back during a block."""
+    for dataset in schema.ROW_DATASETS if sources else ():
+        there = file[dataset.name]
+        width = max(1, int(np.prod(there.shape[1:])) * there.dtype.itemsize)
+        step = max(1, _BLOCK_BYTES // width)
+        for start in range(0, there.shape[0], step):
+            with signals_held():
+                _copy_block(sources, there, dataset, start, min(start + step, there.shape[0]))
+
+
+def _copy_block(
+    sources: Sequence[Source], there: h5py.Dataset, dataset: Dataset, start: int, stop: int
 ) -> None:
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    file.attrs.update(
-        {
-            **schema.fixed_attributes(campaign, part),
-            "created": now if old is None else old.attributes.get("created", now),
-            "laid_out": now,
-            **versions,
-        }
-    )
-
-
-def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
-    """Copy every row but those that are damaged: in the new file they are pending."""
-    source = Source(old, campaign, old.status() != schema.DAMAGED)
-    for column in schema.DATASETS:
-        if column not in schema.TASK_DATASETS:
-            copy_dataset([source], file, column, 0, file[column.name].shape[0])
+    block = there[start:stop]
+    for source in sources:
+        target, taken = source.places(dataset)
+        low, high = np.searchsorted(target, (start, stop))
+        chosen = taken[low:high]
+        if np.any(chosen):
+            values = source.results.column(dataset.name, slice(int(low), int(high)))
+            block[target[low:high][chosen] - start] = values[chosen]
+    there[start:stop] = block

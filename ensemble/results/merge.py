@@ -1,12 +1,13 @@
 """Joining results files of one campaign: parts that were computed apart become one file.
 
 What is joined is a results file like any other: it can be resumed, merged into again, and grown.
-Memory is bounded by a block of rows, whatever the number and size of the parts; a kill leaves a
-sound file, and the same merge again goes on.
+Memory is bounded by a block of rows, whatever the number and size of the parts. The file is written
+anew and renamed: a kill leaves the old one.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -18,22 +19,15 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.errors import InputError, WriteError, reason
+from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.copy_rows import Source, copy_dataset
-from adhesis.ensemble.results.disk_file import opened
-from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.layout import Source, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS, TIMES
-from adhesis.solver.runtime.uninterrupted import signals_held
 
-_BLOCK_ROWS = 4096
 # Times may differ between two computations of one task; nothing else may, and fields follow.
 _COMPARED = tuple(d for d in RESULT_DATASETS if d not in TIMES and d.dims[0] != KEPT)
-_COPIED = tuple(
-    d for d in schema.DATASETS if d not in schema.TASK_DATASETS and d is not schema.STATUS
-)
 
 
 @dataclass(frozen=True)
@@ -54,8 +48,7 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
 
     ``out`` is made, or is a file of the same campaign, or of one that grew from it; the caller
     holds its lock. InputError before anything is written, if a file is damaged or foreign, or if
-    two hold a row with different bits; WriteError if the disk does not take it: the same merge goes
-    on.
+    two hold a row with different bits; WriteError if the disk does not take it.
     """
     out = Path(out)
     with ExitStack() as stack:
@@ -75,18 +68,27 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
             raise InputError(f"{out} is part {there.part if there else ''} of its campaign itself")
         doubts = [doubt for file in opened for doubt in file.doubts()]
         sources = _assign(opened, campaign, status, there)
+        of_file = {*schema.fixed_attributes(campaign), "part", "laid_out"}
         if there is None:
-            of_file = {*schema.fixed_attributes(campaign), "part", "created", "laid_out"}
-            known = opened[0].attributes.items()
-            create(out, campaign, versions={k: v for k, v in known if k not in of_file})
-        else:
-            there.close()
-        _copy(sources, out)
+            of_file.add("created")
+        known = (opened[0] if there is None else there).attributes.items()
+        attributes = {name: value for name, value in known if name not in of_file}
+        taken = sum(int(source.taken.sum()) for source in sources)
+        if there is None:
+            create(out, campaign, attributes=attributes, sources=sources)
+        elif taken and not os.access(out, os.W_OK):
+            raise InputError(f"{out} cannot be written: permission denied")
+        elif taken:
+            stays = there.status() != schema.DAMAGED
+            for source in sources:
+                stays[source.target[source.taken]] = False
+            old = Source(there, campaign, stays)
+            create(out, campaign, attributes=attributes, sources=[old, *sources])
     return Merged(
         total=status.size,
         done=int(np.sum(status == schema.DONE)),
         failed=int(np.sum(status == schema.FAILED)),
-        taken=sum(int(source.taken.sum()) for source in sources),
+        taken=taken,
         doubts=tuple(doubts),
     )
 
@@ -145,26 +147,3 @@ def _compare(source: Source, row: int, other: Results, there: int) -> None:
                 f"{source.results.path} and {other.path} both hold {source.results.tasks()[row]}, "
                 f"and their {dataset.name} differs"
             )
-
-
-def _copy(sources: Sequence[Source], out: Path) -> None:
-    """Write the rows that were assigned, block by block, the status of a block last."""
-    try:
-        with opened(out, "r+b") as (file, disk):
-            kept = file[KEPT][:]
-            for first in range(0, file["task"].size, _BLOCK_ROWS):
-                stop = first + _BLOCK_ROWS
-                if not any(source.gives(first, stop) for source in sources):
-                    continue
-                with signals_held():
-                    of_kept = np.searchsorted(kept, (first, stop)).tolist()
-                    for dataset in _COPIED:
-                        rows = of_kept if dataset.dims[0] == KEPT else (first, stop)
-                        copy_dataset(sources, file, dataset, *rows)
-                    file.flush()
-                    disk.check()
-                    copy_dataset(sources, file, schema.STATUS, first, stop)
-                    file.flush()
-                    disk.check()
-    except OSError as error:
-        raise WriteError(f"{out} could not be written: {reason(error)}") from error

@@ -19,7 +19,7 @@ from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import HEAD, check_head
-from adhesis.ensemble.task.dataset import KEPT, sizes_of
+from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
 from adhesis.solver.checks import shown
 
 _MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
@@ -57,7 +57,7 @@ class Results:
             self._file = h5py.File(self.path, "r", locking=False)
         try:
             with _damage(self.path):
-                self._check_members()
+                self._check_links()
                 self._check_size()
                 self.attributes = self._root_attributes()
                 schema.check_version(
@@ -65,11 +65,10 @@ class Results:
                 )
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
                 self.part = self._part()
-                self._datasets = schema.datasets(self.campaign)
-                self._check_layout()
                 self._check_attributes()
-                self._check_scales()
-                self._tasks = self._checked_tasks()
+                self._check_members()
+                self._sizes = sizes_of(schema.scales(self.campaign, self.part))
+                self._tasks = self.campaign.tasks(self.part)
         except BaseException:
             self._file.close()
             raise
@@ -88,7 +87,7 @@ class Results:
                 "campaign can have there"
             )
 
-    def _check_members(self) -> None:
+    def _check_links(self) -> None:
         """Refuse links to elsewhere, before any member of the root is looked up.
 
         To look up a link to another file opens that one, for which a pipe lets HDF5 wait.
@@ -123,85 +122,62 @@ class Results:
                 f"with 1 ≤ K ≤ N, as 3/20; {_INSTEAD}"
             ) from None
 
-    def _check_layout(self) -> None:
-        """Compare shapes and types with those of the campaign, before anything of them is read."""
-        missing = [column.name for column in self._datasets if column.name not in self._file]
-        if missing:
-            raise InputError(
-                f"{self.path} was written by another state of adhesis, without {missing[0]}: read "
-                "it with that one, or compute the campaign again into another file"
-            )
-        if schema.file_size(self.campaign, self.part) > os.path.getsize(self.path):
-            raise ValueError("truncated")
-        wanted = schema.scales(self.campaign, self.part)
-        self._sizes = sizes_of(wanted)
-        for scale in wanted:
-            self._check_dataset(scale.name, scale.values.shape, scale.values.dtype)
-        for column in self._datasets:
-            self._check_dataset(
-                column.name, schema.shape_of(column, self._sizes), np.dtype(column.dtype)
-            )
-
-    def _check_dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
-        found = self._file[name]
-        if found.shape != shape or found.dtype != dtype:
-            raise ValueError(name)
-        if found.is_virtual or found.external:
-            raise ValueError(name)  # its numbers would be those of other files
-
     def _check_attributes(self) -> None:
-        """Compare the attributes with those that the campaign and the layout have.
+        """Compare the root attributes with those that the campaign decides.
 
-        Readers of other programs go by them: by a seed, a unit, or a factor of a dataset.
+        Readers of other programs go by them, as by the seed.
         """
-        for name, value in (
-            {"part": None} | schema.fixed_attributes(self.campaign, self.part)
-        ).items():
+        wanted = {"part": None} | schema.fixed_attributes(self.campaign, self.part)
+        for name, value in wanted.items():
             found: Any = self.attributes.get(name)
             if name not in _WORDING and not np.array_equal(found, value):
                 raise InputError(
                     f"{self.path} is damaged: its attribute {name} is {shown(found)}, and that of "
                     f"its campaign is {shown(value)}; {_INSTEAD}"
                 )
-        wanted = {s.name: schema.description(s) for s in schema.scales(self.campaign, self.part)}
-        for column in self._datasets:
-            wanted[column.name] = schema.description(column)
-            of_dims = [[scale.name for scale in d.values()] for d in self._file[column.name].dims]
-            if of_dims != [[f"/{name}"] for name in column.dims]:
-                raise ValueError(column.name)
-        for name, attributes in wanted.items():
-            found = self._file[name].attrs
-            if set(found) - _OF_HDF5 != set(attributes):
-                raise ValueError(name)
-            for key in attributes.keys() - _WORDING:
-                if not np.array_equal(found[key], attributes[key]):
-                    raise ValueError(name)
 
-    def _check_scales(self) -> None:
-        for scale in schema.scales(self.campaign, self.part):
-            found = self._file[scale.name][:]
-            if not np.allclose(found, scale.values, rtol=_SCALE_ROUNDING, atol=0.0):
-                raise InputError(
-                    f"{self.path} is damaged: its {scale.name} is not that of its campaign; "
-                    f"{_INSTEAD}"
-                )
+    def _check_members(self) -> None:
+        """Compare scales and datasets with what would be laid out for the campaign.
 
-    def _checked_tasks(self) -> Tasks:
-        """Return the tasks of the campaign, which those of the file must be."""
-        tasks = self.campaign.tasks(self.part)
-        columns = [(d.name, d.name) for d in schema.TASK_DATASETS]
-        further = zip(schema.axis_datasets(self.campaign), tasks.names, strict=True)
-        columns += [(dataset.name, axis) for dataset, axis in further]
-        for name, axis in columns:
-            found, wanted = self._file[name][:], tasks.column(axis)
-            wrong = np.flatnonzero(found != wanted)
-            if wrong.size:
-                row = int(wrong[0])
-                raise InputError(
-                    f"{self.path} is damaged: its tasks are not those of its campaign ({name} of "
-                    f"row {row} is {found[row]} instead of {wanted[row]}); {_INSTEAD}"
-                )
-        return tasks
+        Numbers are read when all headers are right: one could promise more of them than memory
+        holds, or those of other files.
+        """
+        wanted = schema.members(self.campaign, self.part)
+        missing = [m.dataset.name for m in wanted if m.dataset.name not in self._file]
+        if missing:
+            raise InputError(
+                f"{self.path} was written by another state of adhesis, without {missing[0]}: read "
+                "it with that one, or compute the campaign again into another file"
+            )
+        if sum(member.nbytes for member in wanted) > os.path.getsize(self.path):
+            raise ValueError("truncated")
+        for dataset, shape, _ in wanted:
+            found = self._file[dataset.name]
+            dims = [[scale.name for scale in dim.values()] for dim in found.dims]
+            if (
+                (found.shape, found.dtype) != (shape, np.dtype(dataset.dtype))
+                or (found.is_virtual or found.external)
+                or set(found.attrs) - _OF_HDF5 != set(dataset.described)
+                or (dataset.dims and dims != [[f"/{name}"] for name in dataset.dims])
+            ):
+                raise ValueError(dataset.name)
+            for key, value in dataset.described.items():
+                if key not in _WORDING and not np.array_equal(found.attrs[key], value):
+                    raise ValueError(dataset.name)
+        for dataset, _, values in wanted:
+            if values is not None:
+                self._check_values(dataset, values())
+
+    def _check_values(self, dataset: Dataset, wanted: NDArray[Any]) -> None:
+        found = self._file[dataset.name][:]
+        rounding = 0.0 if dataset.dims else _SCALE_ROUNDING
+        wrong = np.flatnonzero(~np.isclose(found, wanted, rtol=rounding, atol=0.0))
+        if wrong.size:
+            row = int(wrong[0])
+            raise InputError(
+                f"{self.path} is damaged: its {dataset.name} is not that of its campaign "
+                f"({found[row]} instead of {wanted[row]} in row {row}); {_INSTEAD}"
+            )
 
     def __enter__(self) -> Self:
         return self

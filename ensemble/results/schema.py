@@ -7,8 +7,10 @@ compares the two.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,17 +91,6 @@ def axis_datasets(campaign: Campaign) -> tuple[Dataset, ...]:
     )
 
 
-def datasets(campaign: Campaign) -> tuple[Dataset, ...]:
-    """Return all datasets of a campaign's results file, besides the scales."""
-    return (*TASK_DATASETS, *axis_datasets(campaign), *RUN_DATASETS, *RESULT_DATASETS)
-
-
-def description(described: Dataset | Scale) -> dict[str, Any]:
-    """Return the attributes of a dataset."""
-    further = described.attributes if isinstance(described, Dataset) else {}
-    return {"units": described.unit, "long_name": described.meaning, **further}
-
-
 def kept_rows(campaign: Campaign, part: Part = WHOLE) -> NDArray[np.intp]:
     """Return the rows of the tasks that keep their fields, in the file of a part."""
     realisation = campaign.rows(part) % campaign.realisations
@@ -123,18 +114,39 @@ def same_rows(one: Campaign, two: Campaign) -> bool:
     )
 
 
-def shape_of(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:
-    """Return the shape of a dataset, from the sizes of the dimensions."""
-    return (sizes[dataset.dims[0]], *row_shape(dataset, sizes))
+class Member(NamedTuple):
+    """A scale or dataset in the file of one campaign, as it is laid out and as readers want it."""
+
+    dataset: Dataset  # without dimensions of a scale
+    shape: tuple[int, ...]
+    # Returns the numbers that the campaign decides; None where a run writes them
+    values: Callable[[], NDArray[Any]] | None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of its numbers."""
+        return np.dtype(self.dataset.dtype).itemsize * math.prod(self.shape)
+
+
+def members(campaign: Campaign, part: Part = WHOLE) -> list[Member]:
+    """Return the scales and then the datasets of the file of a campaign, or of a part of it."""
+    laid_out, tasks = scales(campaign, part), campaign.tasks(part)
+    sizes, further = sizes_of(laid_out), axis_datasets(campaign)
+    known = {d.name: partial(tasks.column, d.name) for d in TASK_DATASETS}
+    for dataset, axis in zip(further, tasks.names, strict=True):
+        known[dataset.name] = partial(tasks.column, axis)
+    found = []
+    for s in laid_out:
+        scale = Dataset(s.name, (), s.values.dtype.str, s.unit, s.meaning)
+        found.append(Member(scale, s.values.shape, partial(np.asarray, s.values)))
+    for d in (*TASK_DATASETS, *further, *RUN_DATASETS, *RESULT_DATASETS):
+        found.append(Member(d, (sizes[d.dims[0]], *row_shape(d, sizes)), known.get(d.name)))
+    return found
 
 
 def file_size(campaign: Campaign, part: Part = WHOLE) -> int:
     """Bytes of a campaign's results file, without headers."""
-    sizes = sizes_of(scales(campaign, part))
-    return sum(
-        int(np.prod(shape_of(dataset, sizes), dtype=object)) * np.dtype(dataset.dtype).itemsize
-        for dataset in datasets(campaign)
-    )
+    return sum(member.nbytes for member in members(campaign, part))
 
 
 def fixed_attributes(campaign: Campaign, part: Part = WHOLE) -> dict[str, Any]:

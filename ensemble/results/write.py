@@ -9,7 +9,6 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import h5py
@@ -72,15 +71,10 @@ class Writer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         # Closing is collective: a rank that failed alone must not wait here for the others. And
         # HDF5 1.10 crashes when all ranks close a file that it cannot write to.
-        if error is None or self._disk is not None:
+        if kind is None or self._disk is not None:
             self.close()
 
     def close(self) -> None:

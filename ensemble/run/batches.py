@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 
 from adhesis.ensemble.campaign.precision import Precision, enough, looks, precision
 from adhesis.ensemble.campaign.tables import Campaign
@@ -20,6 +21,11 @@ class _Cell:
     values: dict[int, float] = field(default_factory=dict)  # by realisation; NaN if it failed
     asked: int = 0
     full: bool = False
+
+    def missing(self, first: int, last: int) -> list[int]:
+        """Return the rows without a value of some realisations."""
+        stretch = enumerate(self.rows[first:last], start=first)
+        return [row for realisation, row in stretch if realisation not in self.values]
 
 
 class Batches:
@@ -48,17 +54,13 @@ class Batches:
     @property
     def to_do(self) -> list[int]:
         """Rows of the batches that are not complete."""
-        return [
-            row
-            for cell in self._cells.values()
-            for realisation, row in enumerate(cell.rows[: cell.asked])
-            if realisation not in cell.values
-        ]
+        return [row for cell in self._cells.values() for row in cell.missing(0, cell.asked)]
 
     @property
     def not_needed(self) -> list[int]:
         """Rows without a result of the cells that have enough."""
-        return [row for cell in self._cells.values() if cell.full for row in self._left(cell)]
+        cells = (cell for cell in self._cells.values() if cell.full)
+        return [row for cell in cells for row in cell.missing(0, len(cell.rows))]
 
     @property
     def precisions(self) -> list[tuple[str, Precision]]:
@@ -88,24 +90,14 @@ class Batches:
         if cell.full:
             return [], []
         self._advance(cell)
-        further = [
-            r
-            for realisation, r in enumerate(cell.rows[before : cell.asked], start=before)
-            if realisation not in cell.values
-        ]
-        return further, self._left(cell) if cell.full else []
-
-    @staticmethod
-    def _left(cell: _Cell) -> list[int]:
-        return [row for r, row in enumerate(cell.rows) if r not in cell.values]
+        further = cell.missing(before, cell.asked)
+        return further, cell.missing(0, len(cell.rows)) if cell.full else []
 
     def _advance(self, cell: _Cell) -> None:
         """Ask for batches until one is not complete, or the cell has enough."""
-        known = 0
-        if any(r not in cell.values for r in range(cell.asked)):
+        if cell.missing(0, cell.asked):
             return
-        while known in cell.values:
-            known += 1
+        known = next(r for r in count() if r not in cell.values)
         stop = enough([cell.values[r] for r in range(known)], self._looks, self._wanted)
         cell.full = stop is not None
         if stop is None:

@@ -9,7 +9,7 @@ Tasks are numbers; what one means, and where its result goes, is the business of
                            it raises ends the run (a disk that fails is not a task that fails).
 ``collect(outcome)``       on the master, after the worker already has its next task.
 
-Messages go through a :class:`Channel`: MPI between ranks, pipes between processes of one machine,
+Messages go through a :class:`Channel`: MPI between ranks, sockets between processes of one machine,
 or :class:`OwnWorker`, where the master's process works itself. A waiting rank looks for a message
 and sleeps, it never spins: blocking receives burn a core each. Every task that a worker is sent is
 answered exactly once, done or given up, so the master knows at any time what is in flight, and a

@@ -1,13 +1,10 @@
 """Keep a second run out of a results file, by a lock beside it: ``FILE.h5.lock``.
 
 HDF5 keeps no second writer out (under MPI it takes no lock at all). The lock is the operating
-system's, on a file beside the results: it ends with the process that holds it, however that ends,
-so the lock file of a killed run is not locked. Ranks may outlive a killed launcher by
-seconds; each rank that writes therefore holds its share, and a new run waits for the last of them.
-
-On Linux it is a lock of the open file: a second run is kept out in the same process, too, and the
-lock lasts whatever else that process opens and closes. Elsewhere it is one of the process (POSIX),
-which keeps out other processes alone and ends when any descriptor of the lock file is closed.
+system's (flock), on a file beside the results: it ends with the process that holds it, however that
+ends, so the lock file of a killed run is not locked. It keeps out a second run of the same process,
+too. Ranks may outlive a killed launcher by seconds; each rank that writes therefore holds a share,
+and a new run, which takes the whole lock before its share, waits for the last of them.
 
 The lock belongs to the file itself: a symbolic link to a results file has no lock of its own. Where
 others can write to the folder, a link in place of the lock is refused, not followed.
@@ -21,7 +18,6 @@ import json
 import os
 import socket
 import stat
-import struct
 import sys
 import time
 from collections.abc import Mapping
@@ -30,23 +26,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, refusal
 from adhesis.ensemble.escape import one_line
 from adhesis.ensemble.outputs import target_of
 from adhesis.solver.checks import counted
 
-# Two bytes far beyond the text are locked: for the run as a whole, and for ranks that write.
-_RUN, _WRITERS = 1 << 30, (1 << 30) + 1
-# Linux: struct flock, and the three kinds of a lock.
-_OF_OPEN_FILE = sys.platform == "linux" and hasattr(fcntl, "F_OFD_SETLK")
-_FLOCK = "hhqqi4x"
-_TYPES = {
-    fcntl.LOCK_SH: fcntl.F_RDLCK,
-    fcntl.LOCK_EX: fcntl.F_WRLCK,
-    fcntl.LOCK_UN: fcntl.F_UNLCK,
-}
-_UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
-_FULL = {errno.ENOSPC, errno.EDQUOT}
+_UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}
 # Without O_NONBLOCK, opening a pipe in place of the lock file would block.
 _SAFELY = os.O_NOFOLLOW | os.O_NONBLOCK
 _MAX_RECORD = 4096  # bytes
@@ -70,9 +55,12 @@ class RunLock:
         """
         deadline = time.monotonic() + patience
         announced = False
-        while not self._try(_RUN):
+        while not self._try():
             if time.monotonic() >= deadline:
-                raise InputError(f"{self._results} is being written by another run{self._holder()}")
+                raise InputError(
+                    f"{self._results} is being written by another run{self._holder()}, or by ranks "
+                    "that have outlived it: wait until they have ended"
+                )
             if not announced and patience > 1:
                 print(
                     f"{self._results} is held by another run{self._holder()}; "
@@ -83,21 +71,12 @@ class RunLock:
                 announced = True
             time.sleep(_RETRY_INTERVAL)
         self._owner = True
-        while not self._lock(_WRITERS, fcntl.LOCK_EX):
-            if time.monotonic() >= deadline:
-                self.release()
-                raise InputError(
-                    f"{self._results} is still being written by ranks of an earlier run: "
-                    "end them, or wait until they have ended"
-                )
-            time.sleep(_RETRY_INTERVAL)
-        self._lock(_WRITERS, fcntl.LOCK_SH)
         self._write_record(ranks)
 
     def join(self) -> None:
         """Hold a share of the lock, by any other rank that writes, after rank 0 has acquired it."""
-        self._open()
-        self._lock(_WRITERS, fcntl.LOCK_SH)
+        with suppress(OSError):  # rank 0 has warned
+            fcntl.flock(self._open(), fcntl.LOCK_SH)
 
     def __enter__(self) -> Self:
         return self
@@ -112,37 +91,41 @@ class RunLock:
             return
         if self._owner and not keep_file:
             self.path.unlink(missing_ok=True)
-        for byte in (_RUN, _WRITERS):  # a process that was forked meanwhile has the open file, too
-            with suppress(OSError):
-                _set_lock(self._descriptor, fcntl.LOCK_UN, byte)
+        with suppress(OSError):  # a process that was forked meanwhile has the open file, too
+            fcntl.flock(self._descriptor, fcntl.LOCK_UN)
         os.close(self._descriptor)
         self._descriptor, self._owner = None, False
 
-    def _try(self, byte: int) -> bool:
+    def _try(self) -> bool:
         """Lock the file that is at the path now: its last holder may just have removed it."""
-        self._open()
-        assert self._descriptor is not None
-        if self._lock(byte, fcntl.LOCK_EX):
-            locked = os.fstat(self._descriptor)
-            try:
-                current = os.stat(self.path)
-            except FileNotFoundError:
-                current = None
-            if current is not None and os.path.samestat(current, locked):
+        descriptor = self._open()
+        try:
+            # Between both another run may take it: the second fails then.
+            for kind in (fcntl.LOCK_EX, fcntl.LOCK_SH):
+                fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.stat(self.path), os.fstat(descriptor)):
+                    return True
+        except OSError as error:
+            if error.errno in _UNSUPPORTED:
+                print(
+                    f"warning: the file system of {self.path} has no locks; "
+                    "make sure that no other run writes there",
+                    file=sys.stderr,
+                )
                 return True
-        os.close(self._descriptor)
+        os.close(descriptor)
         self._descriptor = None
         return False
 
-    def _open(self) -> None:
+    def _open(self) -> int:
         if self._descriptor is None:
             try:
                 descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | _SAFELY, 0o666)
             except OSError as error:
                 if error.errno in (errno.ELOOP, errno.ENXIO, errno.EISDIR):
                     raise self._no_lock() from None
-                kind = WriteError if error.errno in _FULL else InputError
-                raise kind(f"{self.path} cannot be written: {error.strerror}") from error
+                raise refusal(error)(f"{self.path} cannot be written: {error.strerror}") from error
             found = os.fstat(descriptor)
             # With a second name (hard link) it may be a file of the user's: the record would
             # overwrite it.
@@ -150,27 +133,12 @@ class RunLock:
                 os.close(descriptor)
                 raise self._no_lock()
             self._descriptor = descriptor
+        return self._descriptor
 
     def _no_lock(self) -> InputError:
         return InputError(
             f"{self.path} is a link or no ordinary file, and not the lock of a run: remove it"
         )
-
-    def _lock(self, byte: int, kind: int) -> bool:
-        assert self._descriptor is not None
-        try:
-            _set_lock(self._descriptor, kind, byte)
-        except OSError as error:
-            if error.errno in _UNSUPPORTED:
-                if byte == _RUN:
-                    print(
-                        f"warning: the file system of {self.path} has no locks; "
-                        "make sure that no other run writes there",
-                        file=sys.stderr,
-                    )
-                return True
-            return False
-        return True
 
     def _write_record(self, ranks: int) -> None:
         assert self._descriptor is not None
@@ -197,30 +165,19 @@ def _lock_of(results: Path) -> Path:
     return results.with_name(f"{results.name}.lock")
 
 
-def _set_lock(descriptor: int, kind: int, byte: int) -> None:
-    """Lock or release one byte of a file without waiting (OSError)."""
-    if _OF_OPEN_FILE:
-        try:
-            lock = struct.pack(_FLOCK, _TYPES[kind], os.SEEK_SET, byte, 1, 0)
-            fcntl.fcntl(descriptor, fcntl.F_OFD_SETLK, lock)
-            return
-        except OSError as error:
-            if error.errno != errno.EINVAL:  # a system that does not know these locks
-                raise
-    fcntl.lockf(descriptor, kind | (0 if kind == fcntl.LOCK_UN else fcntl.LOCK_NB), 1, byte)
-
-
 def holder(results: Path | str) -> dict[str, Any] | None:
     """Return which run writes to a results file now: host, pid, ranks, since; None if none does.
 
     The lock is held for a moment only. On a file system without locks None is returned.
     """
-    try:
-        descriptor = os.open(_lock_of(Path(results)), os.O_RDONLY | _SAFELY)
-    except OSError:
+    for mode in (os.O_RDWR, os.O_RDONLY):  # some file systems lock alone what may be written
+        with suppress(OSError):
+            descriptor = os.open(_lock_of(Path(results)), mode | _SAFELY)
+            break
+    else:
         return None
     try:
-        _set_lock(descriptor, fcntl.LOCK_SH, _RUN)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         return None if error.errno in _UNSUPPORTED else _read_record(descriptor) or {}
     finally:

@@ -6,8 +6,9 @@ import math
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,13 @@ from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.results.layout import check_space, create
+from adhesis.ensemble.results.layout import Source, check_space, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.batches import Batches
+from adhesis.ensemble.run.interrupt import Deadline
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.task.compute import check_task
 from adhesis.ensemble.versions import versions
 from adhesis.solver.checks import counted
 
@@ -36,27 +37,42 @@ class Selection:
     """Rows to compute again."""
 
     status: Literal["failed", "all"]
-    # By the name of an attribute of tasks; if there are any, only tasks with one of them
+    # By the name of a column of tasks; if there are any, only tasks with one of them
     values: Mapping[str, Collection[float]] = field(default_factory=dict)
 
-    def check(self, tasks: Sequence[Task]) -> None:
+    def check(self, tasks: Tasks) -> None:
         """Refuse values that the campaign does not have (InputError)."""
         for name, chosen in self.values.items():
-            known = {getattr(task, name) for task in tasks}
+            known = np.unique(tasks.column(name)).tolist()
             for value in chosen:
                 if value not in known:
-                    values = ", ".join(f"{v:g}" for v in sorted(known)[:_MOST_SHOWN])
+                    values = ", ".join(f"{v:g}" for v in known[:_MOST_SHOWN])
                     more = ", …" if len(known) > _MOST_SHOWN else ""
                     raise InputError(
                         f"{parameter(name)} is {value:g}: this campaign has no such task, "
                         f"only {values}{more}"
                     )
 
-    def takes(self, task: Task, status: int) -> bool:
-        """Whether a row is selected."""
-        return (status == FAILED or (self.status == "all" and status == DONE)) and all(
-            getattr(task, name) in chosen for name, chosen in self.values.items() if chosen
-        )
+    def rows(self, tasks: Tasks, status: NDArray[np.uint8]) -> list[int]:
+        """Return the rows that are selected, by the status of each task."""
+        selected = np.isin(status, (FAILED, DONE) if self.status == "all" else FAILED)
+        for name, chosen in self.values.items():
+            if chosen:
+                selected &= np.isin(tasks.column(name), list(chosen))
+        return np.flatnonzero(selected).tolist()
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a run."""
+
+    part: Part = WHOLE  # the share of the tasks to compute
+    redo: Selection | None = None  # rows to compute again
+    max_failures: int | None = 20  # so many failed tasks stop the run
+    deadline: Deadline | None = None  # when to give up what is in flight
+    patience: float = 10.0  # how long to wait for another run to let go of the results file, in s
+    # Processes that compute beside this one where there are no ranks; 0 computes here
+    processes: int = 0
 
 
 @dataclass(frozen=True)
@@ -78,19 +94,17 @@ def prepare(
     path: Path,
     lock: RunLock,
     size: int,
-    *,
-    part: Part = WHOLE,
-    redo: Selection | None = None,
-    patience: float = 0.0,
-    say: Callable[[str], None] = lambda text: None,
-    check: Callable[[Campaign, Task], None] = check_task,
+    options: Options,
+    say: Callable[[str], None],
+    check: Callable[[Campaign, Task], None],
 ) -> Plan:
     """Lock, check everything, make or extend the file, and find what is to be done; by rank 0.
 
     Only tasks that are to be computed are checked, as that loads the solver. ``size`` is the number
-    of ranks; ``patience`` how long to wait for another run, in s; ``say`` gets a line about what
-    was found; ``check`` raises InputError if a task cannot be set up.
+    of ranks; ``say`` gets a line about what was found; ``check`` raises InputError if a task cannot
+    be set up.
     """
+    part, redo = options.part, options.redo
     tasks = campaign.tasks(part)
     if part != WHOLE and campaign.stop.relative_error is not None:
         raise InputError(
@@ -109,59 +123,49 @@ def prepare(
                 f"not exist: leave it out, or give the file ({parameter('out')})"
             )
 
-    def check_cells(chosen: Tasks) -> None:
-        for task in chosen.of_cells():
-            check(campaign, task)
+    @cache
+    def check_cell(task: Task) -> None:
+        check(campaign, task)
+
+    def lay_out(sources: Sequence[Source] = (), **attributes: Any) -> None:
+        check_space(path, campaign, part)
+        for task in tasks.of_cells():
+            check_cell(task)
+        created = versions() | attributes
+        create(path, campaign, part=part, attributes=created, sources=sources)
 
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise InputError(f"{path} cannot be written: the folder {path.parent} is read-only")
     if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
         raise InputError(f"{path} cannot be written: permission denied")
-    lock.acquire(size, patience)
-    if not os.path.exists(path):
-        check_space(path, campaign, part)
-        check_cells(tasks)
-        create(path, campaign, part=part, versions=versions())
-        batches = Batches(campaign, tasks, {}) if campaign.stop.relative_error else None
-        rows = batches.to_do if batches else list(range(len(tasks)))
-        say(f"{path}: {len(rows)} tasks to do{' at first' if batches else ''}")
-        return Plan(tasks, rows, 0, 0, batches=batches)
-    with Results(path) as old:
-        grown_keys = growth(path, old.campaign, campaign)
-        if old.part != part:
-            held = "the whole campaign" if old.part == WHOLE else f"part {old.part} of it"
-            raise InputError(f"{path} holds {held}, and part {part} is wanted")
-        if grown_keys and part != WHOLE:
-            raise InputError(
-                f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "
-                "parts are merged into does"
-            )
-        if grown_keys and not same_rows(old.campaign, campaign):
-            raise InputError(
-                f"{path} cannot grow by {', '.join(grown_keys)}: the bins of its "
-                "spectra would change (they follow the highest n0 · ratio of the campaign)"
-            )
-        before = len(old)
-        if grown_keys:
-            check_space(path, campaign, part)
-            check_cells(tasks)
-            create(path, campaign, part=part, versions=versions(), grown_from=old)
-            if old.damaged().size:
-                say(f"{old.damage()}{_AGAIN}")
+    lock.acquire(size, options.patience)
+    grown = ""
+    is_new = not os.path.exists(path)
+    if is_new:
+        lay_out()
+    else:
+        with Results(path) as old:
+            grown_keys = _growth(path, old, campaign, part)
+            if grown_keys:
+                source = Source(old, campaign, old.status() != DAMAGED)
+                lay_out([source], created=old.attributes.get("created"))
+                grown = f", {len(tasks) - len(old)} of them new"
+                if old.damaged().size:
+                    say(f"{old.damage()}{_AGAIN}")
     with Results(path) as results:
         status = results.status()
         again = np.flatnonzero(status == DAMAGED).tolist()
         if again:
             say(f"{results.damage()}{_AGAIN}")
         if redo is not None:
-            states = zip(results.tasks(), status.tolist(), strict=True)
-            chosen = [row for row, (task, state) in enumerate(states) if redo.takes(task, state)]
+            chosen = redo.rows(results.tasks(), status)
             say(f"{path}: {counted(len(chosen), 'task')} to be computed again")
             again += chosen
         status[again] = PENDING
         plan = _plan(results, status)
     # where nothing is left, the solver is not loaded
-    check_cells(plan.tasks.chosen(plan.tasks.rows[plan.rows]))
+    for task in plan.tasks.chosen(plan.tasks.rows[plan.rows]).of_cells():
+        check_cell(task)
     if again or plan.batches is not None:
         with Writer(path) as writer:
             writer.reset(again)
@@ -170,13 +174,34 @@ def prepare(
                 writer.mark([row for row in spare if status[row] == PENDING], needed=False)
                 wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
                 writer.mark(sorted(wanted), needed=True)
-    grown = f", {len(plan.tasks) - before} of them new" if grown_keys else ""
+    if is_new:
+        say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
+        return plan
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
         f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
         + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
     )
     return plan
+
+
+def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[str, ...]:
+    """Return the keys by which a file has to grow; InputError where it cannot be the campaign's."""
+    grown_keys = growth(path, old.campaign, campaign)
+    if old.part != part:
+        held = "the whole campaign" if old.part == WHOLE else f"part {old.part} of it"
+        raise InputError(f"{path} holds {held}, and part {part} is wanted")
+    if grown_keys and part != WHOLE:
+        raise InputError(
+            f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "
+            "parts are merged into does"
+        )
+    if grown_keys and not same_rows(old.campaign, campaign):
+        raise InputError(
+            f"{path} cannot grow by {', '.join(grown_keys)}: the bins of its "
+            "spectra would change (they follow the highest n0 · ratio of the campaign)"
+        )
+    return grown_keys
 
 
 def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:

@@ -21,7 +21,7 @@ from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import duration, percent
-from adhesis.ensemble.results.copy_rows import rows_in
+from adhesis.ensemble.results.layout import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.plan import group_of, prior
@@ -36,10 +36,8 @@ PILOT_SECONDS = 60.0
 _MOST_CELLS_SHOWN = 60
 # Ranks are worth having as long as they are busy for this share of the time.
 _BUSY = 0.8
-# With [stop]: loops beyond the first of their cells before their spread says anything, and what
-# the rule takes more than one that knew the spread (docs/campaign-file.md).
+# With [stop]: loops beyond the first of their cells before their spread says anything.
 _FEWEST_FOR_SPREAD = 6
-_MORE_THAN_LEAST = 1.3
 # Of the power law through the cells that were tried: fewest cells, least range of the logarithm of
 # their priors, and bounds of its power.
 _FEWEST_FOR_POWER, _NARROW, _POWERS = 3, 0.1, (0.5, 3.0)
@@ -179,7 +177,7 @@ def price(
     *,
     seconds: float = PILOT_SECONDS,
     compute: Callable[[Campaign, Task], Row] | None = None,
-    prepare: Callable[[Tasks], None] = lambda tasks: None,
+    check: Callable[[Campaign, Task], None] = lambda campaign, task: None,
     on_pilot: Callable[[Task, float], None] = lambda task, seconds: None,
 ) -> Price:
     """Estimate what a campaign costs; writes nothing.
@@ -187,7 +185,7 @@ def price(
     Cells of which loops are done in the results file cost what those did. Of the others loops are
     tried out for ``seconds``, the first realisation of each, then the second …; what was not
     reached is extrapolated by how the tasks of such cells usually compare. Loops that share a
-    loading branch are tried out together. ``prepare`` is called with the first task still to do of
+    loading branch are tried out together. ``check`` is called with the first task still to do of
     each cell before one is tried out, ``on_pilot`` after each loop with its CPU time in s.
     InputError if the results file is damaged, or holds another campaign.
     """
@@ -197,8 +195,8 @@ def price(
     left, done = tasks, 0
     if path is not None and os.path.exists(path):
         left, done = _left(campaign, path, tasks, known)
-    if left:
-        prepare(left.of_cells())
+    for task in left.of_cells():
+        check(campaign, task)
     to_try = _to_try(left, known)
     pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
     short: list[float] = []
@@ -321,8 +319,7 @@ def _realisations(campaign: Campaign, known: _Known) -> tuple[int, str]:
     if not loops:
         return at[-1], f"[stop]: {few} to {at[-1]} realisations a cell; the price is for {at[-1]}"
     assert campaign.stop.relative_error is not None
-    needed = _MORE_THAN_LEAST * (1.96 * spread / campaign.stop.relative_error) ** 2
-    count = next((look for look in at if look >= max(needed, few)), at[-1])
+    count = fewest(at, (1.96 * spread / campaign.stop.relative_error) ** 2)
     return count, (
         f"[stop]: about {count} realisations a cell, as {campaign.stop.quantity} of {loops} loops "
         f"scatters by {percent(spread)} so far; at least {few}, at most {at[-1]}"

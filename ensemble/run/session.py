@@ -13,16 +13,16 @@ from typing import Any, TextIO
 import h5py
 
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
-from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
+from adhesis.ensemble.run.interrupt import GRACE, StopSignals
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
+from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
@@ -49,22 +49,8 @@ class Engine:
     all_write: bool = bool(h5py.get_config().mpi)
     # Makes what stands around a rank's loop of handing out or working
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
-    silence: float = (
-        dispatch.SILENCE
-    )  # how long a rank may not be heard from until the run ends, in s
-
-
-@dataclass(frozen=True)
-class Options:
-    """Options of a run."""
-
-    part: Part = WHOLE  # the share of the tasks to compute
-    redo: Selection | None = None  # rows to compute again
-    max_failures: int | None = 20  # so many failed tasks stop the run
-    deadline: Deadline | None = None  # when to give up what is in flight
-    patience: float = 10.0  # how long to wait for another run to let go of the results file, in s
-    # Processes that compute beside this one where there are no ranks; 0 computes here
-    processes: int = 0
+    # How long a rank may not be heard from until the run ends, in s
+    silence: float = dispatch.SILENCE
 
 
 def run_campaign(
@@ -97,15 +83,7 @@ def run_campaign(
         stack.push(lock)
         try:
             plan = together(
-                comm,
-                lambda: prepare(
-                    *(campaign, path, lock, size),
-                    part=options.part,
-                    redo=options.redo,
-                    patience=options.patience,
-                    say=say,
-                    check=engine.check,
-                ),
+                comm, lambda: prepare(campaign, path, lock, size, options, say, engine.check)
             )
         except WriteError:
             lock.release()  # no other rank writes yet

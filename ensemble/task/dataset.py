@@ -35,6 +35,11 @@ class Dataset:
         kind = np.dtype(self.dtype).kind
         return {"f": np.nan, "i": -1, "u": 0, "S": b""}[kind]
 
+    @property
+    def described(self) -> dict[str, Any]:
+        """The attributes that it has in a file."""
+        return {"units": self.unit, "long_name": self.meaning, **self.attributes}
+
 
 @dataclass(frozen=True)
 class Scale:

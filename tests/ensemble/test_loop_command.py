@@ -16,8 +16,8 @@ from matplotlib.image import imread
 import adhesis
 import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.provenance import provenance
 from adhesis.ensemble.quantities import units_of
+from adhesis.ensemble.versions import provenance
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
 from tests.support.options import replacing

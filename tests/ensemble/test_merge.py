@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+
 import h5py
 import numpy as np
 import pytest
@@ -9,7 +11,8 @@ import pytest
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.results import layout
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.merge import merge
@@ -142,7 +145,7 @@ def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tm
     assert "p2.h5 is damaged or truncated, or another program has changed" in refused([two], out)
     write_head(two)
     sentence = refused([two], out)
-    assert "p2.h5 is damaged: its tasks are not those of its campaign (seed of row 3 is" in sentence
+    assert "p2.h5 is damaged: its seed is not that of its campaign (" in sentence
     two.write_bytes(two.read_bytes()[:5000])
     assert "damaged or truncated" in refused([one, two], out)
     assert "merged into itself" in refused([one, out], out)
@@ -151,6 +154,28 @@ def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tm
         [one, tmp_path / "link.h5"], out
     )
     assert "is part 1/2 of its campaign" in refused([again], one)
+
+
+def test_a_merge_that_the_disk_refuses_leaves_the_old_file(tmp_path, monkeypatch):
+    """Rows are copied into a new file, so that no moment leaves half of a row behind."""
+    one, two = parts(tmp_path, 2)
+    out = tmp_path / "all.h5"
+    merge([one], out)
+    before = out.read_bytes()
+    copy = layout._copy_block
+
+    def full(sources, there, dataset, start, stop):
+        if dataset.name == "loss":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        copy(sources, there, dataset, start, stop)
+
+    with monkeypatch.context() as then:
+        then.setattr(layout, "_copy_block", full)
+        with pytest.raises(WriteError, match=r"all\.h5 cannot be written: No space left on device"):
+            merge([two], out)
+    assert out.read_bytes() == before
+    assert not list(tmp_path.glob("*.part"))
+    assert merge([two], out).done == 12
 
 
 def test_a_part_is_what_it_is(tmp_path, capsys):

@@ -140,6 +140,14 @@ def test_fewest_realisations_are_those_of_a_cell_without_any_spread(first, batch
     assert enough(np.ones(most), at, 0.01) == count
 
 
+@pytest.mark.parametrize(("spread", "wanted"), [(0.4, 0.1), (0.49, 0.05), (0.25, 0.05)])
+def test_the_price_of_a_spread_is_what_the_rule_takes_in_the_median(spread, wanted):
+    """To one batch: the interval is narrow when expected, and three more looks follow."""
+    at, rng = looks(8, 8, 1000), np.random.default_rng(0)
+    taken = [enough(rng.normal(1, spread, 1000), at, wanted) for _ in range(60)]
+    assert abs(fewest(at, (1.96 * spread / wanted) ** 2) - np.median(taken)) <= 8
+
+
 @pytest.mark.parametrize(
     ("draw", "wanted"),
     [

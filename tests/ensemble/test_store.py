@@ -26,7 +26,6 @@ from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, scales
 from adhesis.ensemble.results.write import DatasetRows, Writer
-from adhesis.ensemble.run import lock as lock_module
 from adhesis.ensemble.run.lock import RunLock, holder
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS
@@ -42,7 +41,7 @@ def campaign():
 @pytest.fixture
 def path(tmp_path, campaign):
     path = tmp_path / "r.h5"
-    create(path, campaign, versions={"mpi": "none"})
+    create(path, campaign, attributes={"mpi": "none"})
     return path
 
 
@@ -340,9 +339,8 @@ def wanted_by_another_process(path):
     return subprocess.run(command, capture_output=True, check=False).returncode != 0
 
 
-@pytest.mark.skipif(not lock_module._OF_OPEN_FILE, reason="needs locks of open files")
 def test_the_lock_lasts_whatever_its_process_opens_and_closes(tmp_path):
-    """A lock of the process would end when the first descriptor of its file is closed."""
+    """A POSIX lock would end when the first descriptor of its file is closed."""
     path = tmp_path / "r.h5"
     with RunLock(path) as lock:
         lock.acquire(1, 0.0)
@@ -354,7 +352,6 @@ def test_the_lock_lasts_whatever_its_process_opens_and_closes(tmp_path):
     assert not wanted_by_another_process(path)
 
 
-@pytest.mark.skipif(not lock_module._OF_OPEN_FILE, reason="needs locks of open files")
 def test_a_process_that_was_forked_meanwhile_does_not_keep_a_lock_that_was_released(tmp_path):
     path, (end, write) = tmp_path / "r.h5", os.pipe()
     lock = RunLock(path)
@@ -379,8 +376,7 @@ def test_a_file_system_without_locks_is_used_after_a_warning(tmp_path, monkeypat
     def refuse(*_):
         raise OSError(getattr(errno, code), os.strerror(getattr(errno, code)))
 
-    monkeypatch.setattr(fcntl, "lockf", refuse)
-    monkeypatch.setattr(fcntl, "fcntl", refuse)
+    monkeypatch.setattr(fcntl, "flock", refuse)
     path = tmp_path / "r.h5"
     with RunLock(path) as lock:
         lock.acquire(2, 0.0)
@@ -409,7 +405,7 @@ def test_the_lock_stays_after_a_failure_so_that_ranks_that_still_write_are_met(t
             lambda: orphans.append(holding(path, join=True)),
         )
     try:
-        with pytest.raises(InputError, match="ranks of an earlier run"):
+        with pytest.raises(InputError, match="ranks that have outlived it"):
             RunLock(path).acquire(1, 0.2)
     finally:
         orphans[0].kill()

@@ -9,9 +9,9 @@ import pytest
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
-from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.layout import Source, create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DATASETS
+from adhesis.ensemble.results.schema import DATASETS, DONE
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
@@ -406,7 +406,7 @@ def test_only_first_realisations_keep_fields_through_reset_and_growth(tmp_path):
         "field_realisations = 2\n", realisations="4", work_of_adhesion="[0.01, 0.02, 0.04]"
     )
     with Results(path) as old:
-        create(path, larger, grown_from=old)
+        create(path, larger, sources=[Source(old, larger, old.status() == DONE)])
     with Results(path) as grown:
         tasks = [grown.tasks()[row] for row in grown.column(KEPT)]
         assert [task.realisation for task in tasks] == [0, 1] * 6

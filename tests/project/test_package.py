@@ -99,6 +99,9 @@ def test_a_star_import_leaves_the_built_in_names_alone() -> None:
 
 COMMANDS = """
 import os, sys
+before = {*sys.modules}
+import adhesis.__main__
+print("\\nloaded start", *{*sys.modules} - before)
 from adhesis.ensemble.command.main import COMMANDS, main
 def loaded(stage):
     print("\\nloaded", stage, *{name.split(".")[0] for name in sys.modules})
@@ -138,6 +141,8 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     lines = (line.split() for line in done.stdout.splitlines() if line.startswith("loaded "))
     loaded = {stage: set(names) for _, stage, *names in lines}
     numeric = {"scipy", "matplotlib", "mpi4py"}
+    # Until there is a handler, Ctrl-C is a traceback.
+    assert loaded["start"] & {"typing", "pathlib", "re"} == set()
     assert loaded["help"] & (numeric | {"numpy", "h5py", "pandas", "rich"}) == set()
     assert loaded["adhesis"] & (numeric | {"h5py", "xarray", "rich"}) == set()
     assert loaded["nothing_to_do"] & numeric == set()

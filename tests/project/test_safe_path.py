@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import signal
 import subprocess
 import sys
+from multiprocessing import Pipe
 
 import pytest
 
@@ -62,8 +62,8 @@ PARENT = """
 import json, subprocess, sys, time
 from adhesis.ensemble.run.launch import python, python_environment
 worker = subprocess.Popen(
-    python("-m", "adhesis.ensemble.run.process_worker", "1"),
-    stdin=int(sys.argv[1]),
+    python("-m", "adhesis.ensemble.run.processes", "1", sys.argv[1]),
+    pass_fds=[int(sys.argv[1])],
     env=python_environment(),
 )
 print(json.dumps(worker.pid), flush=True)
@@ -73,27 +73,26 @@ time.sleep(600)
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the system ends children on Linux alone")
 def test_a_worker_ends_with_its_parent_even_if_that_is_killed():
-    """Its pipe is held open by this process, so that the pipe's end does not end it."""
-    theirs, ours = os.pipe()
+    """Its socket is held open by this process, so that the socket's end does not end it."""
+    ours, theirs = Pipe()
     parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(theirs)],
+        [sys.executable, "-c", PARENT, str(theirs.fileno())],
         env=environment(),
         stdout=subprocess.PIPE,
-        pass_fds=[theirs],
+        pass_fds=[theirs.fileno()],
     )
-    os.close(theirs)
     try:
         worker = json.loads(parent.stdout.readline())
-        with os.fdopen(os.dup(ours), "wb") as jobs:
-            pickle.dump((divmod, None, 10.0), jobs)
-            pickle.dump((False, ("task", 0)), jobs)
-        while (message := pickle.load(parent.stdout))[0] == "alive":
+        ours.send((divmod, None, 10.0))
+        ours.send((False, ("task", 0)))
+        while (message := ours.recv())[0] == "alive":
             pass
         assert message[0] == "outcome"  # so it has come to its task
         parent.send_signal(signal.SIGKILL)
         parent.wait()
         wait_until(lambda: has_ended(worker))
     finally:
-        os.close(ours)
+        ours.close()
+        theirs.close()
         parent.kill()
         parent.wait()

@@ -181,7 +181,7 @@ def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
 
 def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
     """Write a results file with these rows."""
-    create(path, campaign, versions={"adhesis_version": "0.1.0"})
+    create(path, campaign, attributes={"adhesis_version": "0.1.0"})
     with h5py.File(path, "r+") as file:
         for name, value in rows.items():
             file[name][...] = value
