@@ -96,7 +96,10 @@ def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
 
 def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
     """Return the unit of the heights, of the option or of the header; None without either."""
-    found = units_of_header(table.header, table.fields)[-1]
+    stated = units_of_header(table.header, table.fields)
+    found = stated.units[-1]
+    if stated.other[-1]:
+        raise InputError(f"{stated.other[-1]!r} in the header of {source} is no length")
     if given is not None:
         if found not in (None, given):
             raise InputError(
@@ -104,16 +107,14 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
                 "wrong one"
             )
         return given
-    if found is not None:
-        return found
-    for line in table.header:
-        word = _POSSIBLE_UNIT.search(line)
-        if word is not None:
-            raise InputError(
-                f"the header of {source} has {word[0]!r}, from which the unit of the heights is "
-                "not clear: give --unit, as in --unit um"
-            )
-    return None
+    words = () if found else filter(None, map(_POSSIBLE_UNIT.search, table.header))
+    unclear = stated.unclear or next((word[0] for word in words), None)
+    if unclear:
+        raise InputError(
+            f"the header of {source} has {unclear!r}, from which the unit of the heights is not "
+            "clear: give --unit, as in --unit um"
+        )
+    return found
 
 
 def few_heights_warning(heights: Array, name: str) -> str | None:

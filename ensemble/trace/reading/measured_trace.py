@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from adhesis.ensemble.errors import InputError, parameter, reason, refused_as_in
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
+    HeaderUnits,
+    names_positions,
     parse_units,
     step_of_header,
     units_of_header,
@@ -40,10 +42,11 @@ _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
 _SAME = 1e-9
 # So many heights of a row or column of a map do not rise or fall throughout by chance.
 _NO_CHANCE = 6
+_KINDS = ("positions", "heights")
 # Names of a column that counts the points.
 _COUNTS = re.compile(
-    r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*"
-    r"|.*[(\[]\s*(px|pixels?|pts?|points?|samples?|#|-|1)\s*[)\]]\W*",
+    r"\W*((data|mess|sample|scan)?\W*(no|nr|number|n|i|idx|index|points?|punkt|sample|row|pixels?|px"
+    r"|frame|#))?\W*|.*[(\[]\s*(px|pixels?|pts?|points?|samples?|#|-|1)\s*[)\]]\W*",
     re.I,
 )
 
@@ -356,8 +359,9 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
         values = source.to_numpy(dtype=float, na_value=np.nan)
     except (TypeError, ValueError) as error:
         raise InputError(f"the table holds more than numbers: {error}") from None
-    table = _columns_of("the table", values, tuple(header))
-    return "the table", table
+    # a unit that is given beside the names needs none of them
+    names = tuple(str(units.get(n) or name) for n, name in zip(source.columns, header, strict=True))
+    return "the table", replace(_columns_of("the table", values, tuple(header)), fields=(names,))
 
 
 def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table:
@@ -402,16 +406,20 @@ def _from_table(
     found = units_of_header(table.header, fields)
     first = [row[0] for row in fields if re.search(r"[\w#]", row[0])]
     is_named = any(map(_COUNTS.fullmatch, first))
-    if len(columns) == 2 and found[0] is None and (is_named or _counts_points(columns[0])):
-        step = _step_beside_count(name, table, is_named, columns[0], unit, step)
+    if len(columns) == 2 and found.units[0] is None and (is_named or _counts_points(columns[0])):
+        step = _step_beside_count(name, table, is_named, first, columns[0], unit, step)
         if step is not None:
             columns = columns[1:]
             notes.append("the first column counts the points")
-    named = units_of_header((), fields)  # by the names of the columns, not by other lines
-    (x_unit, z_unit), given_by = _units(name, found, named, unit, columns, step)
+    (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
     column, heights = heights, heights * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
+    if found.depth:
+        notes.append(
+            f"their column is named {found.depth!r}: give {parameter('invert')} if they grow into "
+            "the sample"
+        )
     if gaps:
         notes.append(gaps)
     if table.empty_lines:
@@ -539,7 +547,13 @@ def _counts_points(x: Array) -> bool:
 
 
 def _step_beside_count(
-    name: str, table: Table, is_named: bool, column: Array, unit: str | None, step: float | None
+    name: str,
+    table: Table,
+    is_named: bool,
+    names: Sequence[str],
+    column: Array,
+    unit: str | None,
+    step: float | None,
 ) -> float | None:
     """Return the step of heights beside a column that may count the points; None if it does not.
 
@@ -553,10 +567,16 @@ def _step_beside_count(
         )
     if step is not None:
         return step
-    stated = step_of_header(name, table.header, table.decimal)
+    counts = is_named or unit is not None
+    stated = step_of_header(name, table.header, table.decimal, counts=counts)
     if stated is None and is_named:
         raise InputError(
             f"the first column of {name} counts the points: give {parameter('step')}, as in 0.5um"
+        )
+    if stated is None and unit is not None and names and not names_positions(names[-1]):
+        raise InputError(
+            f"the first column of {name}, {names[-1]!r}, may count the points: give "
+            f"{parameter('step')}, as in 0.5um"
         )
     if stated is not None and unit is not None and not is_named:
         counted_as = LENGTH.units[parse_units(unit)[0]]
@@ -585,31 +605,40 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
 
 
 def _units(
-    name: str,
-    found: list[str | None],
-    named: list[str | None],
-    unit: str | None,
-    columns: Array,
-    step: float | None,
+    name: str, found: HeaderUnits, unit: str | None, columns: Array, step: float | None
 ) -> tuple[tuple[str, str], str]:
-    if len(columns) == 1:
-        found, named = [found[-1]] * 2, [named[-1]] * 2
+    """Return the units of positions and heights, and what states them."""
+    kinds = range(2 - len(columns), 2)  # of heights alone the second
+    for kind in kinds:
+        if found.other[kind]:
+            raise InputError(
+                f"{found.other[kind]!r} in the header of {name} is no length: the "
+                f"{_KINDS[kind]} must be lengths"
+            )
+    stated = found.units if len(columns) == 2 else (found.units[1],) * 2
     if unit is not None:
         given = parse_units(unit)
         source = parameter("unit")
-        for kind in range(2 - len(columns), 2):
-            if named[kind] not in (None, given[kind]):
+        for kind in kinds:
+            if stated[kind] in (None, given[kind]):
+                continue
+            if found.by_name:
                 raise InputError(
-                    f"{parameter('unit')} is {given[kind]} for the {('positions', 'heights')[kind]}"
-                    f", and the header of {name} has {named[kind]}: correct the wrong one"
+                    f"{parameter('unit')} is {given[kind]} for the {_KINDS[kind]}, and the header "
+                    f"of {name} has {stated[kind]}: correct the wrong one"
                 )
-            if found[kind] not in (None, given[kind]):
-                source += f", against {found[kind]} in a line of the header"
+            source += f", against {stated[kind]} in a line of the header"
         return given, source
-    if found[0] is not None and found[1] is not None:
-        return (found[0], found[1]), "header"
-    if found[0] is not None or found[1] is not None:
-        known = "positions" if found[0] else "heights"
+    if found.unclear:
+        raise InputError(
+            f"{name} states no unit that is clear: {found.unclear!r} in its header is not known to "
+            f"name {' and '.join(_KINDS[2 - len(columns) :])}, so give {parameter('unit')}, as in "
+            f"{'mm,um' if len(columns) == 2 else 'um'}, if the numbers are lengths"
+        )
+    if stated[0] is not None and stated[1] is not None:
+        return (stated[0], stated[1]), "header"
+    if stated[0] is not None or stated[1] is not None:
+        known = "positions" if stated[0] else "heights"
         count = f", or {parameter('step')} if the first column counts the points"
         raise InputError(
             f"the header of {name} states the unit of the {known} alone: give {parameter('unit')} "

@@ -50,6 +50,7 @@ _OTHER_TEXTS = {
     re.compile(rb"\s*ISO ?5436|(?s:.*)\nCX [AIM] "): "a profile in the form of ISO 5436-2 (SMD)",
     re.compile(rb"[ab](ISO|BCR)\s*-\s*\d"): "a variant of SDF (ISO 25178-71)",
     re.compile(rb"DSAA\s"): "a grid of Surfer (DSAA)",
+    re.compile(rb"Zygo XYZ"): "a file of Zygo (XYZ), whose positions are numbers of pixels",
 }
 
 
