@@ -109,7 +109,7 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
         return given
     words = () if found else filter(None, map(_POSSIBLE_UNIT.search, table.header))
     unclear = stated.unclear or next((word[0] for word in words), None)
-    if unclear:
+    if unclear and found != "m":
         raise InputError(
             f"the header of {source} has {unclear!r}, from which the unit of the heights is not "
             "clear: give --unit, as in --unit um"

@@ -218,7 +218,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a column named A": (["x (um),A", *TWO], {}, "unit of the positions alone"),
     "a resolution": (["Vertical resolution (nm)", "Data", *ZS], {"step": STEP}, "states no unit"),
     "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* must hold 2 num"),
-    "a damaged last height": ([*ZS[:-1], "0.5l"], Z_UM, r"line 400 .* has '0\.5l'"),
+    "a damaged last height": ([*ZS[:-1], "0.5l"], Z_UM, r"line 400 .* is '0\.5l'"),
     "a damaged first row": ([UM, "0.000,-0.5l", *TWO[1:]], {}, "line 2 of .* above the numbers"),
     "SMD": ("\r\n".join(SMD), {}, r"ISO 5436-2 \(SMD\).* export the trace as text"),
     "SMD without a name": ("\r\n".join(["1 2", "PRF 1", *SMD[2:]]), {}, r"ISO 5436-2 \(SMD\)"),
@@ -235,18 +235,18 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "thousands by points": (
         [f"{500 * k:,};{1e3 * float(z):.0f}".replace(",", ".") for k, z in enumerate(ZS)],
         {"unit": "nm"},
-        r"numbers such as '1\.000' beside whole ones below 1000: take the signs of thousands out",
+        r"such as '1\.000', and none whose '\.' is a decimal sign for certain: give decimal",
     ),
     "perhaps thousands by commas": (
         ["Step: 0.5 um", "z (nm)", *(f"{5e3 + 1e3 * float(z):,.0f}" for z in ZS)],
         {},
-        r"such as '5,200', and none whose comma is a decimal sign for certain: give decimal",
+        r"such as '5,200', and none whose ',' is a decimal sign for certain: give decimal",
     ),
     "perhaps thousands in both columns": (
         ["x (nm);z (nm)", *(f"{1000 + 500 * k:,};{9 + float(z):.3f}".replace(".", ",")
                            for k, z in enumerate(ZS))],
         {},
-        r"such as '1,000', and none whose comma is a decimal sign for certain: give decimal",
+        r"such as '1,000', and none whose ',' is a decimal sign for certain: give decimal",
     ),
     "a multiple of a unit": (["x (um),z (x10 nm)", *TWO], {}, "states no unit"),
     "a unit times a number": (["x (um),z [nm × 10]", *TWO], {}, "states no unit"),
@@ -263,7 +263,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "units within the cells": (
         ["x;z", *(f"{x} um;{z} um" for x, z in PAIRS)],
         {},
-        r"line 2 of .* has '0\.000 um', a unit or word within the cell",
+        r"line 2 of .* has '0\.000 um', which is no number .*: take signs of thousands, units",
     ),
     "a shorter trace between spaces": (
         [*(f"{x} {z} {x} {z}" for x, z in PAIRS), "      200.0 0.1"],
@@ -329,14 +329,14 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
     "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
-    "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "decimal is 'x': it must be '.' or ','"),
+    "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "'x': it must be one of '.', ','"),
     "a column of words": ([f"{row},yes" for row in TWO], {}, "line 1 .* 'yes', which is no number"),
     "thousands with a given form": (
         [f"{500 * k:,};{z}" for k, z in enumerate(ZS)],
         {"decimal": ".", "delimiter": ";"},
         "line 3 .* has '1,000', which is no number with a decimal point",
     ),
-    "quoted rows": ([f'"{row}"' for row in TWO], {}, "such as '0.000,.*quotes about whole rows"),
+    "quoted rows": ([f'"{row}"' for row in TWO], {}, "line 1 .* '0.000,.*quotes about rows out"),
     "SDF cut off": (["aISO-1.0", *SDF[:40]], {}, "begins as an instrument's file, .* cut off"),
     "rounded positions, and a row left out": (
         [UM, *(f"{1.08 * k:.0f},{z}" for k, z in enumerate(ZS) if k != 200)],

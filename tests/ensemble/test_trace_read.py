@@ -305,7 +305,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "points of thousands": (
         [f"1.{k:03d},5;0,1" for k in range(99)],
         {"unit": "um"},
-        "fields such as",
+        "line 1 .* has '1.000,5', which is no number",
     ),
     "one number or two": (
         [f"{k % 7},{k % 3}" for k in range(99)],

@@ -190,7 +190,7 @@ class HeaderUnits:
 
     units: tuple[str | None, str | None] = (None, None)
     by_name: bool = False  # whether the columns have them, and not lines of their own
-    unclear: str = ""  # a name that has a unit of length, but metres, and is not understood
+    unclear: str = ""  # a name that has a unit of length and is not understood
     other: tuple[str, str] = ("", "")  # names that have units of other quantities
     depth: str = ""  # name by which heights may grow into the sample
 
@@ -238,7 +238,7 @@ def _row_of_units(row: Sequence[_Column], above: Sequence[_Column] | None) -> He
         text = name.text if name is column else f"{name.text} {column.text}".strip()
         is_clear = column.unit is not None and name.names(positions=k < len(row) - 1)
         is_other = bare or column.other != "-" if column.other else False
-        if column.has_length and not is_clear and not is_other and column.unit != "m":
+        if column.has_length and not is_clear and not is_other:
             unclear = unclear or text
         units.append(column.unit)
         other.append(text if is_other else "")

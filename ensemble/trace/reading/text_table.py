@@ -23,16 +23,12 @@ from adhesis.ensemble.trace.reading.missing_heights import may_be_code
 from adhesis.ensemble.trace.reading.printed_numbers import (
     COMMENT,
     DELIMITERS,
-    find_delimiter,
     find_form,
-    flaw_of,
-    has_signs_of_thousands,
-    is_grouped,
     is_missing,
     is_without_words,
     looks_like_numbers,
-    marks_thousands,
     printed_form,
+    refuse_thousands,
     shown_line,
     split,
     value,
@@ -104,7 +100,7 @@ def read_column(source: Source, delimiter: str | None = None, decimal: str | Non
     rows = [place for place, line in enumerate(lines) if looks_like_numbers(line)]
     if len(rows) == 1:
         row = lines[rows[0]]
-        words = split(row, delimiter or find_delimiter(source, [row], decimal))
+        words = split(row, find_form(source, [row], delimiter, decimal)[0])
         if len(words) > 1:
             lines[rows[0] : rows[0] + 1] = words
             delimiter = "|"  # none is left
@@ -202,10 +198,15 @@ class _Reader:
         if adjoins and (_DIGIT.match(line) or is_without_words(line)):
             return True
         if self.count == 1:
-            return is_grouped(line) or (" " not in line and _DIGIT.match(line) is not None)
-        first = split(line, self.delimiter)[0]
-        number = value(first, self.decimal)
-        return (number is not None and not isnan(number)) or is_grouped(first)
+            return " " not in line and _DIGIT.match(line) is not None
+        number = value(split(line, self.delimiter)[0], self.decimal)
+        return number is not None and not isnan(number)
+
+    def refuse(self, place: int, sentence: str) -> NoReturn:
+        """Raise InputError about a line."""
+        raise InputError(
+            f"line {place + 1} of {self.source} is {shown_line(self.lines[place])}{sentence}"
+        )
 
 
 def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
@@ -230,16 +231,10 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
     places = _without_empty_rows(reader, places, len(filled))
     rows = [reader.rows[place] for place in places]
-    if not is_given and decimal == ",":
-        _refuse_perhaps_thousands(source, rows)
-    for k in filled:
-        column = [row.fields[k] for row in rows]
-        if not is_given and has_signs_of_thousands(column, decimal):
-            example = next(field for field in column if decimal in field)
-            raise InputError(
-                f"{source} has numbers such as {example!r} beside whole ones below 1000: take the "
-                f"signs of thousands out, or give {parameter('decimal')}"
-            )
+    columns = [[row.fields[k] for row in rows] for k in filled]
+    if not is_given:
+        refuse_thousands(source, columns, decimal)
+    for k, column in zip(filled, columns, strict=True):
         numbers = [row.values[k] for row in rows]
         _refuse_odd_ends(source, column, numbers, places, is_lone=len(filled) == 1)
         if len(filled) == 1:
@@ -262,16 +257,6 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     )
 
 
-def _refuse_perhaps_thousands(source: Source, rows: Sequence[_Row]) -> None:
-    """Refuse commas that may be decimal signs or mark thousands, wherever they stand."""
-    marked = [field for row in rows for field in row.fields if "," in field]
-    if marked and all(marks_thousands(field, ",") for field in marked):
-        raise InputError(
-            f"{source} has numbers such as {marked[0]!r}, and none whose comma is a decimal sign "
-            f"for certain: give {parameter('decimal')}, or take signs of thousands out"
-        )
-
-
 def _first_row(reader: _Reader) -> int | None:
     """Return the line on which the rows begin: the first of three that are whole."""
     found: list[int] = []
@@ -289,32 +274,19 @@ def _first_row(reader: _Reader) -> int | None:
 
 def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
     source = reader.source
-    others = [
-        (place, split(line, reader.delimiter))
-        for place, line in enumerate(reader.lines)
-        if looks_like_numbers(line) and place not in reader.rows
-    ]
-    for place, fields in others:
-        flaw = flaw_of(fields)
-        if flaw is not None:
-            raise InputError(f"line {place + 1} of {source} has {flaw}")
-    if numbers < _ROWS_TO_BEGIN:
-        raise InputError(
-            f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
-            "needed"
-        )
-    for place, fields in others:
+    for place, line in enumerate(reader.lines):
+        fields = split(line, reader.delimiter) if looks_like_numbers(line) else []
         word = next((field for field in fields if value(field, reader.decimal) is None), None)
-        if word is not None and not re.search(r"[;|\t]", word):
+        if word is not None:
             raise InputError(
                 f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
-                f"{'comma' if reader.decimal == ',' else 'point'}: take columns of words and "
-                f"remarks out, or give {parameter('decimal')} and {parameter('delimiter')}"
+                f"{'comma' if reader.decimal == ',' else 'point'}: take signs of thousands, units, "
+                f"remarks and quotes about rows out, or give {parameter('decimal')} and "
+                f"{parameter('delimiter')}"
             )
-    example = next(place for place, line in enumerate(reader.lines) if looks_like_numbers(line))
     raise InputError(
-        f"{source} holds no rows of numbers of one length: line {example + 1} is "
-        f"{shown_line(reader.lines[example])}"
+        f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
+        "needed, of one length"
     )
 
 
@@ -330,10 +302,10 @@ def _block(reader: _Reader, start: int) -> list[int]:
             break  # one empty line is a missing height, two are the end of a block
         lacks = not row.is_empty and not reader.is_whole(place)
         if lacks and reader.delimiter == " " and reader.count > 2:
-            raise InputError(
-                f"line {place + 1} of {reader.source} is {shown_line(reader.lines[place])}: which "
-                f"of the {reader.count} columns are missing cannot be seen between spaces, so save "
-                "it with another delimiter"
+            reader.refuse(
+                place,
+                f": which of the {reader.count} columns are missing cannot be seen between spaces, "
+                "so save it with another delimiter",
             )
         places.append(place)
     while reader.rows[places[-1]].is_empty:
@@ -360,35 +332,29 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
         if is_row and reader.rows[place].is_empty:
             continue
         if _FACTOR.fullmatch(lines[place]):
-            raise InputError(
-                f"line {place + 1} of {source} is {shown_line(lines[place])}: multiply the numbers "
-                "by this factor, and remove it"
-            )
+            reader.refuse(place, ": multiply the numbers by this factor, and remove it")
         may_be_row = reader.may_be_row(place, place == start - 1)
         if may_be_row and (touches or (is_row and reader.is_whole(place))):
-            raise InputError(
-                f"line {place + 1} of {source} is {shown_line(lines[place])}, above the numbers "
-                f"that begin on line {start + 1}: remove it if it is none of them, and correct it "
-                "if it is"
+            reader.refuse(
+                place,
+                f", above the numbers that begin on line {start + 1}: remove it if it is none of "
+                "them, and correct it if it is",
             )
         touches = False
+    held = "one number" if reader.count == 1 else f"{reader.count} numbers"
     for place in range(last + 1, len(lines)):
         if reader.may_be_row(place, place == last + 1):
-            words = (k for k in range(last + 1, place + 1) if k not in reader.rows)
-            end = next(words, last + 1)
-            flaw = flaw_of(split(lines[end], reader.delimiter))
-            if flaw is not None and reader.may_be_row(end, True):
-                raise InputError(f"line {end + 1} of {source} has {flaw}")
-            held = "one number" if reader.count == 1 else f"{reader.count} numbers"
+            end = next((k for k in range(last + 1, place + 1) if k not in reader.rows), last + 1)
             if end == last + 1 and reader.may_be_row(end, True):
-                raise InputError(
-                    f"line {end + 1} of {source} is {shown_line(lines[end])}: it must hold {held}, "
-                    "with an empty field for one that is missing; remove it if it is no row"
+                reader.refuse(
+                    end,
+                    f": it must hold {held}, with an empty field for one that is missing; remove "
+                    "it if it is no row",
                 )
-            raise InputError(
-                f"line {end + 1} of {source} is {shown_line(lines[end])}: it ends the rows of "
-                f"{held} on lines {start + 1} to {last + 1}, and more numbers follow on line "
-                f"{place + 1}; keep the rows of one trace in a file"
+            reader.refuse(
+                end,
+                f": it ends the rows of {held} on lines {start + 1} to {last + 1}, and more "
+                f"numbers follow on line {place + 1}; keep the rows of one trace in a file",
             )
     # Lines beside the block that differ in their digits alone are rows of another form.
     n = _ROWS_TO_BEGIN
