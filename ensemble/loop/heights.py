@@ -10,7 +10,7 @@ import numpy as np
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_header
-from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
+from adhesis.ensemble.trace.reading.measured_trace import load_array
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_column
 from adhesis.solver.model.profile import Array
@@ -42,8 +42,7 @@ def read_heights(
     """
     given = None if unit is None else _unit(unit)
     source = source_of(path)
-    source.beginning()  # refuses what is missing, empty or packed
-    if not holds_numbers(source):
+    if not source.holds_numbers():
         raise InputError(
             source.container()
             or f"{path} is neither text nor .npy: --trace reads files of instruments, and a text "

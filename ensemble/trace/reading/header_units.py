@@ -180,8 +180,8 @@ class _Column:
 
 
 def names_positions(text: str) -> bool:
-    """Return whether all words of a column's name are known, and may name positions."""
-    return _Column(text).names(positions=True)
+    """Return whether a column's name is known, and that of positions."""
+    return bool((_Column(text).words or frozenset()) & _X)
 
 
 @dataclass(frozen=True)

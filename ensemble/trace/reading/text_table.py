@@ -380,21 +380,22 @@ def _refuse_odd_ends(
     They are printed otherwise than all numbers between, or the first one counts the others. Of
     several columns only the last row is judged, in which the file may end too early.
     """
-
-    def judged(k: int) -> bool:  # noughts and codes of missing heights are written as they please
-        is_free = (numbers[k] == 0 and k < n - 1) or may_be_code(numbers[k])
-        return isfinite(numbers[k]) and not is_free
-
     n = len(column)
-    forms = [printed_form(column[k]) for k in range(_ENDS, n - _ENDS) if judged(k)]
-    if len(forms) < _TO_JUDGE:
+    # Noughts and codes of missing heights are written as they please.
+    forms = {
+        k: printed_form(column[k])
+        for k in range(n)
+        if isfinite(numbers[k]) and (numbers[k] or k == n - 1) and not may_be_code(numbers[k])
+    }
+    inner = [form for k, form in forms.items() if _ENDS <= k < n - _ENDS]
+    if len(inner) < _TO_JUDGE:
         return
-    usual, times = Counter(forms).most_common(1)[0]
-    has_one_form = times >= (_ONE_FORM if is_lone else 1.0) * len(forms)
-    fewest, shortest = (min(counts) for counts in zip(*forms, strict=True))
-    ends = (*range(min(_ENDS, n)), *range(max(_ENDS, n - _ENDS), n)) if is_lone else (n - 1,)
-    for k in filter(judged, ends):
-        form = printed_form(column[k])
+    usual, times = Counter(inner).most_common(1)[0]
+    has_one_form = times >= (_ONE_FORM if is_lone else 1.0) * len(inner)
+    fewest, shortest = (min(counts) for counts in zip(*inner, strict=True))
+    for k, form in forms.items():
+        if k < n - 1 and (not is_lone or _ENDS <= k < n - _ENDS):
+            continue
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
         is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
         is_odd = form != usual if has_one_form else is_cut
