@@ -359,7 +359,7 @@ def test_what_may_be_something_else_is_refused_by_name(kind: str, tmp_path: Path
 NOT_HEIGHTS = """\
 log z (nm)|ln(z) (nm)|sqrt z (nm)|z² (nm)|z^2 (nm)|z** 2 (nm)|1000 z (nm)|1e3 z (nm)
 z*1000 (nm)|z × 10 (nm)|z/10 (nm)|z:10 (nm)|-z (nm)|z (k nm)|z (knm)|z (10 nm)
-z (x10 nm)|z (10^-9 m)|z (nm)/10|z [nm × 10]|z (nm) x 10|10 z / nm|z in 10 nm|z per nm
+z (x10 nm)|z (10^-9 m)|z (nm)/10|z [nm × 10]|z (nm) x 10|10 z / nm|z in 10 nm|z in 1/nm|z 1/µm|z 0.1 um|Height x / um|z per nm
 z (nm per div)|z (um, nm)|(z nm)^2|½ z (nm)|z' (nm)|dz/dx (nm)|dz (nm)|Δz (nm)
 slope (nm)|z error (nm)|std z (nm)|mean z (nm)|Ra (nm)|width (nm)|PSD (nm)|Current (A)
 I (A)|A [A]|Strom (A)|電流(A)|Time (um)|wavelength (nm)|inverted z (nm)|abs(z) (nm)|x (nm)

@@ -74,6 +74,7 @@ _OTHER = re.compile(
     r"|m?rad|counts?|cts|a\.?u\.?|arb\.?( units)?|px|pixels?|%|ppm|dB|bits?|LSB|digits?|Ohm|Ω|1|-)"
     rf"|(?(1)[^)\]>}}]*|(?:{_WORD}))[/^][^)\]>}}]*)(?(1)\s*[)\]>}}])\s*"
 )
+_NUMBERED = re.compile(r"\b(channel|kanal|profile|profil|column|trace|line|scan) \d\b")
 _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
 # A label and a value name no column: "Unit:", "0.5 µm", "Tip radius 2 um", "Cut-off (mm): 0.8".
 _VALUE = re.compile(
@@ -164,17 +165,18 @@ class _Column:
     def words(self) -> frozenset[str] | None:
         """Words of the name in lower case; None if one of them is unknown, or no word."""
         name = self._found[1] if self._found else self.plain
-        tokens = re.split(r"[\s,_.\-]+", name.strip(" :=,_/\t").lower()) if name.strip() else []
-        plain = [re.sub(r"\d$", "", token) if k else token for k, token in enumerate(tokens)]
-        plain[:1] = [re.sub(r"(?<=\D)\d$", "", token) for token in plain[:1]]
-        words = frozenset(filter(None, plain))
+        name = name.strip(" :=,_/\t").lower()
+        if self._found and self._found[2]:  # "Channel 1 (um)", but not "z 1/um"
+            name = _NUMBERED.sub(r"\1", name)
+        tokens = re.split(r"[\s,_.\-]+", name) if name else []
+        words = frozenset(re.sub(r"(?<=\D)\d$", "", token) for token in tokens)
         known = _X | _Z | _BESIDE | (_ALONE if len(tokens) == 1 else frozenset())
-        return words if words <= known and not (tokens and not plain[0]) else None
+        return words if words <= known else None
 
     def names(self, positions: bool) -> bool:
         """Return whether all words are known, and may name positions, or else heights."""
         own, others = (_X, _Z) if positions else (_Z, _X)
-        if self.words is None or self.other:
+        if self.words is None or self.other or (not positions and "x" in self.words):
             return False
         return bool(self.words & own or not self.words & others)
 
