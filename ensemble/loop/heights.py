@@ -98,7 +98,9 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
     stated = units_of_header(table.header, table.fields)
     found = stated.units[-1]
     if stated.other[-1]:
-        raise InputError(f"{stated.other[-1]!r} in the header of {source} is no length")
+        raise InputError(
+            f"{stated.other[-1]!r} in the header of {source} is no length: heights must be"
+        )
     if given is not None:
         if found not in (None, given):
             raise InputError(

@@ -195,7 +195,7 @@ BLOCK = ["Roughness profile (um)", *ZS]
 REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "two steps": (["Step: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}, "9 nm and 500 nm: give"),
     "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "no step with its unit"),
-    "names of two tables": ([UM, "Lc (mm),Ls (um)", *TWO], {}, "no unit that is clear: .Lc"),
+    "names of two tables": ([UM, "Lc (mm),Ls (um)", *TWO], {}, "no unit that is clear, with .Lc"),
     "another unit": (["Stylus travel in mm", "Data", *ZS], {"step": STEP}, "states no unit"),
     "a speed": (["Step: 0.5 mm/s", "Z (um)", *ZS], {}, "no step with its unit"),
     "a count on top": (["400", *ZS], Z_UM, "line 1 of .* has '400', at the end of a column"),
@@ -359,7 +359,8 @@ def test_what_may_be_something_else_is_refused_by_name(kind: str, tmp_path: Path
 NOT_HEIGHTS = """\
 log z (nm)|ln(z) (nm)|sqrt z (nm)|z² (nm)|z^2 (nm)|z** 2 (nm)|1000 z (nm)|1e3 z (nm)
 z*1000 (nm)|z × 10 (nm)|z/10 (nm)|z:10 (nm)|-z (nm)|z (k nm)|z (knm)|z (10 nm)
-z (x10 nm)|z (10^-9 m)|z (nm)/10|z [nm × 10]|z (nm) x 10|10 z / nm|z in 10 nm|z in 1/nm|z 1/µm|z 0.1 um|Height x / um|z per nm
+z (x10 nm)|z (10^-9 m)|z (nm)/10|z [nm × 10]|z (nm) x 10|10 z / nm|z in 10 nm
+z in 1/nm|z 1/µm|z 0.1 um|Height x / um|z per nm
 z (nm per div)|z (um, nm)|(z nm)^2|½ z (nm)|z' (nm)|dz/dx (nm)|dz (nm)|Δz (nm)
 slope (nm)|z error (nm)|std z (nm)|mean z (nm)|Ra (nm)|width (nm)|PSD (nm)|Current (A)
 I (A)|A [A]|Strom (A)|電流(A)|Time (um)|wavelength (nm)|inverted z (nm)|abs(z) (nm)|x (nm)

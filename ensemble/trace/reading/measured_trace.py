@@ -580,8 +580,8 @@ def _units(
     for kind in kinds:
         if found.other[kind]:
             raise InputError(
-                f"{found.other[kind]!r} in the header of {name} is no length: the "
-                f"{_KINDS[kind]} must be lengths"
+                f"{found.other[kind]!r} in the header of {name} is no length: the {_KINDS[kind]} "
+                "must be lengths, so convert them first"
             )
     stated = found.units if len(columns) == 2 else (found.units[1],) * 2
     if unit is not None:
@@ -599,9 +599,9 @@ def _units(
         return given, source
     if found.unclear:
         raise InputError(
-            f"{name} states no unit that is clear: {found.unclear!r} in its header is not known to "
-            f"name {' and '.join(_KINDS[2 - len(columns) :])}, so give {parameter('unit')}, as in "
-            f"{'mm,um' if len(columns) == 2 else 'um'}, if the numbers are lengths"
+            f"{name} states no unit that is clear, with {found.unclear!r} in its header: give "
+            f"{parameter('unit')}, as in {'mm,um' if len(columns) == 2 else 'um'}, if the numbers "
+            f"are {' and '.join(_KINDS[2 - len(columns) :])}"
         )
     if stated[0] is not None and stated[1] is not None:
         return (stated[0], stated[1]), "header"

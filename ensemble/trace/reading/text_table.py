@@ -50,8 +50,6 @@ _FACTOR = re.compile(r"\s*[\d.,eE+\-]+\s*[*×x]\s*")  # above the numbers, as Ma
 # What people and programs write for the minus sign.
 _MARK = "\ufeff"  # of a text in UTF-8
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
-# Blanks that do not break a line mark thousands between digits.
-_THOUSANDS = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
 # Bytes that are no UTF-8. One between ASCII is a sign of Western Europe (µ, Å, ö); several in a row
 # may be a sign of any other code, and are none that is known.
 _FOREIGN = re.compile(rb"[\x80-\xff]{2,}")
@@ -125,7 +123,6 @@ def _lines(source: Source) -> list[str]:
     if not text.isascii():
         # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
         # A raised digit or a fraction becomes no digit of the number that it follows.
-        text = _THOUSANDS.sub("’", text)
         raised = {ord(s): f"^{s}" for s in set(text) if unicodedata.category(s) == "No"}
         text = text.translate(raised)
         text = unicodedata.normalize("NFKC", text).translate(_MINUS)
