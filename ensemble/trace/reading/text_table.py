@@ -188,16 +188,11 @@ class _Reader:
         One that ``adjoins`` the rows may be one if it begins with a number or has no word.
         """
         if place in self.rows:
-            return not self.rows[place].is_empty
+            return adjoins or self.is_whole(place)
         line = self.lines[place].strip()
         if not line or line[0] in COMMENT:
             return False
-        if adjoins and (_DIGIT.match(line) or is_without_words(line)):
-            return True
-        if self.count == 1:
-            return " " not in line and _DIGIT.match(line) is not None
-        number = value(split(line, self.delimiter)[0], self.decimal)
-        return number is not None and not isnan(number)
+        return adjoins and (_DIGIT.match(line) is not None or is_without_words(line))
 
     def refuse(self, place: int, sentence: str) -> NoReturn:
         """Raise InputError about a line."""
@@ -323,36 +318,28 @@ def _without_empty_rows(reader: _Reader, places: list[int], columns: int) -> lis
 def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
     """Refuse rows of numbers above the block and below it."""
     source, lines = reader.source, reader.lines
-    touches = True  # nothing but empty rows has come in between
-    for place in range(start - 1, -1, -1):
-        is_row = place in reader.rows
-        if is_row and reader.rows[place].is_empty:
-            continue
-        if _FACTOR.fullmatch(lines[place]):
-            reader.refuse(place, ": multiply the numbers by this factor, and remove it")
-        may_be_row = reader.may_be_row(place, place == start - 1)
-        if may_be_row and (touches or (is_row and reader.is_whole(place))):
-            reader.refuse(
-                place,
-                f", above the numbers that begin on line {start + 1}: remove it if it is none of "
-                "them, and correct it if it is",
-            )
-        touches = False
     held = "one number" if reader.count == 1 else f"{reader.count} numbers"
-    for place in range(last + 1, len(lines)):
-        if reader.may_be_row(place, place == last + 1):
-            end = next((k for k in range(last + 1, place + 1) if k not in reader.rows), last + 1)
-            if end == last + 1 and reader.may_be_row(end, True):
+    for outside in range(start - 1, -1, -1), range(last + 1, len(lines)):
+        adjoins = True  # nothing but empty rows has come in between
+        for place in outside:
+            if _FACTOR.fullmatch(lines[place]):
+                reader.refuse(place, ": multiply the numbers by this factor, and remove it")
+            if place in reader.rows and reader.rows[place].is_empty:
+                continue
+            is_below = place > last  # where a short row is one, too
+            if reader.may_be_row(place, adjoins or (is_below and place in reader.rows)):
+                end, where = place, f", above the numbers that begin on line {start + 1}"
+                if is_below:
+                    after = (k for k in range(last + 1, place + 1) if k not in reader.rows)
+                    end = next(after, last + 1)
+                    where = f": it ends the rows of {held} on lines {start + 1} to {last + 1}"
+                    where += "" if end == place else f", and numbers follow on line {place + 1}"
                 reader.refuse(
                     end,
-                    f": it must hold {held}, with an empty field for one that is missing; remove "
-                    "it if it is no row",
+                    f"{where}; correct it if it is one of the rows, with an empty field for a "
+                    "number that is missing, or else remove it, as a file holds one trace",
                 )
-            reader.refuse(
-                end,
-                f": it ends the rows of {held} on lines {start + 1} to {last + 1}, and more "
-                f"numbers follow on line {place + 1}; keep the rows of one trace in a file",
-            )
+            adjoins = False
     # Lines beside the block that differ in their digits alone are rows of another form.
     n = _ROWS_TO_BEGIN
     for beside in lines[max(start - n, 0) : start], lines[last + 1 : last + 1 + n]:
