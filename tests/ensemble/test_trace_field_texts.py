@@ -205,7 +205,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a length and a count on top": (["199.5", "400", *ZS], Z_UM, r"line 1 of .* has '199\.5'"),
     "a checksum below": ([*ZS, "34582"], Z_UM, "line 401 of .* has '34582'"),
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
-    "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402, .* line 404"),
+    "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402; .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
     "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends"),
     "a shorter block below": ([UM, *TWO, "Raw", *ZS], {}, "line 402 .* follow on line 403"),
@@ -264,7 +264,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "units within the cells": (
         ["x;z", *(f"{x} um;{z} um" for x, z in PAIRS)],
         {},
-        r"line 2 of .* has '0\.000 um', which is no number .*: take signs of thousands, units",
+        r"line 2 of .* has '0\.000 um', which is no number .* units within cells",
     ),
     "a shorter trace between spaces": (
         [*(f"{x} {z} {x} {z}" for x, z in PAIRS), "      200.0 0.1"],

@@ -78,7 +78,13 @@ def test_every_usual_text_gives_the_same_heights(kind: str, tmp_path: Path) -> N
 NAMES = [
     *("Position Height", "Distance Raw", "X1 Z1", "Weg Höhe", "Abstand Profil", "距離 高さ"),
     *("Abscisse Hauteur", "distancia altura", "Posizione Altezza", "位置 高度", "위치 높이"),
-    *("Odległość Wysokość", "afstand hoogte", "Расстояние Высота"),
+    *(
+        "x R-profile",
+        "Sample-position W_profile",
+        "Odległość Wysokość",
+        "afstand hoogte",
+        "Расстояние Высота",
+    ),
 ]
 FORMS = ("{} ({})", "{} [{}]", "{} / {}", "{} in {}", "{}_{}", "{}, {}", "{} <{}>")
 

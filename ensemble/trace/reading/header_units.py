@@ -31,22 +31,24 @@ _X = _set(
     "lengths path abscissa abscisse weg abstand strecke länge ort longueur posición posicion "
     "distancia longitud posizione distanza lunghezza positie afstand lengte pozycja odległość "
     "poloha vzdálenost läge avstånd avstand длина расстояние положение 位置 距離 距离 長さ "
-    "长度 水平距離 水平距离 測定位置 위치 거리 길이 수평거리"
+    "长度 水平距離 水平距离 測定位置 위치 거리 길이 수평거리 "
+    "travel traverse 水平位置"
 )
 _Z = _DEPTH | _set(
     "z zunit zunits h height heights höhe höhen hoehe hauteur altura altezza hoogte wysokość "
     "výška höjd høyde højde высота vertical elevation topography profile profiles profil "
     "perfil profilo профиль roughness rauheit waviness 高さ 高度 断面 輪郭 粗さ 轮廓 높이 "
-    "단면"
+    "단면 relief 測定値"
 )
 _UNITS = _set("unit units einheit einheiten unité unités unidad unidades unità yunit yunits")
 _BESIDE = _UNITS | _set(
     "y axis achse axe eje asse direction label value values wert werte valeur column channel "
     "kanal trace scan line sampling stylus stage data daten raw measured measurement primary "
-    "filtered unfiltered level levelled leveled coordinate ось surface along up point points "
-    "of in the all are"
+    "filtered unfiltered level levelled leveled coordinate ось surface sample along up point "
+    "points of in the all are"
 )
 _ALONE = _set("a b c d")  # columns of a spreadsheet
+_OF_PROFILES = _set("p r w total")  # which P, W and R profiles are, behind their filters
 
 # Units that are words or parts of names, too, need brackets. A is ampere as well: it is Å in
 # brackets behind a name of positions or heights alone.
@@ -171,6 +173,7 @@ class _Column:
         tokens = re.split(r"[\s,_.\-]+", name) if name else []
         words = frozenset(re.sub(r"(?<=\D)\d$", "", token) for token in tokens)
         known = _X | _Z | _BESIDE | (_ALONE if len(tokens) == 1 else frozenset())
+        known |= _OF_PROFILES if words & {"profile", "profil"} else frozenset()
         return words if words <= known else None
 
     def names(self, positions: bool) -> bool:

@@ -123,7 +123,8 @@ def find_form(
             raise InputError(f"{parameter(name)} is {sign!r}: it must be one of {rule}")
     # No number holds one of these; a comma and a blank may stand in or behind a number.
     sure = [s for s in ";\t|" if sum(s in line for line in sample) >= _MOSTLY * len(sample)][:1]
-    signs = [delimiter] if delimiter else sure or ([","] if "," in "".join(sample) else []) + [" "]
+    some = [sign for sign in ";\t|," if any(sign in line for line in sample)]
+    signs = [delimiter] if delimiter else sure or [*some, " "]
     read = {}
     for form in product(signs, [decimal] if decimal else ".,"):
         rows = [[value(field, form[1]) for field in split(line, form[0])] for line in sample]
@@ -132,7 +133,7 @@ def find_form(
     best = max(read, key=lambda form: read[form][:2])
     most = read[best][0]
     others = [form for form in read if read[form][0] == most and read[form][2] != read[best][2]]
-    if most and others:
+    if most and others and best[0] in ", ":
         return _one_comma(source, sample) or _refuse_two_ways(source, sample[0])
     if decimal is None and best[0] == "," and all(_PAIR.fullmatch(line.strip()) for line in sample):
         _refuse_two_ways(source, sample[0])

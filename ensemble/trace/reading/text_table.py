@@ -272,14 +272,16 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
         if word is not None:
             raise InputError(
                 f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
-                f"{'comma' if reader.decimal == ',' else 'point'}: take signs of thousands, units, "
-                f"remarks and quotes about rows out, or give {parameter('decimal')} and "
-                f"{parameter('delimiter')}"
+                f"{'comma' if reader.decimal == ',' else 'point'}: take signs of thousands, units "
+                "within cells, remarks and quotes about rows out, or give "
+                f"{parameter('decimal')} and {parameter('delimiter')}"
             )
-    raise InputError(
-        f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
-        "needed, of one length"
-    )
+    if numbers < _ROWS_TO_BEGIN:
+        raise InputError(
+            f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
+            "needed"
+        )
+    raise InputError(f"{source} holds no rows of numbers of one length")
 
 
 def _block(reader: _Reader, start: int) -> list[int]:
@@ -328,16 +330,18 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
                 continue
             is_below = place > last  # where a short row is one, too
             if reader.may_be_row(place, adjoins or (is_below and place in reader.rows)):
-                end, where = place, f", above the numbers that begin on line {start + 1}"
-                if is_below:
-                    after = (k for k in range(last + 1, place + 1) if k not in reader.rows)
-                    end = next(after, last + 1)
-                    where = f": it ends the rows of {held} on lines {start + 1} to {last + 1}"
-                    where += "" if end == place else f", and numbers follow on line {place + 1}"
+                mend = (
+                    "correct it if it is one of the rows, with an empty field for a number that is "
+                    "missing, or else remove it"
+                )
+                if not is_below:
+                    reader.refuse(place, f", above the numbers from line {start + 1} on: {mend}")
+                after = (k for k in range(last + 1, place + 1) if k not in reader.rows)
+                end = next(after, last + 1)
+                if end != place:  # removing it would join two blocks
+                    mend = f"numbers follow on line {place + 1}, so keep one trace in a file"
                 reader.refuse(
-                    end,
-                    f"{where}; correct it if it is one of the rows, with an empty field for a "
-                    "number that is missing, or else remove it, as a file holds one trace",
+                    end, f": it ends the rows of {held} on lines {start + 1} to {last + 1}; {mend}"
                 )
             adjoins = False
     # Lines beside the block that differ in their digits alone are rows of another form.
