@@ -118,5 +118,5 @@ def _progress(loops: Loops | None, seconds: float, load: bool) -> str:
     parts = [f"{len(loops.done)} of {loops.count} loops"]
     parts += [f"running {running}"] if running else []
     parts.append(f"{seconds:.0f} s so far")
-    left = loops.seconds_left if loops.running or loops.waiting else None
+    left = loops.seconds_left if len(loops.done) < loops.count else None
     return "; ".join(parts) + ("" if left is None else f", about {duration(left)} left")

@@ -10,7 +10,7 @@ import numpy as np
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_header
-from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
+from adhesis.ensemble.trace.reading.measured_trace import load_array
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_column
 from adhesis.solver.model.profile import Array
@@ -42,8 +42,7 @@ def read_heights(
     """
     given = None if unit is None else _unit(unit)
     source = source_of(path)
-    source.beginning()  # refuses what is missing, empty or packed
-    if not holds_numbers(source):
+    if not source.holds_numbers():
         raise InputError(
             source.container()
             or f"{path} is neither text nor .npy: --trace reads files of instruments, and a text "
@@ -96,7 +95,12 @@ def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
 
 def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
     """Return the unit of the heights, of the option or of the header; None without either."""
-    found = units_of_header(table.header, table.fields)[-1]
+    stated = units_of_header(table.header, table.fields)
+    found = stated.units[-1]
+    if stated.other[-1]:
+        raise InputError(
+            f"{stated.other[-1]!r} in the header of {source} is no length: heights must be"
+        )
     if given is not None:
         if found not in (None, given):
             raise InputError(
@@ -104,16 +108,14 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
                 "wrong one"
             )
         return given
-    if found is not None:
-        return found
-    for line in table.header:
-        word = _POSSIBLE_UNIT.search(line)
-        if word is not None:
-            raise InputError(
-                f"the header of {source} has {word[0]!r}, from which the unit of the heights is "
-                "not clear: give --unit, as in --unit um"
-            )
-    return None
+    words = () if found else filter(None, map(_POSSIBLE_UNIT.search, table.header))
+    unclear = stated.unclear or next((word[0] for word in words), None)
+    if unclear and found != "m":
+        raise InputError(
+            f"the header of {source} has {unclear!r}, from which the unit of the heights is not "
+            "clear: give --unit, as in --unit um"
+        )
+    return found
 
 
 def few_heights_warning(heights: Array, name: str) -> str | None:

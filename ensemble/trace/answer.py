@@ -129,6 +129,17 @@ class Change:
     factor: float  # its loss over that of the loop with which it is compared; 0 if it loses nothing
 
 
+def _least(name: str, none: str = "") -> Any:
+    """Return a property of an answer: the least of a range of adhesion in m."""
+
+    def least(answer: Answer) -> float | None:
+        found = (one[name] for one in answer._alike())
+        return min((value for value in found if value is not None), default=None)
+
+    none = f"; None{none}" if none else ""
+    return property(least, doc=f"Least ``{name}`` in m of the answer's loop and variants{none}.")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Answer(ByValue):
     """Loss, pull-off stress and contact fraction of a trace, with their doubts.
@@ -216,35 +227,10 @@ class Answer(ByValue):
         assert found is not None
         return found
 
-    @property
-    def valid_range(self) -> float | None:
-        """Least ``valid_range`` in m of the answer's loop and its variants.
-
-        None if no loop has tension inside patches (docs/zero-range.md).
-        """
-        return self._least("valid_range")
-
-    @property
-    def edge_range(self) -> float | None:
-        """Least ``edge_range`` in m of the answer's loop and its variants."""
-        return self._least("edge_range")
-
-    @property
-    def touch_range(self) -> float | None:
-        """Least ``touch_range`` in m of the answer's loop and its variants; None without touch."""
-        return self._least("touch_range")
-
-    @property
-    def turn_range(self) -> float | None:
-        """Least ``turn_range`` in m of the answer's loop and its variants; None if none is known.
-
-        None, too, if it is longer than the other three.
-        """
-        return self._least("turn_range")
-
-    def _least(self, name: str) -> float | None:
-        found = (one[name] for one in self._alike())
-        return min((value for value in found if value is not None), default=None)
+    valid_range = _least("valid_range", " without tension inside patches (docs/zero-range.md)")
+    edge_range = _least("edge_range")
+    touch_range = _least("touch_range", " without touch")
+    turn_range = _least("turn_range", ", too, if it is longer than the other three")
 
     @property
     def largest_interior_tension(self) -> float:

@@ -73,12 +73,6 @@ class Loops:
         notes = dict(self._master.notes)  # another thread may ask
         return {self._jobs[k].name: note or (0.0, "loading", 0.0) for k, note in notes.items()}
 
-    @property
-    def waiting(self) -> list[str]:
-        """Names of the jobs that are not begun."""
-        running = self.running
-        return [j.name for j in self._jobs if j.name not in self.done and j.name not in running]
-
     def run(
         self, watch: Watch | None = None, every: float = _REPORT_INTERVAL
     ) -> dict[str, Result | str]:

@@ -45,33 +45,53 @@ _OF_MODEL = {"numerics": "of the loop itself", "zones": "cohesive zones at edges
 
 def summary(answer: Answer) -> str:
     """The answer in a few lines for the terminal."""
-    loop = answer.main
-    lines = [
-        f"loss        {_value(answer.loss, 1e3, 'mJ/m²')}"
-        f"{in_works_of_adhesion(answer.loss.value, answer.cycle.works_of_adhesion[0])}"
-        f"{_note(answer)}",
-        f"pull-off    {_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension",
-        f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area', 1.0)} at most",
-        f"changes     {_largest_changes(answer)}",
-        f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
-        f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
-        f"{length_text(loop['h_max'], 4)}; "
-        f"{'adhesion on the projection (flat); ' if answer.cycle.measure == 'flat' else ''}"
-        f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
-        f"most, {counted(loop['jumps'], 'jump')}, "
-        f"audit {loop['audit_residual']:.0e}",
-        *(f"friction    {text}" for text in _friction(answer)),
-        f"scope       {_scope(answer)}",
-        f"range       {_range(answer)}",
-        "doubts      "
-        + ", ".join(
-            f"{name} {rounded_percent(share)}" for name, share in answer.loss.doubts.items()
-        )
-        + " of the loss (standard uncertainties; the half-width of the interval is "
-        f"{COVERAGE:g} times the root of the sum of their squares, at least {100 * LEAST:g} %)",
-        *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
-    ]
+    lines = [f"{name:<11} {text}" for name, text in _findings(answer)]
+    lines += [f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings]
     return printable("\n".join(lines))
+
+
+def _findings(answer: Answer) -> list[tuple[str, str]]:
+    """Return what was found, as names and texts, for the terminal, the page and notebooks."""
+    loop, cycle = answer.main, answer.cycle
+    note = f" ({loop['loss_note']})" if loop["loss_note"] else ""  # what a load leaves out
+    patches = f"{loop['patches']} patch{'es' if loop['patches'] != 1 else ''}"
+    opened = cycle.work_of_adhesion_open
+    friction = []
+    if opened is not None and opened != cycle.works_of_adhesion[0]:
+        varies = cycle.pattern is not None
+        text = friction_text(opened, loop["loss"], loop["friction"], varies=varies)
+        friction = [("friction", text)]
+    doubts = (f"{name} {rounded_percent(share)}" for name, share in answer.loss.doubts.items())
+    return [
+        (
+            "loss",
+            f"{_value(answer.loss, 1e3, 'mJ/m²')}"
+            f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}{note}",
+        ),
+        ("pull-off", f"{_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension"),
+        (
+            "contact",
+            f"{_value(answer.contact_fraction, 1.0, 'of the nominal area', 1.0)} at most",
+        ),
+        ("changes", _largest_changes(answer)),
+        (
+            "loop",
+            f"γ = {cycle.works_of_adhesion[0]:g} J/m², to {cycle.turn(cycle.turning_points[0])} "
+            f"with h_max = {length_text(loop['h_max'], 4)}; "
+            f"{'adhesion on the projection (flat); ' if cycle.measure == 'flat' else ''}"
+            f"{loop['waves']} waves, {patches} at most, {counted(loop['jumps'], 'jump')}, "
+            f"audit {loop['audit_residual']:.0e}",
+        ),
+        *friction,
+        ("scope", _scope(answer)),
+        ("range", _range(answer)),
+        (
+            "doubts",
+            f"{', '.join(doubts)} of the loss (standard uncertainties; the half-width of the "
+            f"interval is {COVERAGE:g} times the root of the sum of their squares, at least "
+            f"{100 * LEAST:g} %)",
+        ),
+    ]
 
 
 def _largest_changes(answer: Answer) -> str:
@@ -88,21 +108,6 @@ def _largest_changes(answer: Answer) -> str:
             f"{of}by “{run.name}” ({run.description}{against}): × {change.factor:.3g}{beyond}"
         )
     return "; ".join(clauses) or "no other decision about the trace could be run"
-
-
-def _friction(answer: Answer) -> list[str]:
-    """Say which part of the loop's loss is friction of edges; nothing with one work of adhesion."""
-    gamma, loop = answer.cycle.work_of_adhesion_open, answer.main
-    if gamma is None or gamma == answer.cycle.works_of_adhesion[0]:
-        return []
-    varies = answer.cycle.pattern is not None
-    return [friction_text(gamma, loop["loss"], loop["friction"], varies=varies)]
-
-
-def _note(answer: Answer) -> str:
-    """Say what the loss under a load leaves out, in brackets after it."""
-    note = answer.main["loss_note"]
-    return f" ({note})" if note else ""
 
 
 def _scope(answer: Answer) -> str:
@@ -190,8 +195,8 @@ def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) ->
 
 def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
     """Return the page as Markdown, with those figures that were drawn and have a caption."""
-    prepared, cycle, plan = answer.prepared, answer.cycle, answer.plan
-    trace, half_space = prepared.trace, cycle.half_space
+    prepared, plan, half_space = answer.prepared, answer.plan, answer.cycle.half_space
+    trace = prepared.trace
     name = Path(trace.source).name
     images = {
         stem: f"![{FIGURES[stem]}]({stem}.png)\n\n*{FIGURES[stem]}.* {caption}"
@@ -199,15 +204,8 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
     }
     parts = [
         f"# From the trace {code_span(name)} to its loss",
-        f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area"
-        f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}{_note(answer)}, "
-        "pull-off at a "
-        f"mean tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
-        f"most **{_value(answer.contact_fraction, 1.0, '', 1.0)}**: one loop to "
-        f"{cycle.turn(cycle.turning_points[0])} (h_max = {length_text(answer.main['h_max'], 4)}) "
-        f"and off again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} "
-        f"Pa, ν = {half_space.poisson:g}.",
-        f"**What changes the loss:** {_largest_changes(answer)}.",
+        "\n".join(f"- **{name}**: {text}" for name, text in _findings(answer)),
+        f"E = {half_space.young:g} Pa, ν = {half_space.poisson:g}; losses per nominal area.",
         *(f"> **Warning:** {markdown(warning)}" for warning in answer.warnings),
         "## What was read",
         f"- {code_span(name)}: {markdown('; '.join(trace.notes))}\n- {trace.summary}",
@@ -219,15 +217,10 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
         images.get("spectrum"),
         "## The loop",
         images.get("loop"),
-        *(f"Friction: {text}." for text in _friction(answer)),
-        f"Scope: {_scope(answer)}.",
-        f"Range: {_range(answer)} (least of the loop and its variants).",
         "## How far it can be trusted",
-        "Each doubt is measured by running the loop with the decision made otherwise. "
-        "Standard uncertainty: the root mean square of the changes; the interval is "
-        f"{COVERAGE:g} times the root of the sum of their squares, at least {100 * LEAST:g} %. "
-        "It is about this trace, "
-        "closed to one period; other places of the same surface have other losses.",
+        "Each doubt is measured by running the loop with the decision made otherwise, and its "
+        "standard uncertainty is the root mean square of the changes. The interval is about this "
+        "trace, closed to one period; other places of the same surface have other losses.",
         markdown_table(*_doubt_rows(answer), left_columns=1),
         markdown_table(*_variant_rows(answer), left_columns=1),
         images.get("cut-off"),
@@ -287,21 +280,12 @@ def _sweep_rows(answer: Answer) -> list[list[str]]:
     rows = [(g, point, numbers) for g, numbers in answer.works_of_adhesion]
     rows += [(gamma, d, numbers) for d, numbers in answer.turning_points if d != point]
     head = ["γ, J/m²", cycle.turn_sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
-    return [
-        head,
-        *(
-            [
-                f"{g:g}",
-                f"{d:g}",
-                with_error(1e3 * r["loss"], 1e3 * abs(r["loss"]) * answer.loss.relative, 0.0),
-                with_error(
-                    1e-3 * r["pull_off_stress"],
-                    1e-3 * r["pull_off_stress"] * answer.pull_off_stress.relative,
-                    0.0,
-                ),
-                f"{r['contact_fraction']:.3f}",
-                f"{r['jumps']}",
-            ]
-            for g, d, r in sorted(rows, key=lambda row: row[:2])
-        ),
-    ]
+    table = [head]
+    for g, d, r in sorted(rows, key=lambda row: row[:2]):
+        cells = [
+            (1e3 * r["loss"], answer.loss),
+            (1e-3 * r["pull_off_stress"], answer.pull_off_stress),
+        ]
+        known = [with_error(value, abs(value) * of.relative, 0.0) for value, of in cells]
+        table.append([f"{g:g}", f"{d:g}", *known, f"{r['contact_fraction']:.3f}", f"{r['jumps']}"])
+    return table

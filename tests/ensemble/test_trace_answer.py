@@ -325,7 +325,7 @@ def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer:
     lines = summary(found).splitlines()
     assert lines[3] == f"changes     {text}"
     page = page_text(found, {})
-    assert page.index(f"**What changes the loss:** {text}.") < page.index("**Warning:** doubt")
+    assert page.index(f"- **changes**: {text}") < page.index("**Warning:** doubt")
     assert answers.document(found)["largest_changes"][0] == {"name": "cut-off × 4", "factor": 3.73}
     nothing = with_losses(spoiled_answer, losses | {"noise 1": 0.0}, {"step": 1e-6})
     (change,) = nothing.largest_changes
@@ -398,7 +398,7 @@ def test_the_command_excludes_ranges(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_the_summary_states_the_scope(document: dict[str, Any], folder: Path) -> None:
     page = (folder / "trace.md").read_text(encoding="utf-8")
-    (scope,) = re.findall(r"^Scope: (.*)$", page, re.M)
+    (scope,) = re.findall(r"^- \*\*scope\*\*: (.*)$", page, re.M)
     largest = max(document["loop"]["states"]["mean_stress"])
     assert scope.startswith("one period of parallel grooves, 950 µm wide; the mean stress ")
     assert (f"a compression of {1e-3 * largest:.3g} kPa" in scope) == (largest > 0)

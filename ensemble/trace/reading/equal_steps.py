@@ -41,41 +41,30 @@ def equal_steps(
         x, heights = x[::-1], heights[::-1]
         lines = None if lines is None else lines[::-1]
         notes.append("positions ran backwards: turned round")
-    rounded = _step_of_rounded(x)
-    if rounded is not None:
-        step, digit = rounded
+    digit, steps = _printed_digit(x), np.diff(x)
+    step = None if digit is None else _step_of_rounded(x, digit)
+    if digit is not None and step is not None:
         notes.append(
             f"positions rounded to {length_text(digit * metres)}: equal steps of "
             f"{length_text(step * metres, 5)}"
         )
         return heights, step * metres, notes
-    _refuse_turns(x, place)
-    _refuse_double_steps(name, x, metres)
-    return _on_grid(x * metres, heights, place, notes)
-
-
-def _refuse_turns(x: Array, place: Callable[[int], str]) -> None:
-    steps = np.diff(x)
     if np.any(steps <= 0):
         back = int(np.argmax(steps <= 0)) + 1
         word = "stand still" if steps[back - 1] == 0 else "turn back"
         raise InputError(
             f"the positions {word} at {place(back)}: they must rise or fall throughout"
         )
-
-
-def _refuse_double_steps(name: str, x: Array, metres: float) -> None:
-    """Refuse whole positions with double steps, which rounding makes, and rows left out do."""
-    digit, steps = _printed_digit(x), np.diff(x)
-    if digit is None or round(float(np.median(steps)) / digit) != 1:
-        return
-    doubles = int(np.sum(np.rint(steps / digit) == 2))
-    if doubles >= _IRREGULAR:
-        raise InputError(
-            f"the positions of {name} are whole multiples of {length_text(digit * metres)}, "
-            f"{doubles} of them two apart: they may be rounded, or rows are left out; save them "
-            "with more decimals, or write the rows that are left out, with NaN"
-        )
+    if digit is not None and round(float(np.median(steps)) / digit) == 1:
+        # Rounding makes double steps, and so do rows that are left out.
+        doubles = int(np.sum(np.rint(steps / digit) == 2))
+        if doubles >= _IRREGULAR:
+            raise InputError(
+                f"the positions of {name} are whole multiples of {length_text(digit * metres)}, "
+                f"{doubles} of them two apart: they may be rounded, or rows are left out; save "
+                "them with more decimals, or write the rows that are left out, with NaN"
+            )
+    return _on_grid(x * metres, heights, place, notes)
 
 
 def _on_grid(
@@ -85,28 +74,21 @@ def _on_grid(
     steps = np.diff(x)
     middle = float(np.median(steps))
     apart = np.rint(steps / middle).astype(int)
-    if apart.sum() > 4 * heights.size or apart.min() < 1:
-        far = int(np.argmax(np.abs(steps - middle)))
-        raise InputError(
-            f"the steps of the positions are unequal: {middle:.4g} m mostly, {steps[far]:.4g} m at "
-            f"{place(far + 1)}"
-        )
     index = np.concatenate([[0], np.cumsum(apart)])
-    step = float((x[-1] - x[0]) / index[-1])
-    off = np.abs(x - x[0] - index * step)
-    if off.max() > _UNEVEN * step:
+    step = float((x[-1] - x[0]) / max(index[-1], 1))
+    off = np.abs(x - x[0] - index * step) / step
+    is_grid = apart.sum() <= 4 * heights.size and apart.min() >= 1
+    if not is_grid or off.max() > _UNEVEN:
+        uneven = float(np.abs(steps / step - 1).max())
         # Drift of the scanner: the number of steps is right, the positions are not.
-        if np.all(apart == 1) and np.abs(steps / step - 1).max() <= _UNEVEN:
+        if is_grid and np.all(apart == 1) and uneven <= _UNEVEN:
             even = np.linspace(x[0], x[-1], x.size)
-            notes.append(
-                f"unequal steps ({100 * np.abs(steps / step - 1).max():.1f} %) put on equal "
-                "ones, linearly"
-            )
+            notes.append(f"unequal steps ({100 * uneven:.1f} %) put on equal ones, linearly")
             return np.interp(even, x, heights), step, notes
-        far = int(np.argmax(off))
+        far = int(np.argmax(off)) if is_grid else int(np.argmax(np.abs(steps - middle))) + 1
         raise InputError(
-            f"the steps of the positions are unequal: {step:.4g} m on average, and "
-            f"{place(far)} is {off[far] / step:.2g} steps away from where it should be"
+            f"the steps of the positions are unequal: {middle:.4g} m mostly, and "
+            f"{x[far] - x[far - 1]:.4g} m at {place(far)}"
         )
     if index[-1] + 1 > x.size:
         whole = np.full(index[-1] + 1, np.nan)
@@ -119,15 +101,14 @@ def _on_grid(
 # ---------------------------------------------------------------------- positions rounded in print
 
 
-def _step_of_rounded(x: Array) -> tuple[float, float] | None:
-    """Return step and digit of equal steps that are rounded in print; None for other positions.
+def _step_of_rounded(x: Array, digit: float) -> float | None:
+    """Return the step of equal steps that are rounded to a digit in print; None for others.
 
     Every position lies within half a digit of a grid of as many points, and the steps alternate in
     a way that this explains.
     """
-    digit = _printed_digit(x)
     steps = np.diff(x)
-    if digit is None or np.any(steps < 0):
+    if np.any(steps < 0):
         return None
     middle = float(np.median(steps))
     if np.sum(np.abs(steps - middle) > max(digit / 2, _UNEVEN * middle)) < _IRREGULAR:
@@ -153,7 +134,7 @@ def _step_of_rounded(x: Array) -> tuple[float, float] | None:
             f"between {first:.4g} and {last:.4g}: give {parameter('columns')} Z, that of the "
             f"heights alone, and {parameter('step')}"
         )
-    return step, digit
+    return step
 
 
 def _printed_digit(x: Array) -> float | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -25,10 +25,6 @@ HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
 
 # Formats of the package that any file of some size, or any text, is taken for.
 _TAKE_ANYTHING = ("asc", "xyz", "hgt")
-
-
-class UnknownFormatError(InputError):
-    """Raised if no reader of instrument files finds heights in the file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +47,8 @@ def available() -> bool:
 def read_scan(source: Source, row: int | None = None, channel: int | None = None) -> Scan:
     """Read a line scan, or one row of a map, from an instrument file.
 
-    UnknownFormatError if no reader knows the file, or it is damaged. InputError if it gives no
-    length or unit, it holds a map and no row is chosen, or the chosen channel or row is not there.
+    InputError if no reader knows the file, it is damaged, it gives no length or unit, it holds a
+    map and no row is chosen, or the chosen channel or row is not there.
     """
     io = _library()
     import warnings
@@ -63,14 +59,18 @@ def read_scan(source: Source, row: int | None = None, channel: int | None = None
             reader = io.open_topography(source.name if source.content is None else source.open())
             channels = list(reader.channels)
         except Exception as error:  # each reader raises exceptions of its own
-            raise UnknownFormatError(_unknown(source, error)) from None
+            text = _one_line(error)
+            if text.startswith("tried "):  # and then lists every reader
+                _refuse_unknown(source)
+            _refuse(source, f"is no instrument format that can be read: {text}")
         chosen = _channel(source, channels, channel)
         if chosen.physical_sizes is None or chosen.unit is None:
             if reader.format() in _TAKE_ANYTHING:
-                raise UnknownFormatError(_neither(source))
-            raise UnknownFormatError(
-                f"{source} states no lengths or no unit of its heights ({_name(reader)}): export "
-                f"them as text, and give {parameter('step')} and {parameter('unit')}"
+                _refuse_unknown(source)
+            _refuse(
+                source,
+                f"states no lengths or no unit of its heights ({_name(reader)}): export them as "
+                f"text, and give {parameter('step')} and {parameter('unit')}",
             )
         try:
             topography = reader.topography(channel_index=chosen.index)
@@ -79,12 +79,30 @@ def read_scan(source: Source, row: int | None = None, channel: int | None = None
         except InputError:
             raise
         except Exception as error:
-            raise UnknownFormatError(
-                f"{source} cannot be read as heights: {_one_line(error)}"
-            ) from None
+            _refuse(source, f"cannot be read as heights: {_one_line(error)}")
     metres = LENGTH.units[LENGTH.unit_named(str(topography.unit))]
     label = f"{_name(reader)}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
     return Scan(positions * metres, heights * metres, label, _tip_radius(topography))
+
+
+def _refuse(source: Source, sentence: str) -> NoReturn:
+    """Raise InputError; a workbook or an archive is named as that."""
+    raise InputError(source.container() or f"{source} {sentence}") from None
+
+
+def _refuse_unknown(source: Source) -> NoReturn:
+    if not source.holds_zero_bytes():
+        _refuse(
+            source,
+            "begins as an instrument's file, and no reader of them can read it: it is damaged, cut "
+            "off, or of another version, so export the trace as text",
+        )
+    _refuse(
+        source,
+        "is neither text nor an instrument format that can be read: it holds zero bytes (a padded "
+        "text, or one in UTF-16 without a mark, is to be saved anew as UTF-8), and no reader of "
+        "instruments' files knows it",
+    )
 
 
 def _name(reader: Any) -> str:
@@ -151,26 +169,6 @@ def _tip_radius(topography: Any) -> float | None:
         return float(radius["value"]) * LENGTH.units[LENGTH.unit_named(str(radius["unit"]))]
     except (KeyError, TypeError, ValueError, InputError):
         return None
-
-
-def _unknown(source: Source, error: Exception) -> str:
-    text = _one_line(error)
-    if text.startswith("tried "):  # and then lists every reader
-        return _neither(source)
-    return f"{source} is no instrument format that can be read: {text}"
-
-
-def _neither(source: Source) -> str:
-    if not source.holds_zero_bytes():
-        return (
-            f"{source} begins as an instrument's file, and no reader of them can read it: it is "
-            "damaged, cut off, or of another version, so export the trace as text"
-        )
-    return (
-        f"{source} is neither text nor an instrument format that can be read: it holds zero bytes "
-        "(a padded text, or one in UTF-16 without a mark, is to be saved anew as UTF-8), and no "
-        "reader of instruments' files knows it"
-    )
 
 
 def _one_line(error: Exception) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,13 @@ from adhesis.ensemble.errors import InputError, parameter, reason, refused_as_in
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
+    HeaderUnits,
+    names_positions,
     parse_units,
     step_of_header,
     units_of_header,
 )
-from adhesis.ensemble.trace.reading.instrument import HINT, UnknownFormatError, available, read_scan
+from adhesis.ensemble.trace.reading.instrument import HINT, available, read_scan
 from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table
@@ -40,10 +42,11 @@ _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
 _SAME = 1e-9
 # So many heights of a row or column of a map do not rise or fall throughout by chance.
 _NO_CHANCE = 6
+_KINDS = ("positions", "heights")
 # Names of a column that counts the points.
 _COUNTS = re.compile(
-    r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*"
-    r"|.*[(\[]\s*(px|pixels?|pts?|points?|samples?|#|-|1)\s*[)\]]\W*",
+    r"\W*((data|mess|sample|scan)?\W*(no|nr|number|n|i|idx|index|points?|punkt|sample|row|pixels?|px"
+    r"|frame|#))?\W*|.*[(\[]\s*(px|pixels?|pts?|points?|samples?|#|-|1)\s*[)\]]\W*",
     re.I,
 )
 
@@ -224,7 +227,8 @@ def read_trace(
                 f"{parameter('unit')} is {checks.shown(unit)}: it must be a text, as 'um' or "
                 "'mm,um'"
             )
-        named = hasattr(source, "iloc") and _are_names(columns)
+        named = columns is not None and hasattr(source, "iloc")
+        named = named and all(isinstance(name, str) for name in columns or ())
         if columns is not None and not named:
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
         row = None if row is None else checks.whole(parameter("row"), row, _ROW)
@@ -236,7 +240,7 @@ def read_trace(
         form = f"columns {', '.join(table.header)}" if table.header else name
         return _from_table(name, table, unit, step, None if named else columns, None, form)
     source = source_of(source)
-    is_text = holds_numbers(source)
+    is_text = source.holds_numbers()
     if is_text and channel is not None:
         raise InputError(
             f"{parameter('channel')} is {channel}: {source} holds columns of numbers, and no "
@@ -261,10 +265,7 @@ def read_trace(
             "mark, is to be saved as UTF-8): export the trace as text, or, if it is an "
             f"instrument's file, install the optional package SurfaceTopography, {HINT}"
         )
-    try:
-        scan = read_scan(source, row, channel)
-    except UnknownFormatError as error:
-        raise InputError(source.container() or str(error)) from None
+    scan = read_scan(source, row, channel)
     heights, gaps = without_codes(scan.heights)
     heights, step, notes = equal_steps(source.name, scan.positions, 1.0, heights, None)
     length, slope = (heights.size - 1) * step, _slope(heights, step)
@@ -277,30 +278,10 @@ def read_trace(
     return Trace(heights, step, source.name, tuple(notes), scan.tip_radius)
 
 
-def _are_names(columns: Sequence[int | str] | None) -> bool:
-    return columns is not None and all(isinstance(name, str) for name in columns)
-
-
 def _refuse_options(to_what: str, **options: object) -> None:
     for name, value in options.items():
         if value is not None:
             raise InputError(f"{parameter(name)} belongs to {to_what}")
-
-
-def holds_numbers(source: Source) -> bool:
-    """Return whether a file is a text or a .npy, and no instrument's file.
-
-    InputError if it cannot be read, or has to be unpacked or exported first.
-    """
-    if source.is_npy:
-        return True
-    format_name = source.text_format()
-    if format_name is not None:
-        raise InputError(
-            f"{source} is {format_name}, whose numbers are no plain columns: export the trace as "
-            "text"
-        )
-    return not source.is_instrument_text and (source.is_utf16 or not source.holds_zero_bytes())
 
 
 def load_array(source: Source) -> Array:
@@ -356,8 +337,9 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
         values = source.to_numpy(dtype=float, na_value=np.nan)
     except (TypeError, ValueError) as error:
         raise InputError(f"the table holds more than numbers: {error}") from None
-    table = _columns_of("the table", values, tuple(header))
-    return "the table", table
+    # a unit that is given beside the names needs none of them
+    names = tuple(str(units.get(n) or name) for n, name in zip(source.columns, header, strict=True))
+    return "the table", replace(_columns_of("the table", values, tuple(header)), fields=(names,))
 
 
 def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table:
@@ -386,32 +368,35 @@ def _from_table(
     form: str,
 ) -> Trace:
     notes = [form]
+    names: Sequence[Sequence[str]]
+    lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
-        columns = _row_of_map(name, table, row, notes)
-        fields: list[tuple[str, ...]] = []
-        lines = None
+        columns, names, lines = _row_of_map(name, table, row, notes), (), None
     else:
-        columns, fields, lines = _chosen(name, table, wanted, notes)
+        columns, names, lines = _chosen(name, table, wanted, notes)
         columns, lines = _scan_line(name, columns, lines, row, notes)
-    if columns.shape[1] < MIN_POINTS:
-        raise InputError(f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS}")
-    if columns.shape[1] > MAX_POINTS:
-        raise InputError(f"{name} holds {columns.shape[1]} rows of numbers: at most {MAX_POINTS}")
-    heights, gaps = without_codes(columns[-1])
-    columns = np.vstack([columns[:-1], heights])
-    found = units_of_header(table.header, fields)
-    first = [row[0] for row in fields if re.search(r"[\w#]", row[0])]
-    is_named = any(map(_COUNTS.fullmatch, first))
-    if len(columns) == 2 and found[0] is None and (is_named or _counts_points(columns[0])):
-        step = _step_beside_count(name, table, is_named, columns[0], unit, step)
-        if step is not None:
-            columns = columns[1:]
+    if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
+        raise InputError(
+            f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
+            f"{MAX_POINTS} are needed"
+        )
+    columns[-1], gaps = without_codes(columns[-1])
+    found = units_of_header(table.header, names)
+    if len(columns) == 2 and found.units[0] is None:
+        first = [row[0] for row in names if re.search(r"[\w#]", row[0])]
+        given = _step_beside_count(name, table, first, columns[0], unit, step)
+        if given is not None:
+            columns, step = columns[1:], given
             notes.append("the first column counts the points")
-    named = units_of_header((), fields)  # by the names of the columns, not by other lines
-    (x_unit, z_unit), given_by = _units(name, found, named, unit, columns, step)
-    column, heights = heights, heights * LENGTH.units[z_unit]
+    (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
+    heights = columns[-1] * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
+    if found.depth:
+        notes.append(
+            f"their column is named {found.depth!r}: give {parameter('invert')} if they grow into "
+            "the sample"
+        )
     if gaps:
         notes.append(gaps)
     if table.empty_lines:
@@ -426,18 +411,24 @@ def _from_table(
             )
         heights, step, more = equal_steps(name, columns[0], LENGTH.units[x_unit], heights, lines)
         notes.extend(more)
-    else:
+    elif step is None:
+        step = step_of_header(name, table.header, table.decimal)
         if step is None:
-            step = step_of_header(name, table.header, table.decimal)
-            if step is None:
-                raise InputError(
-                    f"{name} has heights without positions, and no step with its unit is found in "
-                    f"its header: give {parameter('step')}, as in 0.5um"
-                )
-            notes.append(f"step {length_text(step, 6)} (header)")
-        if form.startswith("text"):
-            _refuse_length_on_top(name, column, step, lines)
-    return _in_metres(Trace(heights, float(step), name, tuple(notes)))
+            raise InputError(
+                f"{name} has heights without positions, and no step with its unit is found in its "
+                f"header: give {parameter('step')}, as in 0.5um"
+            )
+        notes.append(f"step {length_text(step, 6)} (header)")
+    if len(columns) == 1 and form.startswith("text"):
+        _refuse_length_on_top(name, columns[0], step, lines)
+    trace = Trace(heights, float(step), name, tuple(notes))
+    slope = _slope(trace.heights, trace.step)
+    if slope > _STEEPEST:
+        raise InputError(
+            f"{name} would rise by {slope:.3g} times its step from point to point: are positions "
+            f"and heights in the same unit ({parameter('unit')} X,Z)?"
+        )
+    return trace
 
 
 # ---------------------------------------------------------------------- columns and rows
@@ -445,19 +436,18 @@ def _from_table(
 
 def _chosen(
     name: str, table: Table, wanted: Sequence[Any] | None, notes: list[str]
-) -> tuple[Array, list[tuple[str, ...]], Array]:
+) -> tuple[Array, Sequence[Sequence[str]], Array]:
     """Return the columns of positions and heights, or of heights, their names, their lines."""
-    picked = list(table.filled)
+    picked, fields = list(table.filled), table.fields
     if wanted is not None:
-        count = len(table.columns)
-        is_known = all(1 <= w <= count for w in wanted)
-        if len(wanted) not in (1, 2) or len(set(wanted)) < len(wanted) or not is_known:
+        picked = [w - 1 for w in wanted]
+        is_known = all(0 <= k < len(table.columns) for k in picked)
+        if len(picked) not in (1, 2) or len(set(picked)) < len(picked) or not is_known:
             raise InputError(
                 f"{parameter('columns')} is {','.join(map(str, wanted))}: it must name two of the "
-                f"{counted(count, 'column')} of {name}, those of positions and heights, as in 1,2, "
-                "or that of the heights alone"
+                f"{counted(len(table.columns), 'column')} of {name}, those of positions and "
+                "heights, as in 1,2, or that of the heights alone"
             )
-        picked = [w - 1 for w in wanted]
     elif len(picked) > 2:
         rows = f", or {parameter('row')} K, a row of a map" if len(picked) >= MIN_POINTS else ""
         raise InputError(
@@ -465,10 +455,6 @@ def _chosen(
             f"positions and heights{rows}"
         )
     columns = table.columns[picked]
-    if wanted is not None:
-        marked, about = invalid_rows(table.columns, table.fields, picked)
-        columns[-1, marked] = np.nan
-        notes.extend(about)
     # Of columns of unequal length, those chosen end where they do.
     kept = np.arange(columns.shape[1])
     there = np.flatnonzero(np.isfinite(columns).any(axis=0))
@@ -476,24 +462,32 @@ def _chosen(
         kept = there
     elif wanted is not None and there.size:
         kept = kept[there[0] : there[-1] + 1]
-    fields = [tuple(row[k] for k in picked) for row in table.fields]
-    return columns[:, kept], fields, table.lines[kept]
+    if wanted is not None:
+        marked, about = invalid_rows(table.columns, fields, picked)
+        columns[-1, marked] = np.nan
+        notes.extend(about)
+    names = [tuple(row[k] for k in picked) for row in fields]
+    return columns[:, kept], names, table.lines[kept]
 
 
 def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     """Return a row of a text whose rows are those of a map."""
-    rows = table.columns.shape[1]
     for what, line in (("row", table.columns[:, 0]), ("column", table.columns[table.filled[0]])):
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
-        if any(map(_may_be_positions, (line, line[1:]))):
-            raise InputError(
-                f"the first {what} of {name} rises or falls throughout, as positions do: remove "
-                f"it, and give {parameter('step')}"
-            )
-    if not 0 <= row < rows:
-        raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {rows - 1}")
-    notes.append(f"row {row} of {rows}, of {len(table.filled)} heights each")
+        for steps in np.diff(line), np.diff(line[1:]):
+            if steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0)):
+                raise InputError(
+                    f"the first {what} of {name} rises or falls throughout, as positions do: "
+                    f"remove it, and give {parameter('step')}"
+                )
+    _check_row(name, row, table.columns.shape[1])
+    notes.append(f"row {row} of {table.columns.shape[1]}, of {len(table.filled)} heights each")
     return table.columns[list(table.filled), row].reshape(1, -1)
+
+
+def _check_row(name: str, row: int, rows: int) -> None:
+    if row >= rows:
+        raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {rows - 1}")
 
 
 def _scan_line(
@@ -501,10 +495,8 @@ def _scan_line(
 ) -> tuple[Array, Array]:
     """Return one scan line, where the positions of a raster begin anew on each line."""
     x = columns[0]
-    if not x.size:
-        return columns, lines
-    again = np.flatnonzero((x[1:] == x[0]) & (x[:-1] != x[0])) + 1
-    points = int(again[0]) if again.size and len(columns) == 2 else x.size
+    again = np.flatnonzero((x[1:] == x[:1]) & (x[:-1] != x[:1])) + 1
+    points = int(again[0]) if again.size and len(columns) == 2 else max(x.size, 1)
     count, rest = divmod(x.size, points)
     is_raster = count > 1 and not rest and np.array_equal(x, np.tile(x[:points], count))
     if row is None and is_raster:
@@ -520,17 +512,10 @@ def _scan_line(
             f"{parameter('row')} is {row}: {name} is no map, as its positions do not begin anew on "
             f"each line ({parameter('columns')} chooses columns)"
         )
-    if not 0 <= row < count:
-        raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {count - 1}")
+    _check_row(name, row, count)
     notes.append(f"row {row} of {count}, of {points} points each")
     part = slice(row * points, (row + 1) * points)
     return columns[:, part], lines[part]
-
-
-def _may_be_positions(line: Array) -> bool:
-    """Return whether numbers rise or fall throughout, and are so many that it is no chance."""
-    steps = np.diff(line)
-    return steps.size >= _NO_CHANCE and bool(np.all(steps > 0) or np.all(steps < 0))
 
 
 def _counts_points(x: Array) -> bool:
@@ -539,33 +524,36 @@ def _counts_points(x: Array) -> bool:
 
 
 def _step_beside_count(
-    name: str, table: Table, is_named: bool, column: Array, unit: str | None, step: float | None
+    name: str,
+    table: Table,
+    names: Sequence[str],
+    column: Array,
+    unit: str | None,
+    step: float | None,
 ) -> float | None:
-    """Return the step of heights beside a column that may count the points; None if it does not.
+    """Return the step of heights beside a column that counts the points; None for positions.
 
-    It does if it is named so, or a step is given by the option or the header.
+    It counts them if it is named so, or a step is given by the option or the header. ``names`` are
+    those of the column.
     """
+    is_named = any(map(_COUNTS.fullmatch, names))
     if not _counts_points(column):
+        if not is_named:
+            return None
         raise InputError(
             f"the first column of {name} is named as one that counts the points, and does not "
             f"count 1, 2, 3 …: give {parameter('columns')} Z, that of the heights, and "
             f"{parameter('step')}, if no point is left out"
         )
-    if step is not None:
-        return step
-    stated = step_of_header(name, table.header, table.decimal)
-    if stated is None and is_named:
+    is_foreign = bool(names) and not names_positions(names[-1])
+    if step is None:
+        step = step_of_header(name, table.header, table.decimal, counts=is_named or is_foreign)
+    if step is None and (is_named or (is_foreign and unit is not None)):
+        word = "counts" if is_named else f"({names[-1]}) may count"
         raise InputError(
-            f"the first column of {name} counts the points: give {parameter('step')}, as in 0.5um"
+            f"the first column of {name} {word} the points: give {parameter('step')}, as in 0.5um"
         )
-    if stated is not None and unit is not None and not is_named:
-        counted_as = LENGTH.units[parse_units(unit)[0]]
-        if abs(stated / counted_as - 1) > _SAME:
-            raise InputError(
-                f"the positions of {name} would have steps of {length_text(counted_as)}, and its "
-                f"header states {length_text(stated)}: give {parameter('step')}"
-            )
-    return stated
+    return step
 
 
 def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | None) -> None:
@@ -585,31 +573,40 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
 
 
 def _units(
-    name: str,
-    found: list[str | None],
-    named: list[str | None],
-    unit: str | None,
-    columns: Array,
-    step: float | None,
+    name: str, found: HeaderUnits, unit: str | None, columns: Array, step: float | None
 ) -> tuple[tuple[str, str], str]:
-    if len(columns) == 1:
-        found, named = [found[-1]] * 2, [named[-1]] * 2
+    """Return the units of positions and heights, and what states them."""
+    kinds = range(2 - len(columns), 2)  # of heights alone the second
+    for kind in kinds:
+        if found.other[kind]:
+            raise InputError(
+                f"{found.other[kind]!r} in the header of {name} is no length: the {_KINDS[kind]} "
+                "must be lengths, so convert them first"
+            )
+    stated = found.units if len(columns) == 2 else (found.units[1],) * 2
     if unit is not None:
         given = parse_units(unit)
         source = parameter("unit")
-        for kind in range(2 - len(columns), 2):
-            if named[kind] not in (None, given[kind]):
+        for kind in kinds:
+            if stated[kind] in (None, given[kind]):
+                continue
+            if found.by_name:
                 raise InputError(
-                    f"{parameter('unit')} is {given[kind]} for the {('positions', 'heights')[kind]}"
-                    f", and the header of {name} has {named[kind]}: correct the wrong one"
+                    f"{parameter('unit')} is {given[kind]} for the {_KINDS[kind]}, and the header "
+                    f"of {name} has {stated[kind]}: correct the wrong one"
                 )
-            if found[kind] not in (None, given[kind]):
-                source += f", against {found[kind]} in a line of the header"
+            source += f", against {stated[kind]} in a line of the header"
         return given, source
-    if found[0] is not None and found[1] is not None:
-        return (found[0], found[1]), "header"
-    if found[0] is not None or found[1] is not None:
-        known = "positions" if found[0] else "heights"
+    if found.unclear:
+        raise InputError(
+            f"{name} states no unit that is clear, with {found.unclear!r} in its header: give "
+            f"{parameter('unit')}, as in {'mm,um' if len(columns) == 2 else 'um'}, if the numbers "
+            f"are {' and '.join(_KINDS[2 - len(columns) :])}"
+        )
+    if stated[0] is not None and stated[1] is not None:
+        return (stated[0], stated[1]), "header"
+    if stated[0] is not None or stated[1] is not None:
+        known = "positions" if stated[0] else "heights"
         count = f", or {parameter('step')} if the first column counts the points"
         raise InputError(
             f"the header of {name} states the unit of the {known} alone: give {parameter('unit')} "
@@ -646,14 +643,3 @@ def _slope(heights: Array, step: float) -> float:
     rises = np.abs(np.diff(heights))
     known = rises[np.isfinite(rises)]
     return float(np.median(known)) / step if known.size else 0.0
-
-
-def _in_metres(trace: Trace) -> Trace:
-    """Refuse a trace so steep that the unit of one of its columns must be another."""
-    slope = _slope(trace.heights, trace.step)
-    if slope > _STEEPEST:
-        raise InputError(
-            f"{trace.source} would rise by {slope:.3g} times its step from point to point: are "
-            f"positions and heights in the same unit ({parameter('unit')} X,Z)?"
-        )
-    return trace

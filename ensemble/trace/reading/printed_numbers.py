@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections import Counter
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, product
+from typing import NoReturn
 
 from adhesis.ensemble.errors import InputError, parameter
 from adhesis.ensemble.trace.reading.source import Source
@@ -23,10 +23,9 @@ _SIGNS = re.compile(r"[-+*.()\s]")  # about such a word, or as wide as the numbe
 _PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE)  # #NAME?, 1.#INF
 _FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
+_PAIR = re.compile(r'[^,."\s]*(,[^,."\s]*){3}')  # "0,5,1,3": four numbers, or two
+_MOSTLY = 0.8  # share of the lines in which a delimiter stands
 _EXPONENT = re.compile(r"(?<=[\d.])\s*[eEdD](?=\s*[+\-]?\d)")
-_QUOTED = re.compile(r'"[^"]*"')
-_GROUPED = re.compile(r"[+\-]?\d{1,3}([ '’_]\d{3})+([.,]\d*)?")
-_WITH_WORD = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eE][+\-]?\d+)?\s*[^\W\d_]+")
 
 
 def shown_line(line: str) -> str:
@@ -90,121 +89,75 @@ def is_without_words(line: str) -> bool:
     return any(map(str.isdigit, plain)) and not any(map(str.isalpha, plain))
 
 
-def is_grouped(field: str) -> bool:
-    """Return whether blanks or apostrophes mark the thousands of a number."""
-    return bool(_GROUPED.fullmatch(field))
+def refuse_thousands(source: Source, columns: Sequence[Sequence[str]], decimal: str) -> None:
+    """Refuse numbers whose decimal sign may mark thousands wherever it stands: "1,234".
 
-
-def flaw_of(fields: Sequence[str]) -> str | None:
-    """Return what is wrong with a field that is a number and more than that, if one is."""
-    for field in fields:
-        if is_grouped(field):
-            return f"{field!r}: take the signs of thousands out"
-        if _WITH_WORD.fullmatch(field):
-            return (
-                f"{field!r}, a unit or word within the cell of a number: take it out, and give "
-                f"{parameter('unit')}"
-            )
-    return None
-
-
-def marks_thousands(field: str, sign: str) -> bool:
-    """Return whether a sign may mark the thousands of a number: "1,234" and "-12,345,678"."""
-    return bool(re.fullmatch(rf"[+\-]?[1-9]\d{{0,2}}({re.escape(sign)}\d{{3}})+", field))
-
-
-def has_signs_of_thousands(column: Sequence[str], decimal: str) -> bool:
-    """Return whether what is taken for the decimal sign of a column may mark thousands.
-
-    It does if it stands before three digits wherever it stands, never behind a leading nought, and
-    numbers below 1000 have none: "500", "1.000".
+    Points do so only where numbers below 1000 of the same column have none.
     """
-    marked = 0
-    plain = 0
-    for field in column:
-        if decimal in field:
-            if not marks_thousands(field, decimal):
-                return False
-            marked += 1
-        elif re.fullmatch(r"[+\-]?\d{1,3}", field):
-            plain += 1
-        elif not is_missing(field):
-            return False
-    return marked > 0 and plain > 0
+    pattern = re.compile(rf"[+\-]?[1-9]\d{{0,2}}({re.escape(decimal)}\d{{3}})+")
+    together = [[field for column in columns for field in column]]
+    for column in together if decimal == "," else columns:
+        marked = [field for field in column if decimal in field]
+        others = [field for field in column if decimal not in field and not is_missing(field)]
+        is_plain = [bool(re.fullmatch(r"[+\-]?\d{1,3}", field)) for field in others]
+        may_mark = decimal == "," or (any(is_plain) and all(is_plain))
+        if marked and may_mark and all(map(pattern.fullmatch, marked)):
+            raise InputError(
+                f"{source} has numbers such as {marked[0]!r}, and none whose {decimal!r} is a "
+                f"decimal sign for certain: give {parameter('decimal')}, or take signs of "
+                "thousands out"
+            )
 
 
 def find_form(
     source: Source, sample: Sequence[str], delimiter: str | None, decimal: str | None
 ) -> tuple[str, str]:
-    """Return delimiter and decimal sign of lines of numbers; InputError if two fit."""
-    if decimal not in (None, ",", "."):
-        raise InputError(f"{parameter('decimal')} is {decimal!r}: it must be '.' or ','")
-    if delimiter is None:
-        delimiter = find_delimiter(source, sample, decimal)
-    elif delimiter not in DELIMITERS:
-        signs = ", ".join(map(repr, DELIMITERS))
-        raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one of {signs}")
-    if decimal is None:
-        rows = [field for line in sample for field in split(line, delimiter)]
-        comma, point = (next((f for f in rows if sign in f), None) for sign in ",.")
-        if comma and point:
-            both = " and ".join(dict.fromkeys(map(repr, (comma, point))))
-            raise InputError(
-                f"{source} has fields such as {both}: give {parameter('decimal')} and "
-                f"{parameter('delimiter')}, and take signs of thousands, or quotes about whole "
-                "rows, out"
-            )
-        decimal = "," if comma else "."
-    return delimiter, decimal
+    """Return delimiter and decimal sign by which most lines are rows of numbers.
+
+    InputError if two ways of reading them differ.
+    """
+    given = (("delimiter", delimiter, tuple(DELIMITERS)), ("decimal", decimal, (".", ",")))
+    for name, sign, known in given:
+        if sign is not None and sign not in known:
+            rule = ", ".join(map(repr, known))
+            raise InputError(f"{parameter(name)} is {sign!r}: it must be one of {rule}")
+    # No number holds one of these; a comma and a blank may stand in or behind a number.
+    sure = [s for s in ";\t|" if sum(s in line for line in sample) >= _MOSTLY * len(sample)][:1]
+    some = [sign for sign in ";\t|," if any(sign in line for line in sample)]
+    signs = [delimiter] if delimiter else sure or [*some, " "]
+    read = {}
+    for form in product(signs, [decimal] if decimal else ".,"):
+        rows = [[value(field, form[1]) for field in split(line, form[0])] for line in sample]
+        whole = [tuple(map(repr, row)) for row in rows if None not in row]
+        read[form] = (len(whole), sum(v is not None for row in rows for v in row), whole)
+    best = max(read, key=lambda form: read[form][:2])
+    most = read[best][0]
+    others = [form for form in read if read[form][0] == most and read[form][2] != read[best][2]]
+    if most and others and best[0] in ", ":
+        return _one_comma(source, sample) or _refuse_two_ways(source, sample[0])
+    if decimal is None and best[0] == "," and all(_PAIR.fullmatch(line.strip()) for line in sample):
+        _refuse_two_ways(source, sample[0])
+    return best
 
 
-def find_delimiter(source: Source, sample: Sequence[str], decimal: str | None) -> str:
-    """Return the delimiter of lines of numbers; InputError if a comma has two meanings."""
-    lines = [_QUOTED.sub('"', line.strip()) for line in sample]
-
-    def everywhere(sign: str) -> bool:
-        return sum(sign in line for line in lines) >= 0.8 * len(lines)
-
-    for sign in (";", "\t", "|"):
-        if everywhere(sign):
-            return sign
-    spaced = everywhere(" ")
-    if not everywhere(","):
-        return " "
-    if any('",' in line or ',"' in line for line in lines):
-        return ","
-    if decimal == ",":
-        return " "
-    if any("." in line for line in lines) or any(re.search(r",\s", line) for line in lines):
-        return ","
-    if spaced:
-        return " "
-    commas = Counter(line.count(",") for line in lines).most_common(1)[0][0]
-    if commas == 1:
-        if any(re.search(r"[eE][+\-]?\d+\s*,", line) for line in lines):
-            return ","
-        return _one_comma(source, lines)
-    if commas == 3:
-        raise InputError(
-            f"{source} has rows such as {shown_line(lines[0])}, which can be two numbers or four: "
-            f"give {parameter('decimal')}"
-        )
-    return ","
+def _refuse_two_ways(source: Source, line: str) -> NoReturn:
+    raise InputError(
+        f"{source} has rows such as {shown_line(line)}, whose commas can be decimal signs or "
+        f"delimiters: give {parameter('decimal')}"
+    )
 
 
-def _one_comma(source: Source, lines: Sequence[str]) -> str:
-    """Tell "12,345" as a decimal number from two whole ones."""
+def _one_comma(source: Source, lines: Sequence[str]) -> tuple[str, str] | None:
+    """Tell "12,345" as a decimal number from two whole ones; None if it may be either."""
     halves = [line.split(",") for line in lines if line.count(",") == 1]
+    if any(" " in half.strip() for line in halves for half in line):
+        return None
     whole = [int(left) if re.fullmatch(r"[+\-]?\d+", left) else None for left, _ in halves]
     steps = {b - a for a, b in pairwise(whole) if a is not None and b is not None}
     if len(whole) > 3 and len(steps) == 1 and steps != {0}:
-        return ","
+        return ",", "."
     decimals = [right for _, right in halves]
-    if len({len(d) for d in decimals}) == 1 and len(decimals[0]) > 1:
-        return " "
-    if any(len(d) > 1 and d[0] == "0" for d in decimals):
-        return " "
-    raise InputError(
-        f"{source} has rows such as {shown_line(lines[0])}, which can be one number with a decimal "
-        f"comma or two: give {parameter('decimal')}"
-    )
+    has_one_length = len(set(map(len, decimals))) == 1 and len(decimals[0]) > 1
+    if has_one_length or any(len(d) > 1 and d[0] == "0" for d in decimals):
+        return " ", ","
+    return None

@@ -50,6 +50,7 @@ _OTHER_TEXTS = {
     re.compile(rb"\s*ISO ?5436|(?s:.*)\nCX [AIM] "): "a profile in the form of ISO 5436-2 (SMD)",
     re.compile(rb"[ab](ISO|BCR)\s*-\s*\d"): "a variant of SDF (ISO 25178-71)",
     re.compile(rb"DSAA\s"): "a grid of Surfer (DSAA)",
+    re.compile(rb"Zygo XYZ"): "a file of Zygo (XYZ), which counts pixels",
 }
 
 
@@ -73,25 +74,24 @@ class Source:
         """Whether it is an array of NumPy, by its name or its first bytes."""
         return self.suffix == ".npy" or self.beginning().startswith(b"\x93NUMPY")
 
-    @property
-    def is_utf16(self) -> bool:
-        """Whether it begins with the mark of a text in UTF-16 or UTF-32."""
-        return self.beginning().startswith(_UTF16)
+    def holds_numbers(self) -> bool:
+        """Return whether it is a text or a .npy, and no instrument's file.
 
-    @property
-    def is_instrument_text(self) -> bool:
-        """Whether it is a text that the reader of instruments' files knows."""
-        begin = self.beginning()
-        if begin.startswith(_UTF16):
-            begin = begin[2:].replace(b"\0", b"")
-        return bool(_INSTRUMENT_TEXT.match(begin))
-
-    def text_format(self) -> str | None:
-        """Return the name of a text format that cannot be read, or None."""
+        InputError if it cannot be read, or has to be unpacked or exported first.
+        """
+        if self.is_npy:
+            return True
         begin = self.beginning().removeprefix(b"\xef\xbb\xbf")
-        if self.is_instrument_text:
-            return None
-        return next((name for known, name in _OTHER_TEXTS.items() if known.match(begin)), None)
+        is_wide = begin.startswith(_UTF16)
+        if _INSTRUMENT_TEXT.match(begin[2:].replace(b"\0", b"") if is_wide else begin):
+            return False
+        for known, name in _OTHER_TEXTS.items():
+            if known.match(begin):
+                raise InputError(
+                    f"{self} is {name}, whose numbers are no plain columns: export the trace as "
+                    "text"
+                )
+        return is_wide or not self.holds_zero_bytes()
 
     def holds_zero_bytes(self) -> bool:
         """Return whether there is a zero byte anywhere: a text has none (InputError)."""

@@ -23,16 +23,12 @@ from adhesis.ensemble.trace.reading.missing_heights import may_be_code
 from adhesis.ensemble.trace.reading.printed_numbers import (
     COMMENT,
     DELIMITERS,
-    find_delimiter,
     find_form,
-    flaw_of,
-    has_signs_of_thousands,
-    is_grouped,
     is_missing,
     is_without_words,
     looks_like_numbers,
-    marks_thousands,
     printed_form,
+    refuse_thousands,
     shown_line,
     split,
     value,
@@ -54,8 +50,6 @@ _FACTOR = re.compile(r"\s*[\d.,eE+\-]+\s*[*×x]\s*")  # above the numbers, as Ma
 # What people and programs write for the minus sign.
 _MARK = "\ufeff"  # of a text in UTF-8
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
-# Blanks that do not break a line mark thousands between digits.
-_THOUSANDS = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
 # Bytes that are no UTF-8. One between ASCII is a sign of Western Europe (µ, Å, ö); several in a row
 # may be a sign of any other code, and are none that is known.
 _FOREIGN = re.compile(rb"[\x80-\xff]{2,}")
@@ -104,7 +98,7 @@ def read_column(source: Source, delimiter: str | None = None, decimal: str | Non
     rows = [place for place, line in enumerate(lines) if looks_like_numbers(line)]
     if len(rows) == 1:
         row = lines[rows[0]]
-        words = split(row, delimiter or find_delimiter(source, [row], decimal))
+        words = split(row, find_form(source, [row], delimiter, decimal)[0])
         if len(words) > 1:
             lines[rows[0] : rows[0] + 1] = words
             delimiter = "|"  # none is left
@@ -129,7 +123,6 @@ def _lines(source: Source) -> list[str]:
     if not text.isascii():
         # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
         # A raised digit or a fraction becomes no digit of the number that it follows.
-        text = _THOUSANDS.sub("’", text)
         raised = {ord(s): f"^{s}" for s in set(text) if unicodedata.category(s) == "No"}
         text = text.translate(raised)
         text = unicodedata.normalize("NFKC", text).translate(_MINUS)
@@ -195,17 +188,17 @@ class _Reader:
         One that ``adjoins`` the rows may be one if it begins with a number or has no word.
         """
         if place in self.rows:
-            return not self.rows[place].is_empty
+            return adjoins or self.is_whole(place)
         line = self.lines[place].strip()
         if not line or line[0] in COMMENT:
             return False
-        if adjoins and (_DIGIT.match(line) or is_without_words(line)):
-            return True
-        if self.count == 1:
-            return is_grouped(line) or (" " not in line and _DIGIT.match(line) is not None)
-        first = split(line, self.delimiter)[0]
-        number = value(first, self.decimal)
-        return (number is not None and not isnan(number)) or is_grouped(first)
+        return adjoins and (_DIGIT.match(line) is not None or is_without_words(line))
+
+    def refuse(self, place: int, sentence: str) -> NoReturn:
+        """Raise InputError about a line."""
+        raise InputError(
+            f"line {place + 1} of {self.source} is {shown_line(self.lines[place])}{sentence}"
+        )
 
 
 def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
@@ -230,16 +223,10 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
     places = _without_empty_rows(reader, places, len(filled))
     rows = [reader.rows[place] for place in places]
-    if not is_given and decimal == ",":
-        _refuse_perhaps_thousands(source, rows)
-    for k in filled:
-        column = [row.fields[k] for row in rows]
-        if not is_given and has_signs_of_thousands(column, decimal):
-            example = next(field for field in column if decimal in field)
-            raise InputError(
-                f"{source} has numbers such as {example!r} beside whole ones below 1000: take the "
-                f"signs of thousands out, or give {parameter('decimal')}"
-            )
+    columns = [[row.fields[k] for row in rows] for k in filled]
+    if not is_given:
+        refuse_thousands(source, columns, decimal)
+    for k, column in zip(filled, columns, strict=True):
         numbers = [row.values[k] for row in rows]
         _refuse_odd_ends(source, column, numbers, places, is_lone=len(filled) == 1)
         if len(filled) == 1:
@@ -262,16 +249,6 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     )
 
 
-def _refuse_perhaps_thousands(source: Source, rows: Sequence[_Row]) -> None:
-    """Refuse commas that may be decimal signs or mark thousands, wherever they stand."""
-    marked = [field for row in rows for field in row.fields if "," in field]
-    if marked and all(marks_thousands(field, ",") for field in marked):
-        raise InputError(
-            f"{source} has numbers such as {marked[0]!r}, and none whose comma is a decimal sign "
-            f"for certain: give {parameter('decimal')}, or take signs of thousands out"
-        )
-
-
 def _first_row(reader: _Reader) -> int | None:
     """Return the line on which the rows begin: the first of three that are whole."""
     found: list[int] = []
@@ -289,33 +266,22 @@ def _first_row(reader: _Reader) -> int | None:
 
 def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
     source = reader.source
-    others = [
-        (place, split(line, reader.delimiter))
-        for place, line in enumerate(reader.lines)
-        if looks_like_numbers(line) and place not in reader.rows
-    ]
-    for place, fields in others:
-        flaw = flaw_of(fields)
-        if flaw is not None:
-            raise InputError(f"line {place + 1} of {source} has {flaw}")
+    for place, line in enumerate(reader.lines):
+        fields = split(line, reader.delimiter) if looks_like_numbers(line) else []
+        word = next((field for field in fields if value(field, reader.decimal) is None), None)
+        if word is not None:
+            raise InputError(
+                f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
+                f"{'comma' if reader.decimal == ',' else 'point'}: take signs of thousands, units "
+                "within cells, remarks and quotes about rows out, or give "
+                f"{parameter('decimal')} and {parameter('delimiter')}"
+            )
     if numbers < _ROWS_TO_BEGIN:
         raise InputError(
             f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
             "needed"
         )
-    for place, fields in others:
-        word = next((field for field in fields if value(field, reader.decimal) is None), None)
-        if word is not None and not re.search(r"[;|\t]", word):
-            raise InputError(
-                f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
-                f"{'comma' if reader.decimal == ',' else 'point'}: take columns of words and "
-                f"remarks out, or give {parameter('decimal')} and {parameter('delimiter')}"
-            )
-    example = next(place for place, line in enumerate(reader.lines) if looks_like_numbers(line))
-    raise InputError(
-        f"{source} holds no rows of numbers of one length: line {example + 1} is "
-        f"{shown_line(reader.lines[example])}"
-    )
+    raise InputError(f"{source} holds no rows of numbers of one length")
 
 
 def _block(reader: _Reader, start: int) -> list[int]:
@@ -330,10 +296,10 @@ def _block(reader: _Reader, start: int) -> list[int]:
             break  # one empty line is a missing height, two are the end of a block
         lacks = not row.is_empty and not reader.is_whole(place)
         if lacks and reader.delimiter == " " and reader.count > 2:
-            raise InputError(
-                f"line {place + 1} of {reader.source} is {shown_line(reader.lines[place])}: which "
-                f"of the {reader.count} columns are missing cannot be seen between spaces, so save "
-                "it with another delimiter"
+            reader.refuse(
+                place,
+                f": which of the {reader.count} columns are missing cannot be seen between spaces, "
+                "so save it with another delimiter",
             )
         places.append(place)
     while reader.rows[places[-1]].is_empty:
@@ -354,42 +320,30 @@ def _without_empty_rows(reader: _Reader, places: list[int], columns: int) -> lis
 def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
     """Refuse rows of numbers above the block and below it."""
     source, lines = reader.source, reader.lines
-    touches = True  # nothing but empty rows has come in between
-    for place in range(start - 1, -1, -1):
-        is_row = place in reader.rows
-        if is_row and reader.rows[place].is_empty:
-            continue
-        if _FACTOR.fullmatch(lines[place]):
-            raise InputError(
-                f"line {place + 1} of {source} is {shown_line(lines[place])}: multiply the numbers "
-                "by this factor, and remove it"
-            )
-        may_be_row = reader.may_be_row(place, place == start - 1)
-        if may_be_row and (touches or (is_row and reader.is_whole(place))):
-            raise InputError(
-                f"line {place + 1} of {source} is {shown_line(lines[place])}, above the numbers "
-                f"that begin on line {start + 1}: remove it if it is none of them, and correct it "
-                "if it is"
-            )
-        touches = False
-    for place in range(last + 1, len(lines)):
-        if reader.may_be_row(place, place == last + 1):
-            words = (k for k in range(last + 1, place + 1) if k not in reader.rows)
-            end = next(words, last + 1)
-            flaw = flaw_of(split(lines[end], reader.delimiter))
-            if flaw is not None and reader.may_be_row(end, True):
-                raise InputError(f"line {end + 1} of {source} has {flaw}")
-            held = "one number" if reader.count == 1 else f"{reader.count} numbers"
-            if end == last + 1 and reader.may_be_row(end, True):
-                raise InputError(
-                    f"line {end + 1} of {source} is {shown_line(lines[end])}: it must hold {held}, "
-                    "with an empty field for one that is missing; remove it if it is no row"
+    held = "one number" if reader.count == 1 else f"{reader.count} numbers"
+    for outside in range(start - 1, -1, -1), range(last + 1, len(lines)):
+        adjoins = True  # nothing but empty rows has come in between
+        for place in outside:
+            if _FACTOR.fullmatch(lines[place]):
+                reader.refuse(place, ": multiply the numbers by this factor, and remove it")
+            if place in reader.rows and reader.rows[place].is_empty:
+                continue
+            is_below = place > last  # where a short row is one, too
+            if reader.may_be_row(place, adjoins or (is_below and place in reader.rows)):
+                mend = (
+                    "correct it if it is one of the rows, with an empty field for a number that is "
+                    "missing, or else remove it"
                 )
-            raise InputError(
-                f"line {end + 1} of {source} is {shown_line(lines[end])}: it ends the rows of "
-                f"{held} on lines {start + 1} to {last + 1}, and more numbers follow on line "
-                f"{place + 1}; keep the rows of one trace in a file"
-            )
+                if not is_below:
+                    reader.refuse(place, f", above the numbers from line {start + 1} on: {mend}")
+                after = (k for k in range(last + 1, place + 1) if k not in reader.rows)
+                end = next(after, last + 1)
+                if end != place:  # removing it would join two blocks
+                    mend = f"numbers follow on line {place + 1}, so keep one trace in a file"
+                reader.refuse(
+                    end, f": it ends the rows of {held} on lines {start + 1} to {last + 1}; {mend}"
+                )
+            adjoins = False
     # Lines beside the block that differ in their digits alone are rows of another form.
     n = _ROWS_TO_BEGIN
     for beside in lines[max(start - n, 0) : start], lines[last + 1 : last + 1 + n]:
@@ -414,21 +368,22 @@ def _refuse_odd_ends(
     They are printed otherwise than all numbers between, or the first one counts the others. Of
     several columns only the last row is judged, in which the file may end too early.
     """
-
-    def judged(k: int) -> bool:  # noughts and codes of missing heights are written as they please
-        is_free = (numbers[k] == 0 and k < n - 1) or may_be_code(numbers[k])
-        return isfinite(numbers[k]) and not is_free
-
     n = len(column)
-    forms = [printed_form(column[k]) for k in range(_ENDS, n - _ENDS) if judged(k)]
-    if len(forms) < _TO_JUDGE:
+    # Noughts and codes of missing heights are written as they please.
+    forms = {
+        k: printed_form(column[k])
+        for k in range(n)
+        if isfinite(numbers[k]) and (numbers[k] or k == n - 1) and not may_be_code(numbers[k])
+    }
+    inner = [form for k, form in forms.items() if _ENDS <= k < n - _ENDS]
+    if len(inner) < _TO_JUDGE:
         return
-    usual, times = Counter(forms).most_common(1)[0]
-    has_one_form = times >= (_ONE_FORM if is_lone else 1.0) * len(forms)
-    fewest, shortest = (min(counts) for counts in zip(*forms, strict=True))
-    ends = (*range(min(_ENDS, n)), *range(max(_ENDS, n - _ENDS), n)) if is_lone else (n - 1,)
-    for k in filter(judged, ends):
-        form = printed_form(column[k])
+    usual, times = Counter(inner).most_common(1)[0]
+    has_one_form = times >= (_ONE_FORM if is_lone else 1.0) * len(inner)
+    fewest, shortest = (min(counts) for counts in zip(*inner, strict=True))
+    for k, form in forms.items():
+        if k < n - 1 and (not is_lone or _ENDS <= k < n - _ENDS):
+            continue
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
         is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
         is_odd = form != usual if has_one_form else is_cut
