@@ -61,6 +61,9 @@ class Quotient:
     value: float
     bound: str
 
+    def __str__(self) -> str:
+        return f"{self.bound} {self.value:.2g}".strip()
+
 
 @dataclass(frozen=True)
 class Ratio:
@@ -74,20 +77,6 @@ class Ratio:
     # Ratio to the coarsest grid that is at least as accurate, as are all finer ones that finished
     converged: Quotient
     cheapest: Quotient  # ratio to the cheapest grid that is at least as accurate, perhaps by chance
-
-
-@dataclass(frozen=True)
-class Exponent:
-    """Exponent of a power law of the CPU time of ``sharp``, by least squares in the logarithms."""
-
-    among: str  # property that the lines share
-    variable: str  # name of the independent variable
-    # least, most: range of the variable
-    least: int
-    most: int
-    # of_loop, of_solution: exponents of the CPU time of a loop and of a solution
-    of_loop: float
-    of_solution: float
 
 
 def benchmark(
@@ -113,59 +102,18 @@ def benchmark(
     return lines
 
 
-def exponents(lines: Sequence[Line]) -> list[Exponent]:
-    """Fit the growth of the CPU time of ``sharp`` with its patches, and with the wave numbers.
-
-    A series is made of finished lines on scenes of growth that differ in γ alone, or in the
-    highest harmonic alone.
-    """
-    done = [line for line in lines if line.run.method == "sharp" and not line.measured.note]
-    found = []
-    for top in sorted({_top(line) for line in done}):
-        series = [line for line in done if _top(line) == top]
-        sizes = [line.measured.patches for line in series]
-        found += _exponent(f"m to {top}", "patches", sizes, series)
-    for gamma in sorted({line.run.scene.work_of_adhesion for line in done}, reverse=True):
-        series = [line for line in done if line.run.scene.work_of_adhesion == gamma]
-        found += _exponent(f"γ = {gamma:g}", "wave numbers", [_top(s) for s in series], series)
-    return found
-
-
-def _top(line: Line) -> int:
-    return line.run.scene.n0 * line.run.scene.ratio
-
-
-def _exponent(
-    among: str, variable: str, sizes: Sequence[int], series: Sequence[Line]
-) -> list[Exponent]:
-    if len(set(sizes)) < 2:
-        return []
-    seconds = np.array([line.measured.cpu_seconds for line in series])
-    solutions = np.array([line.measured.solutions for line in series])
-    of_loop, of_solution = (
-        float(np.polyfit(np.log(sizes), np.log(cost), 1)[0])
-        for cost in (seconds, seconds / solutions)
-    )
-    return [Exponent(among, variable, min(sizes), max(sizes), of_loop, of_solution)]
-
-
 def ratios(lines: Sequence[Line]) -> list[Ratio]:
     """Compare every finished run of ``sharp`` with the ``grid`` of its scene; see :class:`Ratio`.
 
     Both methods must have finished; a scene without grid gives none.
     """
     found = []
-    for line in lines:
-        if line.run.method != "sharp" or not math.isfinite(line.error):
-            continue
-        series = [
-            (abs(other.error), other.measured.cpu_seconds)
-            for other in lines
-            if other.run.scene is line.run.scene
-            and other.run.method == "grid"
-            and math.isfinite(other.error)
-        ]
-        if series:
+    finished = [line for line in lines if math.isfinite(line.error)]
+    for line in finished:
+        here = [other for other in finished if other.run.scene is line.run.scene]
+        grids = [other for other in here if other.run.method == "grid"]
+        if line.run.method == "sharp" and grids:
+            series = [(abs(grid.error), grid.measured.cpu_seconds) for grid in grids]
             converged = _quotient(line, _with_error_of_finer(series))
             found.append(Ratio(line, converged, _quotient(line, series)))
     return found

@@ -136,28 +136,6 @@ PAPER = Scene(
 QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
 FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)
 
-# Highest over lowest harmonic, γ, and the grid beside sharp: the coarsest, if it ends in time.
-_GROWTH = (
-    *((25, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025)),
-    *((100, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025, 0.0006)),
-    (100, 0.00015, ()),
-    *((1000, gamma, ()) for gamma in (0.04, 0.01, 0.0025)),
-    (10_000, 0.04, ()),
-)
-GROWTH = tuple(
-    Scene(
-        name=f"growth-{10 * ratio}-{gamma:g}",
-        title=f"rough, m = 10 … {10 * ratio}, γ = {gamma:g}",
-        work_of_adhesion=gamma,
-        n0=10,
-        ratio=ratio,
-        grids=grids,
-        accuracies=(1e-3,),
-    )
-    for ratio, gamma, grids in _GROWTH
-)
-"""Scenes for the growth of cost with the number of patches (small γ) and of wave numbers."""
-
 # Has touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
 WARM_UP = Scene(
     name="warm-up",

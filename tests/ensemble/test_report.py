@@ -245,11 +245,13 @@ def test_an_interval_that_goes_on_below_zero_is_marked():
     figure = Figure()
     axes = figure.subplots()
     found = [SimpleNamespace(mean=1.0, low=low, high=2.0) for low in (-0.5, 0.5)]
-    loss_figures.errorbar(axes, np.array([1.0, 2.0]), found, 0, "loss")
+    cells = [SimpleNamespace(estimates={"loss": e}, failed=0, short_of_preload=0) for e in found]
+    what = (axes, np.array([1.0, 2.0]), cells, "loss", 1.0, 0, "loss")
+    loss_figures.errorbar(*what)
     (mark,) = [line for line in axes.lines if line.get_marker() == CARETDOWN]
     assert mark.get_xydata().tolist() == [[1.0, 0.0]]
     axes.cla()
-    loss_figures.errorbar(axes, np.array([1.0, 2.0]), found, 0, "loss", from_zero=False)
+    loss_figures.errorbar(*what, from_zero=False)
     assert CARETDOWN not in [line.get_marker() for line in axes.lines]
 
 

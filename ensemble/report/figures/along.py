@@ -10,13 +10,16 @@ from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.figures.loss_figures import (
-    errorbar,
-    hollow_handle,
-    hollow_of,
-    loss_label,
+from adhesis.ensemble.report.figures.loss_figures import errorbar, hollow_handle, loss_label
+from adhesis.ensemble.report.further_axes import (
+    axis_label,
+    below,
+    from_to,
+    lines_along,
+    own_axes,
+    symbols,
+    together,
 )
-from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, symbols, together
 
 _MOST_TICKS = 5
 _LOG_FROM = 20  # an axis that spans more is logarithmic
@@ -30,12 +33,8 @@ _OF_TURNING_POINT = (
 
 def with_figure(data: Aggregate) -> list[Axis]:
     """Further axes that have a figure: all but those that vary together with H or γ."""
-    return [
-        axis
-        for axis in data.further
-        if not together(data, axis) & {"hurst", "work_of_adhesion"}
-        and any(len(line) > 1 for line in lines_along(data, axis))
-    ]
+    axes = own_axes(data)
+    return [axis for axis in axes if any(len(line) > 1 for line in lines_along(data, axis))]
 
 
 def along(axis: Axis) -> Callable[[Aggregate], style.PublishedFigure]:
@@ -74,14 +73,12 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
                 line = lines.get((title, of_line), [])
                 if not line:
                     continue
-                x = np.array([dict(cell.others)[axis.name] for cell in line], dtype=float)
+                x = np.array([cell.further_values[axis.name] for cell in line], dtype=float)
                 aside = (k - (len(labels) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 x /= axis_unit
-                found = [cell.estimates[name] for cell in line]
                 above = name != "pull_off_penetration"
-                hollow = hollow_of(line)
-                errorbar(axes, x, found, k, of_line, unit=unit, from_zero=above, hollow=hollow)
+                errorbar(axes, x, line, name, unit, k, of_line, from_zero=above)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
@@ -113,10 +110,10 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
 
 def _sample(cells: list[AveragedCell]) -> str:
     """Return the number of profiles that means are over, and what their bars are."""
-    counts = sorted({cell.done for cell in cells if cell.done})
-    many = " to ".join(dict.fromkeys((f"{counts[0]}", f"{counts[-1]}")))
-    interval = ", 95 % interval of the mean" if counts[-1] > 1 else ""
-    return f"n = {many} {'profiles' if counts[-1] > 1 else 'profile'}{interval}"
+    counts = [cell.done for cell in cells if cell.done]
+    several = max(counts) > 1
+    of_what = "profiles, 95 % interval of the mean" if several else "profile"
+    return f"n = {from_to(counts)} {of_what}"
 
 
 def _lines(
@@ -135,12 +132,12 @@ def _lines(
 
     wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
     lines: dict[tuple[str, str], list[AveragedCell]] = {}
-    for cell in sorted(data.cells, key=lambda cell: dict(cell.others)[axis.name]):
+    for cell in sorted(data.cells, key=lambda cell: cell.further_values[axis.name]):
         if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
             continue
         title, label = f"H = {cell.hurst:g}", style.gamma_label(cell.work_of_adhesion)
         if second is not None:
-            value = dict(cell.others)[second.name]
+            value = cell.further_values[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])
         lines.setdefault((title, label), []).append(cell)
     every = list(wanted.values())

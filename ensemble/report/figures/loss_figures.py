@@ -61,8 +61,7 @@ def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
     for axes, (k, gamma) in zip(figure.panels, shown, strict=False):
         cells = _of_gamma(data, gamma)
         x = np.array([cell.hurst for cell in cells])
-        found = [cell.estimates[name] for cell in cells]
-        errorbar(axes, x, found, k, "_", unit=unit, hollow=hollow_of(cells))
+        errorbar(axes, x, cells, name, unit, k, "_")
         _stars(axes, [(cell.hurst + aside, papers_loss(cell), style.colour(k)) for cell in cells])
         style.label_panel(axes, style.gamma_label(gamma))
     for axes in figure.panels[len(shown) :]:
@@ -89,8 +88,7 @@ def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
         for k, hurst in enumerate(hursts):
             cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
-            found = [cell.estimates[name] for cell in cells]
-            errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit, hollow=hollow_of(cells))
+            errorbar(axes, m2, cells, name, unit, k, f"H = {hurst:g}")
             _stars(axes, [(paper.m2(c.hurst), papers_loss(c), style.colour(k)) for c in cells])
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
         style.label_panel(axes, style.gamma_label(gamma))
@@ -216,11 +214,9 @@ def pull_off(data: Aggregate) -> style.PublishedFigure:
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
         x = np.array([cell.work_of_adhesion for cell in cells]) / size
-        found = [cell.estimates["pull_off_stress"] for cell in cells]
         # apart, so that intervals can be distinguished
-        offset = (k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion) / size
-        hollow = hollow_of(cells)
-        errorbar(axes, x, found, k, f"H = {hurst:g}", offset=offset, unit=1e3, hollow=hollow)
+        x += (k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion) / size
+        errorbar(axes, x, cells, "pull_off_stress", 1e3, k, f"H = {hurst:g}")
     figure.label(rf"work of adhesion $\gamma$ ({unit})", "largest tension (kPa)")
     axes.set_ylim(bottom=0)
     handles = [*axes.get_legend_handles_labels()[0], *hollow_handle(data.cells)]
@@ -257,31 +253,29 @@ def _occupied(data: Aggregate) -> slice:
 def errorbar(
     axes: Axes,
     x: np.ndarray,
-    found: list[Estimate],
+    cells: Sequence[Cell],
+    name: str,
+    unit: float,
     k: int,
     label: str,
-    offset: float = 0.0,
-    unit: float = 1.0,
     *,
     from_zero: bool = True,
-    hollow: Sequence[bool] = (),
 ) -> None:
-    """Draw means with their intervals, in multiples of a unit; joined if they are many.
+    """Draw means over cells with their intervals, in multiples of a unit; joined if they are many.
 
-    Where the panel begins at 0, a mark there shows which intervals go on below. Marks of
-    :func:`hollow_of` are hollow.
+    Hollow where loops of a cell failed or were short of their preload. Where the panel begins at 0,
+    a mark there shows which intervals go on below.
     """
-    mean, low, bars = _in_unit(found, unit)
+    mean, low, bars = _in_unit([cell.estimates[name] for cell in cells], unit)
     line = style.LINES[k] if x.size >= FEWEST_FOR_A_LINE else "none"
-    axes.errorbar(
-        x + offset, mean, yerr=bars, linestyle=line, label=label, capsize=style.CAP, **style.look(k)
-    )
-    if any(hollow):
-        place = np.flatnonzero(hollow)
+    look = style.look(k)
+    axes.errorbar(x, mean, yerr=bars, linestyle=line, label=label, capsize=style.CAP, **look)
+    hollow = np.array([bool(cell.failed or cell.short_of_preload) for cell in cells], dtype=bool)
+    if hollow.any():
         options = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5, "label": "_"}
-        axes.plot((x + offset)[place], mean[place], **style.look(k) | options)
+        axes.plot(x[hollow], mean[hollow], **look | options)
     if from_zero:
-        mark_below_zero(axes, (x + offset)[low < 0], style.colour(k))
+        mark_below_zero(axes, x[low < 0], style.colour(k))
 
 
 def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
@@ -291,11 +285,6 @@ def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
         for part in ("mean", "low", "high")
     )
     return mean, low, np.nan_to_num(np.array([mean - low, high - mean]))
-
-
-def hollow_of(cells: Sequence[Cell]) -> list[bool]:
-    """Return whether loops of each cell failed or were short of their preload."""
-    return [cell.failed > 0 or cell.short_of_preload > 0 for cell in cells]
 
 
 def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:
