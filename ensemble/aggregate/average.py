@@ -18,6 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.ensemble.aggregate.by_blocks import (
+    Curve,
+    FieldStatistics,
+    JumpStatistics,
+    average_curves,
+    average_fields,
+    count_jumps,
+)
 from adhesis.ensemble.aggregate.cells import Cell, finished_cells, stress_scale
 from adhesis.ensemble.aggregate.companions import (
     Companion,
@@ -25,9 +33,6 @@ from adhesis.ensemble.aggregate.companions import (
     difference,
     read_companion,
 )
-from adhesis.ensemble.aggregate.jumps import JumpStatistics, count_jumps
-from adhesis.ensemble.aggregate.mean_curves import Curve, average_curves
-from adhesis.ensemble.aggregate.mean_fields import FieldStatistics, average_fields
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.results.read import Results

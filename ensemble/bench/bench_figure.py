@@ -30,20 +30,17 @@ def draw(lines: Sequence[Line]) -> Figure:
             rows, columns, style.TWO_COLUMNS, 8 * style.MM + rows * _PANEL_HEIGHT
         )
         shown: dict[str, Line2D] = {}
-        for k, axes in enumerate(figure.axes):
-            if k >= len(scenes):
-                axes.set_visible(False)
-                continue
-            for method in _METHODS:
-                of_method = (line for line in lines if line.run.method == method)
-                here = [line for line in of_method if line.run.scene is scenes[k]]
-                chosen = [line for line in here if math.isfinite(line.error)]
-                if chosen:
-                    shown[method] = _series(axes, method, chosen)
-            style.label_panel(axes, scenes[k].title)
-            axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
-        # One range for all, so that the panels can be compared; with margins for the labels.
         finished = [line for line in lines if math.isfinite(line.error)]
+        for axes, scene in zip(figure.axes, scenes, strict=False):
+            for method in _METHODS:
+                here = [line for line in finished if line.run.scene is scene]
+                if chosen := [line for line in here if line.run.method == method]:
+                    shown[method] = _series(axes, method, chosen)
+            style.label_panel(axes, scene.title)
+            axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
+        for axes in figure.axes[len(scenes) :]:
+            axes.set_visible(False)
+        # One range for all, so that the panels can be compared; with margins for the labels.
         seconds = [line.measured.cpu_seconds for line in finished]
         errors = [_plotted_error(line) for line in finished]
         for axes in figure.axes if finished else ():

@@ -9,7 +9,7 @@ more accurate than every measured one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
@@ -79,27 +79,18 @@ class Ratio:
     cheapest: Quotient  # ratio to the cheapest grid that is at least as accurate, perhaps by chance
 
 
-def benchmark(
-    scenes: Sequence[Scene] = FULL,
-    *,
-    seconds: float = 360.0,
-    on_line: Callable[[Line], None] | None = None,
-) -> list[Line]:
-    """Measure the methods on the scenes; ``on_line`` is called with every line when it is measured.
+def benchmark(scenes: Sequence[Scene] = FULL, *, seconds: float = 360.0) -> Iterator[Line]:
+    """Measure the methods on the scenes, one line after the other.
 
     A run is given up after so many CPU seconds. A grid that would take longer, estimated from the
     one before it, is left out. Both give lines with a note.
     """
-    lines: list[Line] = []
     for scene in scenes:
-        reference = _reference(scene, seconds)
+        reference, before = _reference(scene, seconds), 0.0
         for run in _runs(scene, seconds):
-            before = [line for line in lines if line.run.scene is scene]
             line = Line(run, reference, _left_out(run, before) or measure(run))
-            lines.append(line)
-            if on_line is not None:
-                on_line(line)
-    return lines
+            before = line.measured.cpu_seconds  # NaN if the run did not finish
+            yield line
 
 
 def ratios(lines: Sequence[Line]) -> list[Ratio]:
@@ -160,12 +151,9 @@ def _runs(scene: Scene, seconds: float) -> Iterator[Run]:
             yield Run(scene, method, value, scene.load_steps * finer, seconds)
 
 
-def _left_out(run: Run, before: Sequence[Line]) -> Measurement | None:
+def _left_out(run: Run, before: float) -> Measurement | None:
     """Return a note for a grid run that would take too long; None if it should be tried."""
-    if run.method != "grid" or not before:
-        return None
-    last = before[-1].measured.cpu_seconds  # NaN if that run did not finish
-    if last * _COST_OF_DOUBLING <= run.seconds:
+    if run.method != "grid" or before * _COST_OF_DOUBLING <= run.seconds:
         return None
     return Measurement(note=f"left out: it would take more than {run.seconds:g} s")
 

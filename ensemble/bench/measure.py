@@ -97,24 +97,16 @@ def measure(run: Run) -> Measurement:
     return Measurement(**json.loads(child.stdout))
 
 
-def measure_here(run: Run, *, limited: bool = False) -> Measurement:
-    """Run and measure in this process; if ``limited``, end it when ``run.seconds`` are over."""
-    if limited:
-        _limit(_START_LIMIT)
+def _measure_here(run: Run) -> Measurement:
+    """Run and measure in this process, and end it when ``run.seconds`` are over."""
+    _limit(_START_LIMIT)
     if run.method != "tamaas":
         _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
     before = peak_megabytes()
-    if limited:
-        _limit(run.seconds)
+    _limit(run.seconds)
     started = process_time()
     numbers = _numbers(run)
-    seconds = process_time() - started
-    return Measurement(
-        cpu_seconds=seconds,
-        megabytes=peak_megabytes(),
-        megabytes_before=before,
-        **numbers,
-    )
+    return Measurement(process_time() - started, peak_megabytes(), before, **numbers)
 
 
 def _numbers(run: Run) -> dict[str, Any]:
@@ -168,7 +160,7 @@ def main() -> None:
     """Measure the run in the first argument."""
     fields = json.loads(sys.argv[1])
     run = Run(**{**fields, "scene": Scene(**fields["scene"])})
-    print(json.dumps(asdict(measure_here(run, limited=True))))
+    print(json.dumps(asdict(_measure_here(run))))
 
 
 if __name__ == "__main__":

@@ -11,14 +11,10 @@ import argparse
 import platform
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import bar
-
-if TYPE_CHECKING:
-    from adhesis.ensemble.bench.equal_error import Line
 
 _DEFAULT = Path("out/benchmark")
 EXAMPLES = (
@@ -56,16 +52,15 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.ensemble.versions import processor
 
     check_output_folder("--to", args.to, _FILES, {})
+    lines = []
     with bar("adhesis bench: measuring", last=False) as show_run:
-
-        def show(line: Line) -> None:
+        for line in benchmark(QUICK if args.quick else FULL, seconds=args.budget):
+            lines.append(line)
             run = line.run
             if not sys.stderr.isatty():  # no bar there; half an hour of silence is too long
                 row = make_table("", COLUMNS, [line]).markdown().splitlines()[-1]
                 print(run.scene.name, row, file=sys.stderr)
             show_run(None, None, f"{run.scene.title}: {run.method}, {run.described}")
-
-        lines = benchmark(QUICK if args.quick else FULL, seconds=args.budget, on_line=show)
     machine = f"one core of {processor()}, Python {platform.python_version()}"
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
     text = page(lines, ratios(lines), f"`{command}` on {machine}")

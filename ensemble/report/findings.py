@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
+from adhesis.ensemble.aggregate.by_blocks import fitted_slope
 from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
 from adhesis.ensemble.aggregate.companions import Companion
-from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from adhesis.ensemble.aggregate.average import aggregate
-from adhesis.ensemble.aggregate.jumps import BIN_EDGES, SMALL
-from adhesis.ensemble.aggregate.mean_curves import QUANTILES
-from adhesis.ensemble.aggregate.mean_fields import fitted_slope
+from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, QUANTILES, SMALL, fitted_slope
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import estimates, interval, interval_method, untransformed

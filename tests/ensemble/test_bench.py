@@ -98,7 +98,7 @@ def test_a_grid_that_would_take_too_long_is_left_out_and_so_are_finer_ones(monke
         return replace(fake_measure(run), cpu_seconds=20.0 if run.setting == 256 else 1.0)
 
     monkeypatch.setattr(benchmarking, "measure", slow)
-    lines = benchmark([ONE_WAVE], seconds=60.0)
+    lines = list(benchmark([ONE_WAVE], seconds=60.0))
     notes = [line.measured.note[:8] for line in lines if line.run.method == "grid"]
     assert notes == ["", "", "left out", "left out"]
     assert all(line.measured.note == "" for line in lines if line.run.method != "grid")
@@ -112,7 +112,7 @@ def test_reference_is_the_tightest_run_that_finishes(monkeypatch):
         return Measurement(note="failed") if run.setting < 1e-7 else fake_measure(run)
 
     monkeypatch.setattr(benchmarking, "measure", tightest_fails)
-    lines = benchmark([SMALL_ROUGH], seconds=60.0)
+    lines = list(benchmark([SMALL_ROUGH], seconds=60.0))
     assert (1e-7, 40) in asked
     assert {line.reference for line in lines} == {
         Reference(3.0, "sharp, accuracy 1e-07, 40 load steps")

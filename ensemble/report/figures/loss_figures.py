@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
+from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE, SMALL
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
-from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE, SMALL
 from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper

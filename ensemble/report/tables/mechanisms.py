@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.jumps import SMALL
-from adhesis.ensemble.aggregate.mean_fields import fitted_slope
+from adhesis.ensemble.aggregate.by_blocks import SMALL, fitted_slope
 from adhesis.ensemble.quantities import percent
 from adhesis.ensemble.report.tables.key import estimated, key_columns
 from adhesis.ensemble.report.tables.table import Table, TableColumn, fixed, make_table, number
