@@ -186,9 +186,10 @@ def read_cells(results: Results) -> list[Cell]:
         values["pull_off_stress_dimensionless"] = values["pull_off_stress"] / scale
         for name in ("loss_error", "energy_at_stake"):
             values[f"{name}_dimensionless"] = values[name] / (scale * values["h_max"])
-        failed, pending, spare = (
-            int(np.sum(status[rows_of_cell] == code)) for code in (FAILED, PENDING, NOT_NEEDED)
-        )
+        counts = {
+            name: int(np.sum(status[rows_of_cell] == code))
+            for name, code in (("failed", FAILED), ("pending", PENDING), ("not_needed", NOT_NEEDED))
+        }
         cells.append(
             Cell(
                 hurst=task.hurst,
@@ -201,9 +202,7 @@ def read_cells(results: Results) -> list[Cell]:
                 },
                 plan=field_plan(campaign, task),
                 done=rows.size,
-                failed=failed,
-                pending=pending,
-                not_needed=spare,
+                **counts,
                 rows=rows,
                 seed=seed[rows],
                 values=values,

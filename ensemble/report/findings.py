@@ -148,14 +148,15 @@ def _numerical(data: Aggregate) -> str:
 
 def precision(data: Aggregate) -> Iterator[str]:
     """Report the cells that have met the precision of ``[stop]``; none without ``[stop]``."""
-    found = {cell.name: cell.precision for cell in data.cells if cell.precision is not None}
+    known = [(cell.name, cell.precision) for cell in data.cells]
+    found = [(name, precision) for name, precision in known if precision is not None]
     if not found:
         return
-    any_ = next(iter(found.values()))
-    rest = [f"{name}: {known}" for name, known in found.items() if not known.met]
+    wanted = found[0][1]
+    rest = [f"{name}: {precision}" for name, precision in found if not precision.met]
     yield (
-        f"The 95 % interval of the mean {any_.quantity} was to reach at most "
-        f"{percent(any_.wanted, digits=3)} from it ([stop]): {len(found) - len(rest)} of "
+        f"The 95 % interval of the mean {wanted.quantity} was to reach at most "
+        f"{percent(wanted.wanted, digits=3)} from it ([stop]): {len(found) - len(rest)} of "
         f"{len(found)} cells met that{f'; the others: {_listed(rest)}' if rest else ''}."
     )
 
@@ -283,10 +284,10 @@ def _limit(data: Aggregate) -> Iterator[str]:
             f"The zero-range limit holds for ranges of adhesion well below {1e9 * low:.3g} nm: the "
             f"least {ANY_RANGE} of all loops, at {least}."
         )
-    counts = {cell.name: int(cell.beyond_zero_range.sum()) for cell in data.cells}
-    if beyond := [name for name, count in counts.items() if count]:
+    counts = [(cell.name, int(cell.beyond_zero_range.sum())) for cell in data.cells]
+    if beyond := [name for name, count in counts if count]:
         yield (
-            f"WARNING: {sum(counts.values())} of {data.done} losses are doubtful, for "
+            f"WARNING: {sum(count for _, count in counts)} of {data.done} losses are doubtful, for "
             f"{why_beyond(opens)}: {_listed(beyond)}."
         )
 
@@ -383,7 +384,7 @@ def _verb(steps: NDArray[np.float64], up: str, down: str, flat: str = "") -> str
     """Return how values behave, from their differences."""
     signs = set(np.sign(steps).tolist())
     known = {1.0: up, -1.0: down, 0.0: flat}
-    return (known[signs.pop()] if len(signs) == 1 else "") or "is not monotone"
+    return (known.get(signs.pop()) if len(signs) == 1 else "") or "is not monotone"
 
 
 def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:

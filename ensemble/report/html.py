@@ -38,9 +38,9 @@ def picture(png: bytes, name: str, kind: str = "") -> str:
     return f'<img {shape}alt="{escape(name)}" src="data:image/png;base64,{data}">'
 
 
-def picture_of(figure: Any) -> str:
+def picture_of(figure: Any, name: str = "figure") -> str:
     """Return a figure as a picture in HTML."""
-    return picture(figure._repr_png_(), "figure")
+    return picture(figure._repr_png_(), name)
 
 
 def table_of(rows: Iterable[tuple[str, str]]) -> str:

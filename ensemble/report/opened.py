@@ -21,7 +21,7 @@ from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.quantities import with_units
 from adhesis.ensemble.report.curves_dataset import curves_dataset
-from adhesis.ensemble.report.html import picture, table_of
+from adhesis.ensemble.report.html import picture_of, table_of
 from adhesis.ensemble.report.tables import loss_tables, mechanisms
 from adhesis.ensemble.report.tables.table import Table
 from adhesis.ensemble.results import schema
@@ -176,7 +176,7 @@ class CampaignResults:
         several = along.with_figure(self.averages) if len(self.averages.hursts) == 1 else []
         draw = partial(self.plot.loss_along, several[0].name) if several else None
         figure: Any = (draw or self.plot.loss_against_hurst)()
-        return page + table + picture(figure._repr_png_(), "losses")
+        return page + table + picture_of(figure, "losses")
 
     @cached_property
     def averages(self) -> Aggregate:
@@ -209,10 +209,9 @@ class CampaignResults:
             for d in schema.DATASETS
             if d.dims[0] == "task"
             and d.name not in (*self.axes, *_SPECTRA, *_NO_RESULTS)
-            and not d.name.startswith("jump_")
+            and (d.name == "jump_count" or not d.name.startswith("jump_"))
         ]
-        count = next(d for d in schema.DATASETS if d.name == "jump_count")
-        return self._arranged([*wanted, count])
+        return self._arranged(wanted)
 
     @cached_property
     def spectra(self) -> xr.Dataset:

@@ -24,10 +24,11 @@ from adhesis.ensemble.report.further_axes import (
 _MOST_TICKS = 5
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
+# Name, label, unit, and whether the panel begins at 0.
 _OF_TURNING_POINT = (
-    ("pull_off_stress", "largest tension (kPa)", 1e3),
-    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0),
-    ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0),
+    ("pull_off_stress", "largest tension (kPa)", 1e3, True),
+    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0, False),
+    ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0, True),
 )
 
 
@@ -52,13 +53,11 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     second = next((other for other in data.further if other.name not in moving), None)
     fixed, every = _lines(data, axis, second)
     lines = {at: done for at, cells in every.items() if (done := [c for c in cells if c.done])}
-    titles = list(dict.fromkeys(title for title, _ in lines))
-    titles = [titles[round(k)] for k in style.spread_out(range(len(titles)), style.MOST_PANELS)]
-    labels = list(dict.fromkeys(label for _, label in lines))
-    labels = [labels[round(k)] for k in style.spread_out(range(len(labels)), style.MOST_CURVES)]
-    rows = [("loss", loss_label(data), 1e-3)]
+    titles = style.spread_out(list(dict.fromkeys(title for title, _ in lines)), style.MOST_PANELS)
+    labels = style.spread_out(list(dict.fromkeys(label for _, label in lines)), style.MOST_CURVES)
+    rows = [("loss", loss_label(data), 1e-3, True)]
     if axis.name in TURNING_POINTS:
-        per_contact = ("loss_per_contact", loss_label(data, "loss per contact"), 1e-3)
+        per_contact = ("loss_per_contact", loss_label(data, "loss per contact"), 1e-3, True)
         rows += [*_OF_TURNING_POINT, per_contact]
     width = style.ONE_COLUMN if len(titles) == 1 else style.TWO_COLUMNS
     height = (22 + 40 * len(rows)) * style.MM
@@ -67,7 +66,7 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     logarithmic = low > 0 and high > _LOG_FROM * low
     grid = figure.rows
     axis_text, axis_unit = axis_label(axis)
-    for row, (name, label, unit) in zip(grid, rows, strict=True):
+    for row, (name, label, unit, from_zero) in zip(grid, rows, strict=True):
         for axes, title in zip(row, titles, strict=True):
             for k, of_line in enumerate(labels):
                 line = lines.get((title, of_line), [])
@@ -77,12 +76,11 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
                 aside = (k - (len(labels) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 x /= axis_unit
-                above = name != "pull_off_penetration"
-                errorbar(axes, x, line, name, unit, k, of_line, from_zero=above)
+                errorbar(axes, x, line, name, unit, k, of_line, from_zero=from_zero)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
-        for axes in row if name != "pull_off_penetration" else ():
+        for axes in row if from_zero else ():
             axes.set_ylim(bottom=0)  # when the panels, which share it, are all drawn
         row[0].set_ylabel(label)
     for axes, title in zip(grid[0], titles, strict=True):

@@ -150,8 +150,7 @@ def cells_with_shape(data: Aggregate) -> list[AveragedCell]:
 
 def shown_penetrations(data: Aggregate, most: int) -> list[int]:
     """Places of the penetrations that a figure shows, deepest first."""
-    places = list(range(data.cells[0].plan.penetration.size))[::-1]
-    return [int(k) for k in style.spread_out(places, most)]
+    return style.spread_out(range(data.cells[0].plan.penetration.size)[::-1], most)
 
 
 def _spectra(data: Aggregate, b: int) -> style.PublishedFigure:

@@ -296,10 +296,11 @@ def profiles(data: Aggregate) -> Table:
         *estimated("m4", "mean", "m4 (1/µm²)", size=1e12),
     ]
     best: dict[tuple[float, ...], Cell] = {}  # all cells of a key have the same profiles
-    for cell in sorted(data.cells, key=lambda cell: -cell.done):
+    for cell in data.cells:
         at = (cell.hurst, *(cell.further_values[axis.name] for axis in further))
-        best.setdefault(at, cell)
-    return make_table("Profiles", columns, [cell for cell in data.cells if cell in best.values()])
+        if at not in best or cell.done > best[at].done:
+            best[at] = cell
+    return make_table("Profiles", columns, best.values())
 
 
 def companions(data: Aggregate) -> Table:
