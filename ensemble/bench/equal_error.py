@@ -15,16 +15,14 @@ from itertools import accumulate
 
 import numpy as np
 
-from adhesis.ensemble.bench.measure import Measured, Measurement, Run, measure
+from adhesis.ensemble.bench.measure import Measurement, Run, measure
 from adhesis.ensemble.bench.scenes import FULL, Scene
-from adhesis.ensemble.bench.tamaas import has_tamaas
+from adhesis.solver.registry import MethodName
 
 # Doubling the nodes multiplies the time of a grid run by up to this factor.
 _COST_OF_DOUBLING = 4.0
 # Time limit of the reference run, in units of that of a measured run.
 _REFERENCE_LIMIT = 3.0
-# tamaas does not locate jumps, so its load steps are finer by this factor.
-_TAMAAS_STEPS = {"one-wave": 5}
 
 
 @dataclass(frozen=True)
@@ -139,16 +137,13 @@ def _front(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _runs(scene: Scene, seconds: float) -> Iterator[Run]:
-    settings: list[tuple[Measured, Sequence[float]]] = [
-        ("grid", scene.grids),
-        ("sharp", scene.accuracies),
-    ]
-    if has_tamaas():
-        settings.append(("tamaas", scene.ranges))
-    for method, values in settings:
-        finer = _TAMAAS_STEPS.get(scene.name, 1) if method == "tamaas" else 1
+    settings: dict[MethodName, tuple[float, ...]] = {
+        "grid": scene.grids,
+        "sharp": scene.accuracies,
+    }
+    for method, values in settings.items():
         for value in values:
-            yield Run(scene, method, value, scene.load_steps * finer, seconds)
+            yield Run(scene, method, value, scene.load_steps, seconds)
 
 
 def _left_out(run: Run, before: float) -> Measurement | None:
@@ -168,4 +163,4 @@ def _reference(scene: Scene, seconds: float) -> Reference:
         if math.isfinite(loss):
             text = f"sharp, accuracy {run.described}, {run.load_steps} load steps"
             return Reference(loss, text)
-    return Reference(math.nan, "none: no reference run finished" if scene.tightest else "none")
+    return Reference(math.nan, "none: no reference run finished")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import adhesis.ensemble.bench.equal_error as benchmarking
-import adhesis.ensemble.bench.tamaas as peer
 from adhesis.ensemble.bench.bench_figure import draw
 from adhesis.ensemble.bench.bench_page import page
 from adhesis.ensemble.bench.equal_error import Line, Reference, benchmark, ratios
@@ -81,8 +80,8 @@ def test_a_run_that_takes_too_long_is_given_up():
 
 
 def fake_measure(run: Run) -> Measurement:
-    """One second and first order for the grid, exact for sharp, far off for tamaas."""
-    error = {"grid": 1 / run.setting, "sharp": 0.0, "tamaas": -0.5}[run.method]
+    """One second and first order for the grid, exact for sharp."""
+    error = {"grid": 1 / run.setting, "sharp": 0.0}[run.method]
     loss = run.scene.exact_loss or 3.0
     return Measurement(1.0, 200.0, 190.0, loss * (1 + error), 2.0, 1e-3, 10, 2, 1)
 
@@ -90,7 +89,6 @@ def fake_measure(run: Run) -> Measurement:
 @pytest.fixture
 def no_runs(monkeypatch):
     monkeypatch.setattr(benchmarking, "measure", fake_measure)
-    monkeypatch.setattr(benchmarking, "has_tamaas", lambda: True)
 
 
 def test_a_grid_that_would_take_too_long_is_left_out_and_so_are_finer_ones(monkeypatch):
@@ -117,24 +115,6 @@ def test_reference_is_the_tightest_run_that_finishes(monkeypatch):
     assert {line.reference for line in lines} == {
         Reference(3.0, "sharp, accuracy 1e-07, 40 load steps")
     }
-
-
-def test_without_tamaas_there_is_no_line_for_it(no_runs, monkeypatch):
-    assert "tamaas" in {line.run.method for line in benchmark([ONE_WAVE])}
-    monkeypatch.setattr(benchmarking, "has_tamaas", lambda: False)
-    assert "tamaas" not in {line.run.method for line in benchmark([ONE_WAVE])}
-
-
-@pytest.mark.skipif(not peer.has_tamaas(), reason="tamaas is not installed")
-def test_tamaas_approaches_the_exact_loss_from_below():
-    problem = ONE_WAVE.problem()
-    losses = [
-        peer.tamaas_loop(
-            problem, reach=reach * problem.profile.h_max, max_penetration=0.2, load_steps=10
-        )[0]
-        for reach in (0.1, 0.05, 0.03)
-    ]
-    assert 0 < losses[0] < losses[1] < losses[2] < ONE_WAVE.exact_loss
 
 
 def test_page_has_every_run_and_says_what_did_not_finish():
