@@ -8,7 +8,7 @@ averages of a file that a run is still writing are consistent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain, pairwise
@@ -131,6 +131,13 @@ class Aggregate:
         keys = {(cell.hurst, cell.others) for cell in layer}
         paired = tuple(p for p in self.paired if (p.lower.hurst, p.lower.others) in keys)
         return replace(self, cells=layer, paired=paired)
+
+    def finished(
+        self, hursts: Collection[float], works_of_adhesion: Collection[float]
+    ) -> list[AveragedCell]:
+        """Return the cells at some H and γ that have finished tasks."""
+        cells = (cell for cell in self.cells if cell.done and cell.hurst in hursts)
+        return [cell for cell in cells if cell.work_of_adhesion in works_of_adhesion]
 
     def cell(self, hurst: float, work_of_adhesion: float) -> AveragedCell | None:
         """Return the first cell of (H, γ), None if the campaign lacks it; see :attr:`shown`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -314,7 +315,7 @@ def _slopes(data: Aggregate) -> Iterator[str]:
     parts = []
     for hurst in data.hursts:
         quoted = paper.m2(hurst)
-        cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
+        cells = data.finished([hurst], data.works_of_adhesion)
         if quoted is not None and cells:
             m2 = cells[0].estimates["m2"].mean
             parts.append(f"{m2:.3g} against {quoted:.2g} at H = {hurst:g}")
@@ -445,12 +446,8 @@ def _spectrum(data: Aggregate) -> Iterator[str]:
 def typical_cell(data: Aggregate, hurst: float | None = None) -> AveragedCell | None:
     """The cell that stands for all: middle H (unless given) and middle γ that have results."""
     hursts = [hurst] if hurst is not None else _from_middle(data.hursts)
-    for h in hursts:
-        for gamma in _from_middle(data.works_of_adhesion):
-            cell = data.cell(h, gamma)
-            if cell is not None and cell.done:
-                return cell
-    return None
+    places = product(hursts, _from_middle(data.works_of_adhesion))
+    return next((cell for h, gamma in places for cell in data.finished([h], [gamma])), None)
 
 
 def _from_middle(values: tuple[float, ...]) -> list[float]:

@@ -14,6 +14,7 @@ from adhesis.ensemble.report.figures.loss_figures import errorbar, hollow_handle
 from adhesis.ensemble.report.further_axes import (
     axis_label,
     below,
+    common,
     from_to,
     lines_along,
     own_axes,
@@ -122,11 +123,10 @@ def _lines(
     The cells of a line ascend along the axis, and may have no finished task.
     Further axes beside these two are at one place, that of :attr:`Aggregate.shown`.
     """
-    moving = together(data, axis)
-    names = set() if second is None else together(data, second)
+    moving = together(data, axis) | (set() if second is None else together(data, second))
 
     def at(cell: AveragedCell) -> list[tuple[str, float]]:
-        return [other for other in cell.others if other[0] not in moving | names]
+        return [other for other in cell.others if other[0] not in moving]
 
     wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
     lines: dict[tuple[str, str], list[AveragedCell]] = {}
@@ -138,5 +138,4 @@ def _lines(
             value = cell.further_values[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])
         lines.setdefault((title, label), []).append(cell)
-    every = list(wanted.values())
-    return [other for other in every[0] if all(other in one for one in every)], lines
+    return [other for other in common(data.shown) if other[0] not in moving], lines

@@ -59,7 +59,7 @@ def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     aside = 0.2 * min(np.diff(hursts), default=0.1)
     for axes, (k, gamma) in zip(figure.panels, shown, strict=False):
-        cells = _of_gamma(data, gamma)
+        cells = data.finished(hursts, [gamma])
         x = np.array([cell.hurst for cell in cells])
         errorbar(axes, x, cells, name, unit, k, "_")
         _stars(axes, [(cell.hurst + aside, papers_loss(cell), style.colour(k)) for cell in cells])
@@ -86,7 +86,7 @@ def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     for axes, (_, gamma) in zip(figure.panels, shown, strict=True):
         for k, hurst in enumerate(hursts):
-            cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
+            cells = data.finished([hurst], [gamma])
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
             errorbar(axes, m2, cells, name, unit, k, f"H = {hurst:g}")
             _stars(axes, [(paper.m2(c.hurst), papers_loss(c), style.colour(k)) for c in cells])
@@ -96,13 +96,6 @@ def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
     handles = [style.key(f"H = {h:g}", ls="none", **style.look(k)) for k, h in enumerate(hursts)]
     figure.legend_above([*handles, *_star_handle(data), *hollow_handle(data.cells)], 4)
     return figure
-
-
-def _of_gamma(data: Aggregate, gamma: float) -> list[Cell]:
-    """The finished cells of one γ that a figure shows, by H."""
-    hursts = style.spread_out(data.hursts, style.MOST_CURVES)
-    cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
-    return [cell for cell in cells if cell.hurst in hursts]
 
 
 def _stars(axes: Axes, values: list[tuple[float | None, float | None, str]]) -> None:
@@ -122,7 +115,8 @@ def _star_handle(data: Aggregate) -> list[Line2D]:
 
 def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
     """Sum of the drops at small-scale and at large-scale jumps, for each (H, γ)."""
-    cells = _cells(data)
+    gammas = style.spread_out(data.works_of_adhesion, style.MOST_CURVES)
+    cells = data.finished(style.spread_out(data.hursts, style.MOST_PANELS), gammas)
     width = style.ONE_COLUMN if len(cells) <= _MOST_BARS else style.TWO_COLUMNS
     figure = style.new_figure(1, 1, width, 68 * style.MM)
     axes = figure.panels[0]
@@ -175,8 +169,7 @@ def jump_energies(data: Aggregate) -> style.PublishedFigure:
     for row, hurst in zip(figure.rows, hursts, strict=True):
         for axes, small in zip(row, (False, True), strict=True):
             for k, gamma in shown:
-                cell = data.cell(hurst, gamma)
-                if cell is not None and cell.done:
+                for cell in data.finished([hurst], [gamma]):
                     _jump_density(axes, cell, small, k, occupied)
             style.label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
     figure.label("energy drop of one jump (J/m²)", "jumps per loop and decade")
@@ -212,7 +205,7 @@ def pull_off(data: Aggregate) -> style.PublishedFigure:
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     for k, hurst in enumerate(hursts):
-        cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
+        cells = data.finished([hurst], data.works_of_adhesion)
         x = np.array([cell.work_of_adhesion for cell in cells]) / size
         # apart, so that intervals can be distinguished
         x += (k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion) / size
@@ -233,12 +226,6 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
     axes.tick_params(right=False)
     right = axes.secondary_yaxis("right", functions=to_and_fro)
     right.set_ylabel(r"$\tilde\sigma$ at the mean $h_\mathrm{max}$")
-
-
-def _cells(data: Aggregate) -> list[Cell]:
-    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
-    gammas = style.spread_out(data.works_of_adhesion, style.MOST_CURVES)
-    return [c for c in data.cells if c.done and c.hurst in hursts and c.work_of_adhesion in gammas]
 
 
 def _occupied(data: Aggregate) -> slice:
