@@ -23,6 +23,7 @@ from adhesis.solver.registry import MethodName
 _COST_OF_DOUBLING = 4.0
 # Time limit of the reference run, in units of that of a measured run.
 _REFERENCE_LIMIT = 3.0
+_BOUNDS = {">": "over ", "<": "under ", "": ""}
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Quotient:
     bound: str
 
     def __str__(self) -> str:
-        return f"{self.bound} {self.value:.2g}".strip()
+        return f"{_BOUNDS[self.bound]}{self.value:.2g}"
 
 
 @dataclass(frozen=True)
