@@ -8,7 +8,8 @@ its period, with as many times more wave numbers: the same surface, and more of 
 or by ``grid`` if its ``--nodes-per-wave`` are given. Prints a table in Markdown as the loops end:
 CPU seconds, patches at most, jumps, elastic solutions, CPU time of the loop for each of them, audit
 residual, estimated error of the loss, and the most memory of the process. The last column is the
-exponent of the CPU time in the patches from one row to the next.
+exponent of the CPU time from one row to the next: in the wave numbers where the ratio differs, else
+in the patches.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ def main() -> None:
         return
     print("| " + " | ".join(_COLUMNS) + " |")
     print("|" + " ---: |" * len(_COLUMNS), flush=True)
-    before: tuple[float, float] | None = None
+    before: tuple[float, float, float] | None = None
     for gamma, ratio, periods in scenes:
         command = [
             sys.executable, __file__, "--alone", "--work-of-adhesion", str(gamma), "--ratio",
@@ -97,10 +98,12 @@ def main() -> None:
             command += ["--nodes-per-wave", str(given.nodes_per_wave)]
         row = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout.strip()
         cells = row.split(" | ")
-        now = float(cells[3]), float(cells[4])
+        now = float(cells[3]), float(cells[1]), float(cells[4])
         exponent = ""
-        if before and now[1] != before[1]:
-            exponent = f"{np.log(now[0] / before[0]) / np.log(now[1] / before[1]):.2f}"
+        if before:
+            time, waves, patches = np.log(np.divide(now, before))
+            if waves or patches:
+                exponent = f"{time / (waves or patches):.2f}"
         before = now
         print(f"| {row} | {exponent} |", flush=True)
 

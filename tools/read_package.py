@@ -18,7 +18,7 @@ def sources() -> set[str]:
         str(path.relative_to(ROOT))
         for folder in ("adhesis", "adhesis/solver", "adhesis/ensemble")  # the latter two are links
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in (".py", ".pyi", ".typed", ".mplstyle")
+        if path.suffix in (".py", ".pyi", ".typed", ".mplstyle", ".css", ".html")
     }
     return found | {"adhesis/ensemble/commit.txt"}
 

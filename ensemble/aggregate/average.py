@@ -8,7 +8,7 @@ averages of a file that a run is still writing are consistent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain, pairwise
@@ -18,14 +18,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.ensemble.aggregate.by_blocks import (
+    Curve,
+    FieldStatistics,
+    JumpStatistics,
+    average_curves,
+    average_fields,
+    count_jumps,
+)
 from adhesis.ensemble.aggregate.cells import Cell, finished_cells, stress_scale
-from adhesis.ensemble.aggregate.companions import Companion, read_companion
-from adhesis.ensemble.aggregate.jumps import JumpStatistics, count_jumps
-from adhesis.ensemble.aggregate.mean_curves import Curve, average_curves
-from adhesis.ensemble.aggregate.mean_fields import FieldStatistics, average_fields
+from adhesis.ensemble.aggregate.companions import (
+    Companion,
+    LossDifference,
+    difference,
+    read_companion,
+)
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
 from adhesis.ensemble.task.dataset import KEPT
@@ -34,20 +43,18 @@ from adhesis.solver.method import BRANCHES
 _MAX_FAILURES = 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PairedDifference:
-    """Loss at ``upper`` less loss at ``lower`` γ (J/m²), all else being equal.
+    """Loss at the next γ beside that at one γ, in J/m² and in W~, all else being equal.
 
     The profiles are the same for all γ, so the mean of the differences is known much better than
     the difference of the two means.
     """
 
-    hurst: float
-    others: tuple[tuple[str, float], ...]
-    lower: float
-    upper: float
-    loss: Estimate
-    loss_dimensionless: Estimate
+    lower: Cell
+    upper: Cell
+    loss: LossDifference
+    loss_dimensionless: LossDifference
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +129,15 @@ class Aggregate:
         layers = list(zip(*stacks.values(), strict=False))
         layer = next(m for m in reversed(layers) if any(cell.done for cell in m))
         keys = {(cell.hurst, cell.others) for cell in layer}
-        paired = tuple(pair for pair in self.paired if (pair.hurst, pair.others) in keys)
+        paired = tuple(p for p in self.paired if (p.lower.hurst, p.lower.others) in keys)
         return replace(self, cells=layer, paired=paired)
+
+    def finished(
+        self, hursts: Collection[float], works_of_adhesion: Collection[float]
+    ) -> list[AveragedCell]:
+        """Return the cells at some H and γ that have finished tasks."""
+        cells = (cell for cell in self.cells if cell.done and cell.hurst in hursts)
+        return [cell for cell in cells if cell.work_of_adhesion in works_of_adhesion]
 
     def cell(self, hurst: float, work_of_adhesion: float) -> AveragedCell | None:
         """Return the first cell of (H, γ), None if the campaign lacks it; see :attr:`shown`."""
@@ -184,14 +198,7 @@ def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:
     for cell in cells:
         rows.setdefault((cell.hurst, cell.others), []).append(cell)
     for lower, upper in chain.from_iterable(map(pairwise, rows.values())):
-        _, low, high = np.intersect1d(
-            lower.realisation, upper.realisation, assume_unique=True, return_indices=True
-        )
-        if not low.size:
-            continue
-        names = ("loss", "loss_dimensionless")
-        grown = [upper.values[name][high] - lower.values[name][low] for name in names]
-        yield PairedDifference(
-            *(lower.hurst, lower.others, lower.work_of_adhesion, upper.work_of_adhesion),
-            *estimates(np.array(grown)),
-        )
+        loss = difference(lower, upper, "loss")
+        scaled = difference(lower, upper, "loss_dimensionless")
+        if loss is not None and scaled is not None:
+            yield PairedDifference(lower, upper, loss, scaled)

@@ -62,13 +62,12 @@ class Cell:
     pending: int
     not_needed: int
     rows: Rows  # shape (done,); rows of the done tasks in the file, by realisation
-    # realisation, seed: shape (done,)
-    realisation: NDArray[np.int64]
-    seed: NDArray[np.int64]
+    seed: NDArray[np.int64]  # shape (done,)
     # Each of shape (done,); per-task numbers under the names of the results file, and
     # ``small_scale_share`` (loss_small_scale / loss_from_drops, under a load over the
-    # drops before the solid falls off); ``loss_error_dimensionless``,
-    # ``energy_at_stake_dimensionless`` (in W~); ``loss_per_contact``,
+    # drops before the solid falls off); ``instability`` (loss without friction);
+    # ``loss_error_dimensionless``, ``energy_at_stake_dimensionless`` (in W~);
+    # ``pull_off_stress_dimensionless`` (in σ~); ``loss_per_contact``,
     # ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
     # spent per largest contact area, in J/m²)
     values: dict[str, Array]
@@ -77,6 +76,11 @@ class Cell:
     def point(self) -> tuple[float, ...]:
         """Values on the axes of the campaign: H, γ, and those of further axes."""
         return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
+
+    @property
+    def further_values(self) -> dict[str, float]:
+        """Values on the further axes, by name."""
+        return dict(self.others)
 
     @property
     def name(self) -> str:
@@ -162,7 +166,7 @@ def finished_cells(results: Results) -> list[Cell]:
 def read_cells(results: Results) -> list[Cell]:
     """Read every cell by H, γ, further axes, ascending."""
     campaign, tasks, status = results.campaign, results.tasks(), results.status()
-    realisation, seed = tasks.column("realisation"), tasks.column("seed")
+    seed = tasks.column("seed")
     columns = {name: results.column(name) for name in _PER_TASK}
     cells = []
     for task, rows_of_cell in tasks.by_cell():
@@ -177,12 +181,15 @@ def read_cells(results: Results) -> list[Cell]:
         )
         for name, energy in _PER_CONTACT.items():
             values[name] = values[energy] / values["largest_contact_fraction"]
-        scale = stress_scale(of_cell, values["h_max"]) * values["h_max"]
+        values["instability"] = values["loss"] - values["friction"]
+        scale = stress_scale(of_cell, values["h_max"])
+        values["pull_off_stress_dimensionless"] = values["pull_off_stress"] / scale
         for name in ("loss_error", "energy_at_stake"):
-            values[f"{name}_dimensionless"] = values[name] / scale
-        failed, pending, spare = (
-            int(np.sum(status[rows_of_cell] == code)) for code in (FAILED, PENDING, NOT_NEEDED)
-        )
+            values[f"{name}_dimensionless"] = values[name] / (scale * values["h_max"])
+        counts = {
+            name: int(np.sum(status[rows_of_cell] == code))
+            for name, code in (("failed", FAILED), ("pending", PENDING), ("not_needed", NOT_NEEDED))
+        }
         cells.append(
             Cell(
                 hurst=task.hurst,
@@ -195,11 +202,8 @@ def read_cells(results: Results) -> list[Cell]:
                 },
                 plan=field_plan(campaign, task),
                 done=rows.size,
-                failed=failed,
-                pending=pending,
-                not_needed=spare,
+                **counts,
                 rows=rows,
-                realisation=realisation[rows],
                 seed=seed[rows],
                 values=values,
             )

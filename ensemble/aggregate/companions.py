@@ -1,7 +1,7 @@
 """Compare campaigns: the same loops with another resolution, path or spectrum.
 
-Two campaigns that share their seed have the same phases realisation by realisation, so the
-difference of their losses is taken profile by profile.
+The seed of a realisation's phases is the same in all cells of a campaign, and of campaigns that
+share their seed, so the difference of two losses is taken profile by profile.
 """
 
 from __future__ import annotations
@@ -56,11 +56,11 @@ class Companion:
 
 @dataclass(frozen=True)
 class LossDifference:
-    """Dimensionless loss of a companion less that of the campaign, over the pairs of one cell."""
+    """A loss of two cells, over the realisations of the same phases that both have finished."""
 
     here: Estimate
     there: Estimate
-    difference: Estimate
+    difference: Estimate  # there less here
 
 
 def read_companion(path: Path | str, campaign: Campaign) -> Companion:
@@ -94,11 +94,14 @@ def kind_of(keys: Sequence[str]) -> Kind:
     return "other"
 
 
-def difference(here: Cell, there: Cell) -> LossDifference | None:
-    """Compare losses over the realisations that both have finished; None if there are none."""
+def difference(
+    here: Cell, there: Cell | None, name: str = "loss_dimensionless"
+) -> LossDifference | None:
+    """Compare a loss profile by profile; None without a realisation that both have finished."""
+    if there is None:
+        return None
     _, mine, theirs = np.intersect1d(here.seed, there.seed, assume_unique=True, return_indices=True)
     if not mine.size:
         return None
-    own = here.values["loss_dimensionless"][mine]
-    other = there.values["loss_dimensionless"][theirs]
+    own, other = here.values[name][mine], there.values[name][theirs]
     return LossDifference(*estimates(np.array([own, other, other - own])))

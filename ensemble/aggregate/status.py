@@ -9,12 +9,11 @@ from __future__ import annotations
 import os
 import shlex
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.cells import (
     Cell,
@@ -36,6 +35,7 @@ from adhesis.solver.values import finite
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
+_OF_TIMES = ("mean", "median", "max", "sum")
 _AVERAGED = ("wall_time", "loss", "loss_dimensionless")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
@@ -69,24 +69,29 @@ def read_status(path: Path | str) -> dict[str, Any]:
         for row, took, error in zip(failed.tolist(), seconds, errors, strict=True)
     ]
     short = sum(cell.short_of_preload for cell in cells)
+
+    def listed(loops: Iterable[tuple[Cell, int]], names: Sequence[str]) -> list[dict[str, Any]]:
+        """Return the place, the loss and further numbers of loops; None where not finite."""
+        return [
+            _named(tasks, int(cell.rows[k]))
+            | {name: finite(float(cell.values[name][k])) for name in ("loss", *names)}
+            for cell, k in loops
+        ]
+
     return {
         "file": str(path),
         "tasks": len(state),
         **{name: int(np.sum(state == code)) for name, code in _CODES.items()},
         "damaged": [_named(tasks, row) for row in damaged.tolist()],
         "computed_by": origins,
-        "seconds": _times(times) if times.size else None,
-        "doubtful": [
-            _named(tasks, int(cell.rows[k])) | _numbers(cell, k, ("audit_residual", "loss_error"))
-            for cell, k in doubtful_loops(cells)
-        ],
+        "seconds": {name: float(getattr(np, name)(times)) for name in _OF_TIMES}
+        if times.size
+        else None,
+        "doubtful": listed(doubtful_loops(cells), ("audit_residual", "loss_error")),
         "opens": campaign.material.opens,
         "under_load": campaign.cycle.under_load,
         "preload_not_reached": None if campaign.cycle.preload is None else short,
-        "beyond_limit": [
-            _named(tasks, int(cell.rows[k])) | _numbers(cell, k, RANGES)
-            for cell, k in loops_beyond_zero_range(cells)
-        ],
+        "beyond_limit": listed(loops_beyond_zero_range(cells), RANGES),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(units),
         "axis_units": units,
@@ -98,20 +103,6 @@ def read_status(path: Path | str) -> dict[str, Any]:
 def _named(tasks: Tasks, row: int) -> dict[str, Any]:
     task = tasks[row]
     return {"row": row, **{name: getattr(task, name) for name in _TASK}}
-
-
-def _numbers(cell: Cell, k: int, names: Sequence[str]) -> dict[str, float | None]:
-    """Return the loss and further numbers of a loop; None where not finite."""
-    return {name: finite(float(cell.values[name][k])) for name in ("loss", *names)}
-
-
-def _times(times: NDArray[np.float64]) -> dict[str, float]:
-    return {
-        "mean": float(times.mean()),
-        "median": float(np.median(times)),
-        "max": float(times.max()),
-        "sum": float(times.sum()),
-    }
 
 
 def _group(cell: Cell) -> dict[str, Any]:
@@ -161,9 +152,11 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
             for name in status["axes"][2:]
             for key in [name.removeprefix("wanted_")]
         }
-        names = "".join(f"{heading}  " for heading in further.values())
-        loss = "loss in mJ/m² ± standard error of the mean"
-        lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  {loss}"]
+        lines += [
+            "",
+            f"    H  γ in J/m² {''.join(f'{heading}  ' for heading in further.values())}"
+            "    done  pending  failed    mean s  loss in mJ/m² ± standard error of the mean",
+        ]
         lines += [_group_line(group, further) for group in groups]
     if status["under_load"]:
         lines += ["", "losses under a weight: closed at the separation of its fall"]
@@ -171,14 +164,14 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines += ["", f"{counted(status['preload_not_reached'], 'loop')} did not reach the preload"]
     if status["damaged"]:
         lines += ["", *damage_lines(status["damaged"])]
-    if status["doubtful"]:
-        why = "by their own account less accurate than asked for"
-        lines += ["", f"{len(status['doubtful'])} losses are doubtful: {why}"]
-        lines += _listed(status["doubtful"], lambda row: f": {doubt.errors_text(row)}")
-    if status["beyond_limit"]:
-        why = doubt.why_beyond(status["opens"])
-        lines += ["", f"{len(status['beyond_limit'])} losses are doubtful: {why}"]
-        lines += _listed(status["beyond_limit"], _range_of)
+    own = "by their own account less accurate than asked for"
+    for rows, why, about in (
+        (status["doubtful"], own, doubt.errors_text),
+        (status["beyond_limit"], doubt.why_beyond(status["opens"]), _range_of),
+    ):
+        if rows:
+            lines += ["", f"{len(rows)} losses are doubtful: {why}"]
+            lines += _listed(rows, about, ": ")
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"], status["file"])]
     return printable("\n".join(lines))
@@ -187,27 +180,29 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
 def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
     counts = f"{group['done']:8d} {group['pending']:8d} {group['failed']:7d}"
     mean, loss, error = group["mean_seconds"], group["loss"], group["loss_standard_error"]
+    shown = ""
+    if loss is not None:
+        loss *= 1e3
+        shown = f"  {loss:.4g}" if error is None else f"  {with_error(loss, 1e3 * error, 0.0)}"
     return (
         f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} "
         + "".join(f"{group[name]:{len(heading)}.4g}  " for name, heading in further.items())
         + f"{counts} "
         + (f"{mean:9.3g}" if mean is not None else " " * 9)
-        + (f"  {_loss(loss, error)}" if loss is not None else "")
+        + shown
         + (f"  {group['precision']}" if "precision" in group else "")
     ).rstrip()
 
 
-def _loss(loss: float, error: float | None) -> str:
-    return f"{1e3 * loss:.4g}" if error is None else with_error(1e3 * loss, 1e3 * error, 0.0)
-
-
 def _listed(
-    rows: Sequence[Mapping[str, Any]], about: Callable[[Mapping[str, Any]], str] = lambda row: ""
+    rows: Sequence[Mapping[str, Any]],
+    about: Callable[[Mapping[str, Any]], str] = lambda row: "",
+    between: str = "",
 ) -> list[str]:
     """Return a line for each of the first rows, and how many more there are."""
     lines = [
         f"  row {row['row']}: H = {row['hurst']:g}, γ = {row['work_of_adhesion']:g} J/m², "
-        f"realisation {row['realisation']}, seed {row['seed']}{about(row)}"
+        f"realisation {row['realisation']}, seed {row['seed']}{between}{about(row)}"
         for row in rows[:_MOST_FAILURES_SHOWN]
     ]
     if len(rows) > _MOST_FAILURES_SHOWN:
@@ -219,7 +214,7 @@ def _range_of(row: Mapping[str, Any]) -> str:
     known = {name: row[name] for name in RANGES if row[name] is not None}
     least = min(known, key=lambda name: known[name]) if known else None
     shown = "range unknown" if least is None else f"{least} {known[least]:.2g} m"
-    return f": {shown}, loss {row['loss']:.3g} J/m²"
+    return f"{shown}, loss {row['loss']:.3g} J/m²"
 
 
 def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -13,7 +13,11 @@ from matplotlib.lines import Line2D
 from adhesis.ensemble.bench.equal_error import Line
 from adhesis.ensemble.report.figures import style
 
-_METHODS = ("grid", "sharp", "tamaas")
+# sharp has the darkest colour, so that the methods differ in grey too.
+_LOOKS = {
+    "grid": {**style.look(0), "ls": style.LINES[0]},
+    "sharp": {**style.look(2), "ls": style.LINES[1], "marker": "s"},
+}
 _PANELS_IN_A_ROW = 2
 _PANEL_HEIGHT = 62 * style.MM
 # Smaller errors are rounding or chance, and are drawn at this value.
@@ -30,20 +34,17 @@ def draw(lines: Sequence[Line]) -> Figure:
             rows, columns, style.TWO_COLUMNS, 8 * style.MM + rows * _PANEL_HEIGHT
         )
         shown: dict[str, Line2D] = {}
-        for k, axes in enumerate(figure.axes):
-            if k >= len(scenes):
-                axes.set_visible(False)
-                continue
-            for method in _METHODS:
-                of_method = (line for line in lines if line.run.method == method)
-                here = [line for line in of_method if line.run.scene is scenes[k]]
-                chosen = [line for line in here if math.isfinite(line.error)]
-                if chosen:
-                    shown[method] = _series(axes, method, chosen)
-            style.label_panel(axes, scenes[k].title)
-            axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
-        # One range for all, so that the panels can be compared; with margins for the labels.
         finished = [line for line in lines if math.isfinite(line.error)]
+        for axes, scene in zip(figure.axes, scenes, strict=False):
+            for method in _LOOKS:
+                here = [line for line in finished if line.run.scene is scene]
+                if chosen := [line for line in here if line.run.method == method]:
+                    shown[method] = _series(axes, method, chosen)
+            style.label_panel(axes, scene.title)
+            axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
+        for axes in figure.axes[len(scenes) :]:
+            axes.set_visible(False)
+        # One range for all, so that the panels can be compared; with margins for the labels.
         seconds = [line.measured.cpu_seconds for line in finished]
         errors = [_plotted_error(line) for line in finished]
         for axes in figure.axes if finished else ():
@@ -57,16 +58,9 @@ def draw(lines: Sequence[Line]) -> Figure:
 
 def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
     """Draw the runs of one method, each with its setting beside it."""
-    k = _METHODS.index(method)
-    # sharp has the darkest colour, so that the methods differ in grey too.
-    of_method = {
-        "grid": style.look(0),
-        "sharp": {**style.look(2), "marker": "s"},
-        "tamaas": style.look(3),
-    }
     seconds = [line.measured.cpu_seconds for line in lines]
     errors = [_plotted_error(line) for line in lines]
-    (drawn,) = axes.plot(seconds, errors, ls=style.LINES[k], label=method, **of_method[method])
+    (drawn,) = axes.plot(seconds, errors, label=method, **_LOOKS[method])
     for number, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
         # Left below for sharp; right for the others, alternately above and below, as they lie
         # close.

@@ -9,22 +9,21 @@ more accurate than every measured one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
 
-from adhesis.ensemble.bench.measure import Measured, Measurement, Run, measure
+from adhesis.ensemble.bench.measure import Measurement, Run, measure
 from adhesis.ensemble.bench.scenes import FULL, Scene
-from adhesis.ensemble.bench.tamaas import has_tamaas
+from adhesis.solver.registry import MethodName
 
 # Doubling the nodes multiplies the time of a grid run by up to this factor.
 _COST_OF_DOUBLING = 4.0
 # Time limit of the reference run, in units of that of a measured run.
 _REFERENCE_LIMIT = 3.0
-# tamaas does not locate jumps, so its load steps are finer by this factor.
-_TAMAAS_STEPS = {"one-wave": 5}
+_BOUNDS = {">": "over ", "<": "under ", "": ""}
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,9 @@ class Quotient:
     value: float
     bound: str
 
+    def __str__(self) -> str:
+        return f"{_BOUNDS[self.bound]}{self.value:.2g}"
+
 
 @dataclass(frozen=True)
 class Ratio:
@@ -76,77 +78,18 @@ class Ratio:
     cheapest: Quotient  # ratio to the cheapest grid that is at least as accurate, perhaps by chance
 
 
-@dataclass(frozen=True)
-class Exponent:
-    """Exponent of a power law of the CPU time of ``sharp``, by least squares in the logarithms."""
-
-    among: str  # property that the lines share
-    variable: str  # name of the independent variable
-    # least, most: range of the variable
-    least: int
-    most: int
-    # of_loop, of_solution: exponents of the CPU time of a loop and of a solution
-    of_loop: float
-    of_solution: float
-
-
-def benchmark(
-    scenes: Sequence[Scene] = FULL,
-    *,
-    seconds: float = 360.0,
-    on_line: Callable[[Line], None] | None = None,
-) -> list[Line]:
-    """Measure the methods on the scenes; ``on_line`` is called with every line when it is measured.
+def benchmark(scenes: Sequence[Scene] = FULL, *, seconds: float = 360.0) -> Iterator[Line]:
+    """Measure the methods on the scenes, one line after the other.
 
     A run is given up after so many CPU seconds. A grid that would take longer, estimated from the
     one before it, is left out. Both give lines with a note.
     """
-    lines: list[Line] = []
     for scene in scenes:
-        reference = _reference(scene, seconds)
+        reference, before = _reference(scene, seconds), 0.0
         for run in _runs(scene, seconds):
-            before = [line for line in lines if line.run.scene is scene]
             line = Line(run, reference, _left_out(run, before) or measure(run))
-            lines.append(line)
-            if on_line is not None:
-                on_line(line)
-    return lines
-
-
-def exponents(lines: Sequence[Line]) -> list[Exponent]:
-    """Fit the growth of the CPU time of ``sharp`` with its patches, and with the wave numbers.
-
-    A series is made of finished lines on scenes of growth that differ in γ alone, or in the
-    highest harmonic alone.
-    """
-    done = [line for line in lines if line.run.method == "sharp" and not line.measured.note]
-    found = []
-    for top in sorted({_top(line) for line in done}):
-        series = [line for line in done if _top(line) == top]
-        sizes = [line.measured.patches for line in series]
-        found += _exponent(f"m to {top}", "patches", sizes, series)
-    for gamma in sorted({line.run.scene.work_of_adhesion for line in done}, reverse=True):
-        series = [line for line in done if line.run.scene.work_of_adhesion == gamma]
-        found += _exponent(f"γ = {gamma:g}", "wave numbers", [_top(s) for s in series], series)
-    return found
-
-
-def _top(line: Line) -> int:
-    return line.run.scene.n0 * line.run.scene.ratio
-
-
-def _exponent(
-    among: str, variable: str, sizes: Sequence[int], series: Sequence[Line]
-) -> list[Exponent]:
-    if len(set(sizes)) < 2:
-        return []
-    seconds = np.array([line.measured.cpu_seconds for line in series])
-    solutions = np.array([line.measured.solutions for line in series])
-    of_loop, of_solution = (
-        float(np.polyfit(np.log(sizes), np.log(cost), 1)[0])
-        for cost in (seconds, seconds / solutions)
-    )
-    return [Exponent(among, variable, min(sizes), max(sizes), of_loop, of_solution)]
+            before = line.measured.cpu_seconds  # NaN if the run did not finish
+            yield line
 
 
 def ratios(lines: Sequence[Line]) -> list[Ratio]:
@@ -155,17 +98,12 @@ def ratios(lines: Sequence[Line]) -> list[Ratio]:
     Both methods must have finished; a scene without grid gives none.
     """
     found = []
-    for line in lines:
-        if line.run.method != "sharp" or not math.isfinite(line.error):
-            continue
-        series = [
-            (abs(other.error), other.measured.cpu_seconds)
-            for other in lines
-            if other.run.scene is line.run.scene
-            and other.run.method == "grid"
-            and math.isfinite(other.error)
-        ]
-        if series:
+    finished = [line for line in lines if math.isfinite(line.error)]
+    for line in finished:
+        here = [other for other in finished if other.run.scene is line.run.scene]
+        grids = [other for other in here if other.run.method == "grid"]
+        if line.run.method == "sharp" and grids:
+            series = [(abs(grid.error), grid.measured.cpu_seconds) for grid in grids]
             converged = _quotient(line, _with_error_of_finer(series))
             found.append(Ratio(line, converged, _quotient(line, series)))
     return found
@@ -200,24 +138,18 @@ def _front(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _runs(scene: Scene, seconds: float) -> Iterator[Run]:
-    settings: list[tuple[Measured, Sequence[float]]] = [
-        ("grid", scene.grids),
-        ("sharp", scene.accuracies),
-    ]
-    if has_tamaas():
-        settings.append(("tamaas", scene.ranges))
-    for method, values in settings:
-        finer = _TAMAAS_STEPS.get(scene.name, 1) if method == "tamaas" else 1
+    settings: dict[MethodName, tuple[float, ...]] = {
+        "grid": scene.grids,
+        "sharp": scene.accuracies,
+    }
+    for method, values in settings.items():
         for value in values:
-            yield Run(scene, method, value, scene.load_steps * finer, seconds)
+            yield Run(scene, method, value, scene.load_steps, seconds)
 
 
-def _left_out(run: Run, before: Sequence[Line]) -> Measurement | None:
+def _left_out(run: Run, before: float) -> Measurement | None:
     """Return a note for a grid run that would take too long; None if it should be tried."""
-    if run.method != "grid" or not before:
-        return None
-    last = before[-1].measured.cpu_seconds  # NaN if that run did not finish
-    if last * _COST_OF_DOUBLING <= run.seconds:
+    if run.method != "grid" or before * _COST_OF_DOUBLING <= run.seconds:
         return None
     return Measurement(note=f"left out: it would take more than {run.seconds:g} s")
 
@@ -232,4 +164,4 @@ def _reference(scene: Scene, seconds: float) -> Reference:
         if math.isfinite(loss):
             text = f"sharp, accuracy {run.described}, {run.load_steps} load steps"
             return Reference(loss, text)
-    return Reference(math.nan, "none: no reference run finished" if scene.tightest else "none")
+    return Reference(math.nan, "none: no reference run finished")

@@ -13,18 +13,14 @@ import resource
 import signal
 import subprocess
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from time import process_time
-from typing import Any, Literal
 
 from adhesis.ensemble.bench.scenes import WARM_UP, Scene
-from adhesis.ensemble.bench.tamaas import tamaas_loop
 from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.registry import MethodName, make_method
-
-Measured = Literal["grid", "sharp", "tamaas"]
 
 _SOLUTIONS = {"grid": "solves", "sharp": "fields"}
 # Accuracy of the load path of ``grid``: it costs little and leaves the nodes as the source of
@@ -40,21 +36,15 @@ class Run:
     """Method, setting and limits of a measured loop."""
 
     scene: Scene
-    method: Measured
-    # Nodes per shortest wave of ``grid``, accuracy of ``sharp``, range of adhesion of ``tamaas`` in
-    # units of h_max
-    setting: float
+    method: MethodName
+    setting: float  # nodes per shortest wave of ``grid``, accuracy of ``sharp``
     load_steps: int
     seconds: float  # CPU seconds after which the run is given up
 
     @property
     def described(self) -> str:
-        """The setting in short: nodes per shortest wave, accuracy, or range."""
-        if self.method == "grid":
-            return f"{self.setting:g} nodes"
-        if self.method == "tamaas":
-            return f"{self.setting:g} h_max"
-        return f"{self.setting:.0e}"
+        """The setting in short: nodes per shortest wave, or accuracy."""
+        return f"{self.setting:g} nodes" if self.method == "grid" else f"{self.setting:.0e}"
 
 
 @dataclass(frozen=True)
@@ -97,53 +87,32 @@ def measure(run: Run) -> Measurement:
     return Measurement(**json.loads(child.stdout))
 
 
-def measure_here(run: Run, *, limited: bool = False) -> Measurement:
-    """Run and measure in this process; if ``limited``, end it when ``run.seconds`` are over."""
-    if limited:
-        _limit(_START_LIMIT)
-    if run.method != "tamaas":
-        _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
+def _measure_here(run: Run) -> Measurement:
+    """Run and measure in this process, and end it when ``run.seconds`` are over."""
+    _limit(_START_LIMIT)
+    setting, steps = _WARM_UP_SETTING[run.method], WARM_UP.load_steps
+    _loop(replace(run, scene=WARM_UP, setting=setting, load_steps=steps))
     before = peak_megabytes()
-    if limited:
-        _limit(run.seconds)
+    _limit(run.seconds)
     started = process_time()
-    numbers = _numbers(run)
-    seconds = process_time() - started
+    loop = _loop(run)
     return Measurement(
-        cpu_seconds=seconds,
-        megabytes=peak_megabytes(),
-        megabytes_before=before,
-        **numbers,
+        *(process_time() - started, peak_megabytes(), before),
+        *(loop.loss, loop.loss_dimensionless, loop.audit_residual),
+        solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
+        jumps=len(loop.jumps),
+        patches=int(loop.patches.max()),
     )
 
 
-def _numbers(run: Run) -> dict[str, Any]:
-    if run.method == "tamaas":
-        problem = run.scene.problem()
-        loss, states = tamaas_loop(
-            problem,
-            reach=run.setting * problem.profile.h_max,
-            max_penetration=run.scene.max_penetration,
-            load_steps=run.load_steps,
-        )
-        scaled = loss / problem.loss_scale
-        return {"loss": loss, "loss_dimensionless": scaled, "solutions": states}
-    loop = _loop(run.method, run.scene, run.setting, run.load_steps)
-    same = ("loss", "loss_dimensionless", "audit_residual")
-    return {name: getattr(loop, name) for name in same} | {
-        "solutions": int(asdict(loop.method)[_SOLUTIONS[run.method]]),
-        "jumps": len(loop.jumps),
-        "patches": int(loop.patches.max()),
-    }
-
-
-def _loop(method: MethodName, scene: Scene, setting: float, load_steps: int) -> LoopResult:
-    problem = scene.problem()
-    if method == "grid":
-        built = make_method("grid", problem, accuracy=_GRID_ACCURACY, nodes_per_wave=int(setting))
+def _loop(run: Run) -> LoopResult:
+    problem = run.scene.problem()
+    if run.method == "grid":
+        nodes = int(run.setting)
+        built = make_method("grid", problem, accuracy=_GRID_ACCURACY, nodes_per_wave=nodes)
     else:
-        built = make_method(method, problem, accuracy=setting)
-    return run_loop(built, max_penetration=scene.max_penetration, load_steps=load_steps)
+        built = make_method(run.method, problem, accuracy=run.setting)
+    return run_loop(built, max_penetration=run.scene.max_penetration, load_steps=run.load_steps)
 
 
 def _limit(seconds: float) -> None:
@@ -168,7 +137,7 @@ def main() -> None:
     """Measure the run in the first argument."""
     fields = json.loads(sys.argv[1])
     run = Run(**{**fields, "scene": Scene(**fields["scene"])})
-    print(json.dumps(asdict(measure_here(run, limited=True))))
+    print(json.dumps(asdict(_measure_here(run))))
 
 
 if __name__ == "__main__":

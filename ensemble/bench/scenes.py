@@ -49,8 +49,6 @@ class Scene:
     grids: tuple[int, ...] = (8, 16, 32, 64)
     # Requested accuracies of the loss, low to high
     accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-    # Ranges of adhesion for tamaas in units of h_max, as small as feasible
-    ranges: tuple[float, ...] = ()
     # Accuracies of the reference run of ``sharp``, best first; the first that succeeds is used.
     # Empty if the loss is known exactly.
     tightest: tuple[float, ...] = ()
@@ -89,7 +87,6 @@ ONE_WAVE = Scene(
     load_steps=10,
     # The wave is the whole profile: its contact of 0.18 λ needs many nodes.
     grids=(64, 256, 1024, 4096),
-    ranges=(0.05, 0.03),
 )
 TWO_WAVES = Scene(
     name="two-waves",
@@ -98,7 +95,6 @@ TWO_WAVES = Scene(
     work_of_adhesion=0.01,
     load_steps=20,
     grids=(16, 64, 256),
-    ranges=(0.5,),
     tightest=(1e-8, 1e-7, 1e-6),
     reference_load_steps=20,
 )
@@ -109,7 +105,6 @@ SMALL_ROUGH = Scene(
     load_steps=20,
     n0=2,
     ratio=16,
-    ranges=(0.5, 0.3),
     tightest=(1e-8, 1e-7, 1e-6, 1e-5),
     reference_load_steps=40,
 )
@@ -120,7 +115,6 @@ ROUGH = Scene(
     n0=10,
     ratio=25,
     grids=(8, 16, 32, 64, 128, 256),
-    ranges=(0.3, 0.2),
     tightest=(1e-7, 1e-6, 1e-5, 1e-4),
 )
 PAPER = Scene(
@@ -129,34 +123,11 @@ PAPER = Scene(
     work_of_adhesion=0.04,
     n0=10,
     ratio=100,
-    ranges=(0.2, 0.1),
     tightest=(1e-7, 1e-6, 1e-5, 1e-4),
 )
 
 QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
 FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)
-
-# Highest over lowest harmonic, γ, and the grid beside sharp: the coarsest, if it ends in time.
-_GROWTH = (
-    *((25, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025)),
-    *((100, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025, 0.0006)),
-    (100, 0.00015, ()),
-    *((1000, gamma, ()) for gamma in (0.04, 0.01, 0.0025)),
-    (10_000, 0.04, ()),
-)
-GROWTH = tuple(
-    Scene(
-        name=f"growth-{10 * ratio}-{gamma:g}",
-        title=f"rough, m = 10 … {10 * ratio}, γ = {gamma:g}",
-        work_of_adhesion=gamma,
-        n0=10,
-        ratio=ratio,
-        grids=grids,
-        accuracies=(1e-3,),
-    )
-    for ratio, gamma, grids in _GROWTH
-)
-"""Scenes for the growth of cost with the number of patches (small γ) and of wave numbers."""
 
 # Has touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
 WARM_UP = Scene(

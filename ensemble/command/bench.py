@@ -1,7 +1,8 @@
 """Measure the speed of each method against its error in the loss; write table and figure.
 
 Every run has a process of its own with one thread; time is CPU time, so other work on the machine
-does not count. The full benchmark takes three quarters of an hour, --quick less than a minute.
+does not count. The full benchmark takes three quarters of an hour at most, --quick less than a
+minute.
 """
 
 from __future__ import annotations
@@ -10,14 +11,10 @@ import argparse
 import platform
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import bar
-
-if TYPE_CHECKING:
-    from adhesis.ensemble.bench.equal_error import Line
 
 _DEFAULT = Path("out/benchmark")
 EXAMPLES = (
@@ -48,35 +45,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
-    from adhesis.ensemble.bench.bench_page import LINE_COLUMNS, RECORD, cells, page
-    from adhesis.ensemble.bench.equal_error import benchmark, exponents, ratios
-    from adhesis.ensemble.bench.scenes import FULL, GROWTH, QUICK
+    from adhesis.ensemble.bench.bench_page import COLUMNS, page
+    from adhesis.ensemble.bench.equal_error import benchmark, ratios
+    from adhesis.ensemble.bench.scenes import FULL, QUICK
     from adhesis.ensemble.report.tables.table import make_table
     from adhesis.ensemble.versions import processor
 
     check_output_folder("--to", args.to, _FILES, {})
+    lines = []
     with bar("adhesis bench: measuring", last=False) as show_run:
-
-        def show(line: Line) -> None:
+        for line in benchmark(QUICK if args.quick else FULL, seconds=args.budget):
+            lines.append(line)
             run = line.run
             if not sys.stderr.isatty():  # no bar there; half an hour of silence is too long
-                print(run.scene.name, *cells(line, LINE_COLUMNS), sep="  ", file=sys.stderr)
+                row = make_table("", COLUMNS, [line]).markdown().splitlines()[-1]
+                print(run.scene.name, row, file=sys.stderr)
             show_run(None, None, f"{run.scene.title}: {run.method}, {run.described}")
-
-        scenes = QUICK if args.quick else (*FULL, *GROWTH)
-        measured = benchmark(scenes, seconds=args.budget, on_line=show)
-    lines = [line for line in measured if line.run.scene not in GROWTH]
-    grown = [line for line in measured if line.run.scene in GROWTH]
     machine = f"one core of {processor()}, Python {platform.python_version()}"
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
-    text = page(lines, grown, ratios(lines), exponents(grown), f"`{command}` on {machine}")
+    text = page(lines, ratios(lines), f"`{command}` on {machine}")
     print(text)
     from adhesis.ensemble.bench.bench_figure import draw  # matplotlib, when all is measured
     from adhesis.ensemble.report.figures.style import save
 
     writing = Writing()
     with writing.output("the benchmark in", args.to), staged_folder(args.to) as folder:
-        make_table("", RECORD, measured).write_csv(folder / "benchmark.csv")
+        make_table("", COLUMNS, lines).write_csv(folder / "benchmark.csv")
         (folder / "benchmark.md").write_text(text, encoding="utf-8")
         save(draw(lines), folder / "benchmark")
     writing.finish()

@@ -15,7 +15,7 @@ from adhesis.ensemble.errors import InputError, one_of, refused_as_input
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
-from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
+from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, write_json
 from adhesis.ensemble.trace.options import (
@@ -223,11 +223,9 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     heights = read_heights(
         args.heights, unit=args.unit, delimiter=delimiter_of(args), decimal=args.decimal
     )
-    warnings = []
-    if np.all(np.isfinite(heights)):
-        found = (closure_warning, few_heights_warning)
-        warnings = [text for make in found if (text := make(heights, f"{args.heights}"))]
-    return profile_from_heights(heights, args.period), warnings
+    known = bool(np.all(np.isfinite(heights)))
+    warning = heights_warning(heights, f"{args.heights}") if known else None
+    return profile_from_heights(heights, args.period), [warning] if warning else []
 
 
 def _self_affine(args: argparse.Namespace) -> Profile:

@@ -26,11 +26,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError, one_of
-from adhesis.ensemble.loop.film_page import BODY, STYLE
 from adhesis.ensemble.loop.film_scenes import Scene, Scenes
 from adhesis.ensemble.outputs import check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
-from adhesis.ensemble.report.html import whole_page
 from adhesis.solver import checks
 from adhesis.solver.checks import counted, function
 from adhesis.solver.loading.loop_result import LoopResult
@@ -157,8 +155,8 @@ class Film:
             "@LAST@": str(len(self) - 1),
             "@DATA@": data.replace("<", "\\u003c"),
         }
-        body = re.sub("@[A-Z]+@", lambda found: parts[found[0]], BODY)
-        return whole_page(self._title, STYLE, body)
+        template = Path(__file__).with_name("film.html").read_text(encoding="utf-8")
+        return re.sub("@[A-Z]+@", lambda found: parts[found[0]], template)
 
     @property
     def _title(self) -> str:

@@ -118,20 +118,13 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
     return found
 
 
-def few_heights_warning(heights: Array, name: str) -> str | None:
-    """Return a warning if so few heights hardly make a profile, else None."""
-    if heights.size >= _MIN_POINTS:
-        return None
-    return (
-        f"{name} holds {heights.size} heights only: fewer than {_MIN_POINTS} make a profile of a "
-        "few waves, so check the file"
-    )
-
-
-def closure_warning(heights: Array, name: str) -> str | None:
-    """Return a warning if the ends of one period of heights (m) do not meet, else None."""
+def heights_warning(heights: Array, name: str) -> str | None:
+    """Return a warning if heights (m) are too few for a profile, or no period of one; else None."""
     if heights.size < _MIN_POINTS:
-        return None
+        return (
+            f"{name} holds {heights.size} heights only: fewer than {_MIN_POINTS} make a profile of "
+            "a few waves, so check the file"
+        )
     # A median of three keeps edges and removes single spikes, which would hide the jump.
     smoothed = np.median([np.roll(heights, k) for k in (1, 0, -1)], axis=0)
     largest = float(np.abs(np.diff(smoothed)).max())

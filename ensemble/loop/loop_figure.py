@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from adhesis.ensemble.report.figures import style
@@ -28,23 +27,19 @@ def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) ->
     """
     with style.drawn_into(ax):
         figure = style.new_figure(1, 2, style.TWO_COLUMNS, 62 * style.MM)
-        _draw(results, figure.given or figure.panels)
+        panels = figure.given or figure.panels
+        for result, rows, options in _lines(results):
+            columns = (result.mean_stress[rows] / 1e3, result.contact_fraction[rows])
+            for panel, y in zip(panels, columns, strict=False):
+                panel.plot(result.penetration[rows], y, **options)
+        stress, depth = panels[0], r"penetration $\Delta/h_{\max}$"
+        stress.axhline(0, color="0.7", lw=0.5, zorder=0)
+        stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
+        for contact in panels[1:]:
+            contact.set(xlabel=depth, ylabel="contact fraction $A/A_0$", ylim=(0, None))
+        if len(stress.get_legend_handles_labels()[1]) > 1:
+            panels[-1].legend()
         return figure.finish()
-
-
-def _draw(results: Sequence[LoopResult] | PathResult, panels: Sequence[Axes]) -> None:
-    """Draw the mean stress into the first of the panels, and the contact fraction into a second."""
-    for result, rows, options in _lines(results):
-        columns = (result.mean_stress[rows] / 1e3, result.contact_fraction[rows])
-        for panel, y in zip(panels, columns, strict=False):
-            panel.plot(result.penetration[rows], y, **options)
-    stress, depth = panels[0], r"penetration $\Delta/h_{\max}$"
-    stress.axhline(0, color="0.7", lw=0.5, zorder=0)
-    stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
-    for contact in panels[1:]:
-        contact.set(xlabel=depth, ylabel="contact fraction $A/A_0$", ylim=(0, None))
-    if len(stress.get_legend_handles_labels()[1]) > 1:
-        panels[-1].legend()
 
 
 def _lines(

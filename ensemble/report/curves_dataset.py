@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.mean_curves import QUANTILES
+from adhesis.ensemble.aggregate.by_blocks import QUANTILES
 from adhesis.solver.method import BRANCHES
 
 # curve -> (unit, what it is)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
@@ -50,10 +50,23 @@ def symbols(others: Sequence[tuple[str, float]]) -> str:
     return ", ".join(named)
 
 
+def from_to(
+    values: Sequence[float], show: Callable[[float], str] = "{:g}".format, between: str = " to "
+) -> str:
+    """Return the least and the largest of some values, "3 to 10"; one text if they are alike."""
+    return between.join(dict.fromkeys(show(end) for end in (min(values), max(values))))
+
+
 def together(data: Aggregate, axis: Axis) -> set[str]:
     """Names of the axes that vary together with one, itself included."""
     groups = data.campaign.sweep.zip
     return next((set(names) for names in groups if axis.name in names), {axis.name})
+
+
+def own_axes(data: Aggregate) -> list[Axis]:
+    """Further axes but those that vary together with H or γ."""
+    of_figures = {"hurst", "work_of_adhesion"}
+    return [axis for axis in data.further if not together(data, axis) & of_figures]
 
 
 def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
@@ -64,7 +77,7 @@ def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
         fixed = tuple(other for other in cell.others if other[0] not in moving)
         if cell.done:
             lines.setdefault((cell.hurst, cell.work_of_adhesion, fixed), []).append(cell)
-    return [sorted(line, key=lambda c: dict(c.others)[axis.name]) for line in lines.values()]
+    return [sorted(line, key=lambda c: c.further_values[axis.name]) for line in lines.values()]
 
 
 def common(data: Aggregate) -> list[tuple[str, float]]:
@@ -81,11 +94,6 @@ def failed_cells(cells: Sequence[Cell]) -> list[Cell]:
     return [cell for cell in cells if not cell.done and not cell.pending]
 
 
-def short_of_preload(cells: Sequence[Cell]) -> list[tuple[int, Cell]]:
-    """Return the cells with loops that did not reach their preload, and how many these are."""
-    return [(count, cell) for cell in cells if (count := cell.short_of_preload)]
-
-
 def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
     """Return lines to stand below a figure: what its cells have in common, and what is amiss."""
     parts = [symbols(others)] if others else []
@@ -99,7 +107,7 @@ def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
     done, lost = sum(cell.done for cell in drawn), sum(cell.failed for cell in drawn)
     if lost:
         parts.append(f"{lost} of {done + lost} loops failed, and are in no mean")
-    if short := sum(count for count, _ in short_of_preload(drawn)):
+    if short := sum(cell.short_of_preload for cell in drawn):
         parts.append(f"{short} of {done} loops did not reach their preload")
     return "\n".join(parts)
 

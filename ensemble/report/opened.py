@@ -7,10 +7,10 @@ run may go on writing to it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import pandas as pd
@@ -21,14 +21,18 @@ from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.quantities import with_units
 from adhesis.ensemble.report.curves_dataset import curves_dataset
-from adhesis.ensemble.report.html import picture, table_of
-from adhesis.ensemble.report.plots import Plots
+from adhesis.ensemble.report.html import picture_of, table_of
 from adhesis.ensemble.report.tables import loss_tables, mechanisms
 from adhesis.ensemble.report.tables.table import Table
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from adhesis.ensemble.report.figures.style import PublishedFigure
 
 # Dimensions of the file under the names that they have here.
 _RENAMED = {
@@ -38,6 +42,63 @@ _RENAMED = {
 }
 _NO_RESULTS = ("error", schema.CHECKSUM.name, schema.ORIGIN.name)
 _SPECTRA = ("psd_height", "height_density", "psd_displacement", "gap_density")
+
+
+class Plots:
+    """One method for each figure of the report; docs/theory.md says what each shows.
+
+    Every method returns the figure, which a notebook displays. With ``ax``, one Axes of matplotlib
+    or several, its first panels are drawn into these, and their figure is returned. What is drawn
+    are averages over the realisations that are finished.
+    """
+
+    def __init__(self, averages: Callable[[], Aggregate]) -> None:
+        self._averages = averages
+
+    def __dir__(self) -> list[str]:
+        from adhesis.ensemble.report.figures.catalogue import ALL
+
+        return [item.draw.__name__ for item in ALL] + ["loss_along"]
+
+    def __repr__(self) -> str:
+        return f"<Plots: {', '.join(dir(self))}>"
+
+    def __getattr__(self, name: str) -> Callable[..., Figure]:
+        """Return the method of a figure of the catalogue, by the name of the function."""
+        if name.startswith("_") or name not in dir(self):
+            raise AttributeError(name)
+        from adhesis.ensemble.report.figures.catalogue import ALL
+
+        item = next(item for item in ALL if item.draw.__name__ == name)
+
+        def draw(ax: object = None) -> Figure:
+            return self._draw(item.of, ax)
+
+        draw.__name__, draw.__doc__ = name, item.draw.__doc__
+        return draw
+
+    def _draw(self, function: Callable[[Aggregate], PublishedFigure], ax: object) -> Figure:
+        """Draw a figure; each method calls this alone, so that a warning is of the user's line."""
+        from adhesis.ensemble.report.figures.style import drawn_into
+
+        with drawn_into(ax):
+            return function(self._averages()).finish()
+
+    def loss_along(self, name: str, ax: object = None) -> Figure:
+        """Loss along a further axis of the campaign ("max_penetration"), with intervals.
+
+        Raises
+        ------
+        ValueError
+            If the campaign has no such axis beside H and γ.
+        """
+        from adhesis.ensemble.report.figures.along import along, with_figure
+
+        axes = {axis.name: axis for axis in with_figure(self._averages())}
+        if name not in axes:
+            known = ", ".join(axes) or "none"
+            raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
+        return self._draw(along(axes[name]), ax)
 
 
 class CampaignResults:
@@ -115,7 +176,7 @@ class CampaignResults:
         several = along.with_figure(self.averages) if len(self.averages.hursts) == 1 else []
         draw = partial(self.plot.loss_along, several[0].name) if several else None
         figure: Any = (draw or self.plot.loss_against_hurst)()
-        return page + table + picture(figure._repr_png_(), "losses")
+        return page + table + picture_of(figure, "losses")
 
     @cached_property
     def averages(self) -> Aggregate:
@@ -148,10 +209,9 @@ class CampaignResults:
             for d in schema.DATASETS
             if d.dims[0] == "task"
             and d.name not in (*self.axes, *_SPECTRA, *_NO_RESULTS)
-            and not d.name.startswith("jump_")
+            and (d.name == "jump_count" or not d.name.startswith("jump_"))
         ]
-        count = next(d for d in schema.DATASETS if d.name == "jump_count")
-        return self._arranged([*wanted, count])
+        return self._arranged(wanted)
 
     @cached_property
     def spectra(self) -> xr.Dataset:

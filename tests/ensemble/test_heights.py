@@ -16,7 +16,7 @@ import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.heights import closure_warning, read_heights
+from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.model.profile import Array, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
@@ -204,12 +204,14 @@ CUT: dict[str, Array] = {
 
 @pytest.mark.parametrize("kind", PERIODIC)
 def test_a_period_is_not_warned_of(kind: str) -> None:
-    assert closure_warning(PERIODIC[kind], "it") is None
+    warning = heights_warning(PERIODIC[kind], "it") or ""
+    assert "do not meet" not in warning
+    assert ("heights only" in warning) is (len(PERIODIC[kind]) < 8)
 
 
 @pytest.mark.parametrize("kind", CUT)
 def test_ends_that_do_not_meet_are_warned_of(kind: str) -> None:
-    sentence = closure_warning(CUT[kind], "it.csv")
+    sentence = heights_warning(CUT[kind], "it.csv")
     assert sentence is not None
     assert sentence.startswith("the ends of it.csv do not meet: from its last height")
     assert "adhesis trace" in sentence
@@ -219,7 +221,7 @@ def test_no_shift_of_a_periodic_profile_is_warned_of() -> None:
     """The warning compares steps, so that it must not depend on where a period begins."""
     for seed in range(20):
         heights = rough(seed, 1)
-        assert not any(closure_warning(np.roll(heights, k), "it") for k in range(0, 800, 37))
+        assert not any(heights_warning(np.roll(heights, k), "it") for k in range(0, 800, 37))
 
 
 @pytest.mark.parametrize("path", [(), ("--path", "0.5,0.2,0.4,out")], ids=["loop", "path"])

@@ -21,8 +21,8 @@ from matplotlib.image import imread
 from matplotlib.markers import CARETDOWN
 
 from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
-from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
@@ -32,7 +32,6 @@ from adhesis.ensemble.report.figures import (
     catalogue,
     loops,
     loss_figures,
-    selection,
     shapes_and_spectra,
 )
 from adhesis.ensemble.report.figures.catalogue import LOOPS
@@ -245,11 +244,13 @@ def test_an_interval_that_goes_on_below_zero_is_marked():
     figure = Figure()
     axes = figure.subplots()
     found = [SimpleNamespace(mean=1.0, low=low, high=2.0) for low in (-0.5, 0.5)]
-    loss_figures.errorbar(axes, np.array([1.0, 2.0]), found, 0, "loss")
+    cells = [SimpleNamespace(estimates={"loss": e}, failed=0, short_of_preload=0) for e in found]
+    what = (axes, np.array([1.0, 2.0]), cells, "loss", 1.0, 0, "loss")
+    loss_figures.errorbar(*what)
     (mark,) = [line for line in axes.lines if line.get_marker() == CARETDOWN]
     assert mark.get_xydata().tolist() == [[1.0, 0.0]]
     axes.cla()
-    loss_figures.errorbar(axes, np.array([1.0, 2.0]), found, 0, "loss", from_zero=False)
+    loss_figures.errorbar(*what, from_zero=False)
     assert CARETDOWN not in [line.get_marker() for line in axes.lines]
 
 
@@ -376,9 +377,9 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp
 def test_a_campaign_without_the_papers_values_draws_what_it_has(tmp_path):
     plan = campaign(hurst=(0.5, 0.6), gamma=(0.02, 0.05), realisations=2)
     data = aggregate(write(tmp_path / "r.h5", plan, rows(plan)))
-    cells = selection.cells_of(data, paper.FIGURE_4)
+    cells = shapes_and_spectra.cells_of(data, paper.FIGURE_4)
     assert [(c.hurst, c.work_of_adhesion) for c in cells] == [(0.5, 0.02), (0.5, 0.05)]
-    said = selection.beside_paper(data, paper.FIGURE_3)
+    said = shapes_and_spectra.beside_paper(data, paper.FIGURE_3)
     assert said.endswith("; the nearest to it here is H = 0.5, γ = 0.02 and 0.05 J/m².")
 
 

@@ -10,32 +10,33 @@ from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.figures.loss_figures import (
-    errorbar,
-    hollow_handle,
-    hollow_of,
-    loss_label,
+from adhesis.ensemble.report.figures.loss_figures import errorbar, hollow_handle, loss_label
+from adhesis.ensemble.report.further_axes import (
+    axis_label,
+    below,
+    common,
+    from_to,
+    lines_along,
+    own_axes,
+    symbols,
+    together,
 )
-from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, symbols, together
 
 _MOST_TICKS = 5
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
+# Name, label, unit, and whether the panel begins at 0.
 _OF_TURNING_POINT = (
-    ("pull_off_stress", "largest tension (kPa)", 1e3),
-    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0),
-    ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0),
+    ("pull_off_stress", "largest tension (kPa)", 1e3, True),
+    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0, False),
+    ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0, True),
 )
 
 
 def with_figure(data: Aggregate) -> list[Axis]:
     """Further axes that have a figure: all but those that vary together with H or γ."""
-    return [
-        axis
-        for axis in data.further
-        if not together(data, axis) & {"hurst", "work_of_adhesion"}
-        and any(len(line) > 1 for line in lines_along(data, axis))
-    ]
+    axes = own_axes(data)
+    return [axis for axis in axes if any(len(line) > 1 for line in lines_along(data, axis))]
 
 
 def along(axis: Axis) -> Callable[[Aggregate], style.PublishedFigure]:
@@ -53,13 +54,11 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     second = next((other for other in data.further if other.name not in moving), None)
     fixed, every = _lines(data, axis, second)
     lines = {at: done for at, cells in every.items() if (done := [c for c in cells if c.done])}
-    titles = list(dict.fromkeys(title for title, _ in lines))
-    titles = [titles[round(k)] for k in style.spread_out(range(len(titles)), style.MOST_PANELS)]
-    labels = list(dict.fromkeys(label for _, label in lines))
-    labels = [labels[round(k)] for k in style.spread_out(range(len(labels)), style.MOST_CURVES)]
-    rows = [("loss", loss_label(data), 1e-3)]
+    titles = style.spread_out(list(dict.fromkeys(title for title, _ in lines)), style.MOST_PANELS)
+    labels = style.spread_out(list(dict.fromkeys(label for _, label in lines)), style.MOST_CURVES)
+    rows = [("loss", loss_label(data), 1e-3, True)]
     if axis.name in TURNING_POINTS:
-        per_contact = ("loss_per_contact", loss_label(data, "loss per contact"), 1e-3)
+        per_contact = ("loss_per_contact", loss_label(data, "loss per contact"), 1e-3, True)
         rows += [*_OF_TURNING_POINT, per_contact]
     width = style.ONE_COLUMN if len(titles) == 1 else style.TWO_COLUMNS
     height = (22 + 40 * len(rows)) * style.MM
@@ -68,24 +67,21 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
     logarithmic = low > 0 and high > _LOG_FROM * low
     grid = figure.rows
     axis_text, axis_unit = axis_label(axis)
-    for row, (name, label, unit) in zip(grid, rows, strict=True):
+    for row, (name, label, unit, from_zero) in zip(grid, rows, strict=True):
         for axes, title in zip(row, titles, strict=True):
             for k, of_line in enumerate(labels):
                 line = lines.get((title, of_line), [])
                 if not line:
                     continue
-                x = np.array([dict(cell.others)[axis.name] for cell in line], dtype=float)
+                x = np.array([cell.further_values[axis.name] for cell in line], dtype=float)
                 aside = (k - (len(labels) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 x /= axis_unit
-                found = [cell.estimates[name] for cell in line]
-                above = name != "pull_off_penetration"
-                hollow = hollow_of(line)
-                errorbar(axes, x, found, k, of_line, unit=unit, from_zero=above, hollow=hollow)
+                errorbar(axes, x, line, name, unit, k, of_line, from_zero=from_zero)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
-        for axes in row if name != "pull_off_penetration" else ():
+        for axes in row if from_zero else ():
             axes.set_ylim(bottom=0)  # when the panels, which share it, are all drawn
         row[0].set_ylabel(label)
     for axes, title in zip(grid[0], titles, strict=True):
@@ -113,10 +109,10 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
 
 def _sample(cells: list[AveragedCell]) -> str:
     """Return the number of profiles that means are over, and what their bars are."""
-    counts = sorted({cell.done for cell in cells if cell.done})
-    many = " to ".join(dict.fromkeys((f"{counts[0]}", f"{counts[-1]}")))
-    interval = ", 95 % interval of the mean" if counts[-1] > 1 else ""
-    return f"n = {many} {'profiles' if counts[-1] > 1 else 'profile'}{interval}"
+    counts = [cell.done for cell in cells if cell.done]
+    several = max(counts) > 1
+    of_what = "profiles, 95 % interval of the mean" if several else "profile"
+    return f"n = {from_to(counts)} {of_what}"
 
 
 def _lines(
@@ -127,21 +123,19 @@ def _lines(
     The cells of a line ascend along the axis, and may have no finished task.
     Further axes beside these two are at one place, that of :attr:`Aggregate.shown`.
     """
-    moving = together(data, axis)
-    names = set() if second is None else together(data, second)
+    moving = together(data, axis) | (set() if second is None else together(data, second))
 
     def at(cell: AveragedCell) -> list[tuple[str, float]]:
-        return [other for other in cell.others if other[0] not in moving | names]
+        return [other for other in cell.others if other[0] not in moving]
 
     wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
     lines: dict[tuple[str, str], list[AveragedCell]] = {}
-    for cell in sorted(data.cells, key=lambda cell: dict(cell.others)[axis.name]):
+    for cell in sorted(data.cells, key=lambda cell: cell.further_values[axis.name]):
         if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
             continue
         title, label = f"H = {cell.hurst:g}", style.gamma_label(cell.work_of_adhesion)
         if second is not None:
-            value = dict(cell.others)[second.name]
+            value = cell.further_values[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])
         lines.setdefault((title, label), []).append(cell)
-    every = list(wanted.values())
-    return [other for other in every[0] if all(other in one for one in every)], lines
+    return [other for other in common(data.shown) if other[0] not in moving], lines

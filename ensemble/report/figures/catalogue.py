@@ -12,9 +12,10 @@ from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.along import along, with_figure
 from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
-from adhesis.ensemble.report.figures.selection import beside_paper, has_fields
 from adhesis.ensemble.report.figures.shapes_and_spectra import (
+    beside_paper,
     cells_with_shape,
+    has_fields,
     shown_penetrations,
 )
 from adhesis.ensemble.report.figures.style import PublishedFigure

@@ -91,8 +91,8 @@ def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
 
 def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, AveragedCell]]:
     """Cells of one H that have finished tasks, each with the place of its γ among those shown."""
-    cells = ((k, data.cell(hurst, gamma)) for k, gamma in style.shown_gammas(data))
-    return [(k, cell) for k, cell in cells if cell is not None and cell.done]
+    shown = style.shown_gammas(data)
+    return [(k, cell) for k, gamma in shown for cell in data.finished([hurst], [gamma])]
 
 
 def _in_contact(cell: AveragedCell, branch: str) -> slice:

@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWN
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
+from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE, SMALL
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
-from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE, SMALL
 from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
@@ -59,10 +59,9 @@ def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     aside = 0.2 * min(np.diff(hursts), default=0.1)
     for axes, (k, gamma) in zip(figure.panels, shown, strict=False):
-        cells = _of_gamma(data, gamma)
+        cells = data.finished(hursts, [gamma])
         x = np.array([cell.hurst for cell in cells])
-        found = [cell.estimates[name] for cell in cells]
-        errorbar(axes, x, found, k, "_", unit=unit, hollow=hollow_of(cells))
+        errorbar(axes, x, cells, name, unit, k, "_")
         _stars(axes, [(cell.hurst + aside, papers_loss(cell), style.colour(k)) for cell in cells])
         style.label_panel(axes, style.gamma_label(gamma))
     for axes in figure.panels[len(shown) :]:
@@ -87,10 +86,9 @@ def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     for axes, (_, gamma) in zip(figure.panels, shown, strict=True):
         for k, hurst in enumerate(hursts):
-            cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
+            cells = data.finished([hurst], [gamma])
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
-            found = [cell.estimates[name] for cell in cells]
-            errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit, hollow=hollow_of(cells))
+            errorbar(axes, m2, cells, name, unit, k, f"H = {hurst:g}")
             _stars(axes, [(paper.m2(c.hurst), papers_loss(c), style.colour(k)) for c in cells])
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
         style.label_panel(axes, style.gamma_label(gamma))
@@ -98,13 +96,6 @@ def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
     handles = [style.key(f"H = {h:g}", ls="none", **style.look(k)) for k, h in enumerate(hursts)]
     figure.legend_above([*handles, *_star_handle(data), *hollow_handle(data.cells)], 4)
     return figure
-
-
-def _of_gamma(data: Aggregate, gamma: float) -> list[Cell]:
-    """The finished cells of one γ that a figure shows, by H."""
-    hursts = style.spread_out(data.hursts, style.MOST_CURVES)
-    cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
-    return [cell for cell in cells if cell.hurst in hursts]
 
 
 def _stars(axes: Axes, values: list[tuple[float | None, float | None, str]]) -> None:
@@ -124,7 +115,8 @@ def _star_handle(data: Aggregate) -> list[Line2D]:
 
 def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
     """Sum of the drops at small-scale and at large-scale jumps, for each (H, γ)."""
-    cells = _cells(data)
+    gammas = style.spread_out(data.works_of_adhesion, style.MOST_CURVES)
+    cells = data.finished(style.spread_out(data.hursts, style.MOST_PANELS), gammas)
     width = style.ONE_COLUMN if len(cells) <= _MOST_BARS else style.TWO_COLUMNS
     figure = style.new_figure(1, 1, width, 68 * style.MM)
     axes = figure.panels[0]
@@ -177,8 +169,7 @@ def jump_energies(data: Aggregate) -> style.PublishedFigure:
     for row, hurst in zip(figure.rows, hursts, strict=True):
         for axes, small in zip(row, (False, True), strict=True):
             for k, gamma in shown:
-                cell = data.cell(hurst, gamma)
-                if cell is not None and cell.done:
+                for cell in data.finished([hurst], [gamma]):
                     _jump_density(axes, cell, small, k, occupied)
             style.label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
     figure.label("energy drop of one jump (J/m²)", "jumps per loop and decade")
@@ -214,13 +205,11 @@ def pull_off(data: Aggregate) -> style.PublishedFigure:
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)
     unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
     for k, hurst in enumerate(hursts):
-        cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
+        cells = data.finished([hurst], data.works_of_adhesion)
         x = np.array([cell.work_of_adhesion for cell in cells]) / size
-        found = [cell.estimates["pull_off_stress"] for cell in cells]
         # apart, so that intervals can be distinguished
-        offset = (k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion) / size
-        hollow = hollow_of(cells)
-        errorbar(axes, x, found, k, f"H = {hurst:g}", offset=offset, unit=1e3, hollow=hollow)
+        x += (k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion) / size
+        errorbar(axes, x, cells, "pull_off_stress", 1e3, k, f"H = {hurst:g}")
     figure.label(rf"work of adhesion $\gamma$ ({unit})", "largest tension (kPa)")
     axes.set_ylim(bottom=0)
     handles = [*axes.get_legend_handles_labels()[0], *hollow_handle(data.cells)]
@@ -239,12 +228,6 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
     right.set_ylabel(r"$\tilde\sigma$ at the mean $h_\mathrm{max}$")
 
 
-def _cells(data: Aggregate) -> list[Cell]:
-    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
-    gammas = style.spread_out(data.works_of_adhesion, style.MOST_CURVES)
-    return [c for c in data.cells if c.done and c.hurst in hursts and c.work_of_adhesion in gammas]
-
-
 def _occupied(data: Aggregate) -> slice:
     """The bins from the first to the last that holds a jump of any cell; at most eight decades."""
     filled = np.flatnonzero(np.sum([cell.jumps.histogram for cell in data.cells], axis=(0, 1)))
@@ -257,31 +240,29 @@ def _occupied(data: Aggregate) -> slice:
 def errorbar(
     axes: Axes,
     x: np.ndarray,
-    found: list[Estimate],
+    cells: Sequence[Cell],
+    name: str,
+    unit: float,
     k: int,
     label: str,
-    offset: float = 0.0,
-    unit: float = 1.0,
     *,
     from_zero: bool = True,
-    hollow: Sequence[bool] = (),
 ) -> None:
-    """Draw means with their intervals, in multiples of a unit; joined if they are many.
+    """Draw means over cells with their intervals, in multiples of a unit; joined if they are many.
 
-    Where the panel begins at 0, a mark there shows which intervals go on below. Marks of
-    :func:`hollow_of` are hollow.
+    Hollow where loops of a cell failed or were short of their preload. Where the panel begins at 0,
+    a mark there shows which intervals go on below.
     """
-    mean, low, bars = _in_unit(found, unit)
+    mean, low, bars = _in_unit([cell.estimates[name] for cell in cells], unit)
     line = style.LINES[k] if x.size >= FEWEST_FOR_A_LINE else "none"
-    axes.errorbar(
-        x + offset, mean, yerr=bars, linestyle=line, label=label, capsize=style.CAP, **style.look(k)
-    )
-    if any(hollow):
-        place = np.flatnonzero(hollow)
+    look = style.look(k)
+    axes.errorbar(x, mean, yerr=bars, linestyle=line, label=label, capsize=style.CAP, **look)
+    hollow = np.array([bool(cell.failed or cell.short_of_preload) for cell in cells], dtype=bool)
+    if hollow.any():
         options = {"linestyle": "none", "markerfacecolor": "white", "zorder": 5, "label": "_"}
-        axes.plot((x + offset)[place], mean[place], **style.look(k) | options)
+        axes.plot(x[hollow], mean[hollow], **look | options)
     if from_zero:
-        mark_below_zero(axes, (x + offset)[low < 0], style.colour(k))
+        mark_below_zero(axes, x[low < 0], style.colour(k))
 
 
 def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
@@ -291,11 +272,6 @@ def _in_unit(found: list[Estimate], unit: float) -> tuple[Array, Array, Array]:
         for part in ("mean", "low", "high")
     )
     return mean, low, np.nan_to_num(np.array([mean - low, high - mean]))
-
-
-def hollow_of(cells: Sequence[Cell]) -> list[bool]:
-    """Return whether loops of each cell failed or were short of their preload."""
-    return [cell.failed > 0 or cell.short_of_preload > 0 for cell in cells]
 
 
 def hollow_handle(cells: Sequence[Cell]) -> list[Line2D]:

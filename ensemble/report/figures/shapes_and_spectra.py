@@ -1,6 +1,6 @@
 """Shapes (Fig. 3), spectra (Figs. 4 and 5), densities of gap (Fig. 8) and height (Fig. 9).
 
-Each shows the (H, γ) and the Δ/h_max of the paper's figure where the campaign has them.
+Each shows the (H, γ) and the Δ/h_max of the paper's figure, or the nearest that the campaign has.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
+from adhesis.ensemble.aggregate.by_blocks import DeformedShape
 from adhesis.ensemble.aggregate.cells import Cell
-from adhesis.ensemble.aggregate.mean_fields import DeformedShape
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.figures.selection import cell_of_hurst, cells_of, state_of
-from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, field_plan
+from adhesis.ensemble.report.findings import typical_cell
+from adhesis.ensemble.report.paper import PaperFigure
+from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, FieldPlan, field_plan
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
@@ -149,8 +150,7 @@ def cells_with_shape(data: Aggregate) -> list[AveragedCell]:
 
 def shown_penetrations(data: Aggregate, most: int) -> list[int]:
     """Places of the penetrations that a figure shows, deepest first."""
-    places = list(range(data.cells[0].plan.penetration.size))[::-1]
-    return [int(k) for k in style.spread_out(places, most)]
+    return style.spread_out(range(data.cells[0].plan.penetration.size)[::-1], most)
 
 
 def _spectra(data: Aggregate, b: int) -> style.PublishedFigure:
@@ -257,8 +257,6 @@ def _refined(
     factor: int,
 ) -> Array:
     """Interpolate periodic values to :func:`_between`, where few nodes would show as a polygon."""
-    if factor == 1:
-        return np.asarray(values[part % values.size])
     wide = np.arange(part[0] - _BEYOND, part[-1] + _BEYOND + 1)
     return interpolator(wide.astype(float), values[wide % values.size])(_between(part, factor))
 
@@ -304,3 +302,67 @@ def _depth(data: Aggregate, cell: Cell, k: int) -> str:
 
 def _cell_label(cell: Cell) -> str:
     return f"H = {cell.hurst:g}, {style.gamma_label(cell.work_of_adhesion)}"
+
+
+# ---------------------------------------------------------------------- which cells and states
+
+
+def has_fields(cell: AveragedCell) -> bool:
+    """Whether a loop of a cell was in contact at a state with fields, as short of a preload."""
+    return bool(np.any(cell.fields.psd_displacement > 0))
+
+
+def cell_of_hurst(data: Aggregate, hurst: float, figure: PaperFigure) -> AveragedCell | None:
+    """Return the cell of H with the first γ of a figure; else the typical one of H."""
+    kept = [cell for cell in data.cells if has_fields(cell) and cell.hurst == hurst]
+    of_paper = [cell for cell in kept if cell.work_of_adhesion == figure.works_of_adhesion[0]]
+    return next(iter([*of_paper, *kept[(len(kept) - 1) // 2 :]]), typical_cell(data, hurst))
+
+
+def cells_of(data: Aggregate, figure: PaperFigure) -> list[AveragedCell]:
+    """Return the cells of a figure that have results.
+
+    Where the campaign lacks its H, they are of the typical one; where it lacks all of its γ, they
+    are of all γ of the campaign.
+    """
+    kept = [cell for cell in data.cells if has_fields(cell)]
+    kept = kept or [cell for cell in data.cells if cell.done]
+    known = {(cell.hurst, cell.work_of_adhesion): cell for cell in kept}
+    typical = typical_cell(data)
+    assert typical is not None  # an aggregate has finished tasks
+    for hurst in (figure.hurst, typical.hurst):
+        for gammas in (figure.works_of_adhesion, data.works_of_adhesion):
+            if found := [gamma for gamma in gammas if (hurst, gamma) in known]:
+                return [known[hurst, gamma] for gamma in style.spread_out(found, style.MOST_PANELS)]
+    return [typical]
+
+
+def state_of(plan: FieldPlan, figure: PaperFigure) -> int:
+    """Return the place of the stored state that is nearest to a figure's penetration.
+
+    The last state is the turning point, where both branches are one: it is taken if it is alone.
+    """
+    assert figure.penetration is not None
+    before = plan.penetration[:-1] if plan.penetration.size > 1 else plan.penetration
+    return int(np.argmin(np.abs(before - figure.penetration)))
+
+
+def beside_paper(data: Aggregate, figure: PaperFigure) -> str:
+    """Return a sentence on what the paper's figure shows, and what is nearest to it here."""
+    cells = cells_of(data, figure)
+    plan = cells[0].plan
+    at = figure.penetration
+    drawn = None if at is None else float(plan.penetration[state_of(plan, figure)])
+    gammas = tuple(cell.work_of_adhesion for cell in cells)
+    shown = f"The paper's figure is at {_place(figure.hurst, figure.works_of_adhesion, at)}"
+    # A state is stored at the load step that is nearest to the penetration that was asked for.
+    half = 0.5 * plan.max_penetration / plan.load_steps
+    near = at is None or drawn is None or abs(drawn - at) <= 1.001 * half
+    if (cells[0].hurst, gammas, near) == (figure.hurst, figure.works_of_adhesion, True):
+        return f"{shown}."
+    return f"{shown}; the nearest to it here is {_place(cells[0].hurst, gammas, drawn)}."
+
+
+def _place(hurst: float, gammas: tuple[float, ...], penetration: float | None) -> str:
+    text = f"H = {hurst:g}, γ = {' and '.join(f'{gamma:g}' for gamma in gammas)} J/m²"
+    return text if penetration is None else f"{text}, Δ/h_max = {penetration:.2g}"

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -32,6 +32,7 @@ from adhesis.ensemble.quantities import gamma_text
 from adhesis.solver.checks import counted, shown
 
 STYLE = Path(__file__).parent / "adhesis.mplstyle"
+Shown = TypeVar("Shown")
 
 MM = 1 / 25.4  # inches
 _MOST_COLUMNS_INSIDE = 2  # of a legend in a panel that is given
@@ -86,7 +87,7 @@ def key(label: str, **options: Any) -> Line2D:
     return Line2D([], [], label=label, **options)
 
 
-def spread_out(values: Sequence[float], most: int) -> list[float]:
+def spread_out(values: Sequence[Shown], most: int) -> list[Shown]:
     """At most so many of the values, evenly spread, first and last included."""
     if len(values) <= most:
         return list(values)

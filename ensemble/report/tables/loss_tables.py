@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell, stress_scale
-from adhesis.ensemble.aggregate.companions import Companion, LossDifference, difference
-from adhesis.ensemble.interval import interval_method
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.companions import difference
+from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.tables.key import (
-    axis_columns,
-    estimate,
-    estimated,
-    gamma_column,
-    key_columns,
-)
+from adhesis.ensemble.report.tables.key import axis_columns, estimated, gamma_column, key_columns
 from adhesis.ensemble.report.tables.table import (
     Table,
     TableColumn,
@@ -31,7 +23,7 @@ from adhesis.ensemble.report.tables.table import (
     number,
     plain,
 )
-from adhesis.solver.loading.zero_range import RANGES
+from adhesis.solver.loading.zero_range import ANY_RANGE, RANGES
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import finite
 
@@ -41,25 +33,39 @@ _MILLI: Any = {"unit": " [J/m^2]", "size": 1e-3}
 
 def losses(data: Aggregate) -> Table:
     """One row for each cell, everything that ``losses.csv`` holds."""
-    columns = (
+    cycle, material = data.campaign.cycle, data.campaign.material
+    columns = [
         *key_columns(data),
-        TableColumn("n", attrgetter("done"), "n"),
-        TableColumn("failed", attrgetter("failed"), "failed", only_if_any=True),
-        TableColumn("pending", attrgetter("pending"), "pending", only_if_any=True),
-        *_preload_columns(data),
-        *estimated("loss_dimensionless", _ALL, "W~", least=True, last=True),
+        TableColumn("n", "done", "n"),
+        TableColumn("failed", "failed", "failed", only_if_any=True),
+        TableColumn("pending", "pending", "pending", only_if_any=True),
+    ]
+    if cycle.preload is not None:
+        columns.append(
+            TableColumn(
+                *("short_of_preload", "short_of_preload", "short", plain),
+                only_if_any=True,
+                note="short: loops that turned before their preload was reached",
+            )
+        )
+    columns += [
+        *estimated("loss_dimensionless", _ALL, "W~", least=True, last=True, note=_note(data)),
         TableColumn(
             "loss_dimensionless_error_numerical",
-            estimate("loss_error_dimensionless"),
+            "estimates.loss_error_dimensionless.mean",
             *("± loop", number(1)),
             only_if_any=True,
             last=True,
+            note="± loop: mean of the estimated numerical error of a loop",
         ),
         TableColumn(
             "loss_dimensionless_error_load_steps",
             partial(_error_of_load_steps, data),
             *("± steps", number(1)),
             last=True,
+            note="± steps: the difference from the campaign with other load steps beside this one"
+            if any(companion.kind == "load steps" for companion in data.companions)
+            else "± steps: mean |loop integral - sum of drops|",
         ),
         TableColumn(
             "loss_dimensionless_error_resolution",
@@ -67,32 +73,47 @@ def losses(data: Aggregate) -> Table:
             *("± method", number(1)),
             only_if_any=True,
             last=True,
+            note="± method: the difference from the campaign with another accuracy or method "
+            "beside it",
         ),
         TableColumn(
-            "loss_dimensionless_paper", papers_loss, "paper", fixed(2), only_if_any=True, last=True
+            *("loss_dimensionless_paper", papers_loss, "paper", fixed(2)),
+            only_if_any=True,
+            last=True,
+            note=f"paper: {paper.REFERENCE}, Table 1, – where it gives none",
         ),
         *estimated("loss", _ALL, "loss (mJ/m²)", **_MILLI, least=True),
-        *_friction_columns(data),
-        *(
-            estimated("zone_error", "mean", "± zones", **_MILLI)
-            if data.campaign.material.opens
-            else ()
+    ]
+    if material.work_of_adhesion_open is not None:
+        columns += estimated("friction", "mean", "friction", **_MILLI)
+        columns += estimated("instability", "mean", "instability", **_MILLI)
+    if material.opens:
+        columns += estimated("zone_error", "mean", "± zones", **_MILLI)
+    columns += [
+        TableColumn(
+            *("loss_over_work_of_adhesion", _over_gamma, "W/γ", number(3)),
+            only_if_any=True,
+            note="W/γ: loss over work of adhesion",
         ),
-        TableColumn("loss_over_work_of_adhesion", _over_gamma, "W/γ", number(3), only_if_any=True),
         TableColumn("interval", lambda cell: interval_method(cell.done)),
         *estimated("loss_from_drops", **_MILLI),
         *estimated("audit_residual"),
-        TableColumn("audit_residual_rms", _of_audit(lambda audit: np.sqrt(np.mean(audit**2)))),
+        TableColumn(
+            "audit_residual_rms",
+            _of_loops("audit_residual", lambda audit: np.sqrt(np.mean(audit**2))),
+        ),
         TableColumn(
             "audit_residual_largest",
-            _of_audit(lambda audit: np.max(np.abs(audit))),
+            _of_loops("audit_residual", lambda audit: np.max(np.abs(audit))),
             *("audit", percent),
+            note="audit: largest |loop integral - sum of drops| / loss",
         ),
         TableColumn(
             "races",
             lambda cell: int(cell.values["races"].sum()) if cell.done else None,
             *("races", plain),
             only_if_any=True,
+            note="races: jumps that another rule of descent would have ended elsewhere, all loops",
         ),
         *estimated("energy_at_stake_dimensionless"),
         TableColumn(
@@ -100,17 +121,16 @@ def losses(data: Aggregate) -> Table:
             lambda cell: extreme(np.min, cell.least_range),
             *("range (nm)", number(unit=1e-9)),
             only_if_any=True,
+            note="range: range of adhesion below which the zero-range limit holds (the least of "
+            f"{ANY_RANGE} of all loops)",
         ),
-        *(TableColumn(f"{name}_least [m]", partial(_least_of, name)) for name in RANGES),
-        TableColumn(
-            "largest_interior_tension [Pa]",
-            lambda cell: extreme(np.max, cell.values["largest_interior_tension"]),
-        ),
+        *(TableColumn(f"{name}_least [m]", _of_loops(name, np.min)) for name in RANGES),
+        TableColumn("largest_interior_tension [Pa]", _of_loops("largest_interior_tension", np.max)),
         *estimated("loss_small_scale", "mean sem", **_MILLI),
         *estimated("loss_large_scale", "mean sem", **_MILLI),
         *estimated("small_scale_share", "mean ci_low ci_high"),
         *estimated("pull_off_stress", "mean sem ci_low ci_high", unit=" [Pa]"),
-        TableColumn("pull_off_stress_dimensionless_mean", _if_done(_pull_off_stress)),
+        *estimated("pull_off_stress_dimensionless"),
         *estimated("pull_off_penetration", "mean sem"),
         *estimated("h_max", unit=" [m]"),
         *estimated("h_rms", unit=" [m]"),
@@ -119,44 +139,34 @@ def losses(data: Aggregate) -> Table:
         *estimated("m4", unit=" [1/m^2]"),
         TableColumn("m2_paper", _papers_m2),
         *estimated("wall_time", unit=" [s]"),
-    )
+    ]
     return make_table("Loss of one loop", columns, data.cells)
 
 
-def _preload_columns(data: Aggregate) -> tuple[TableColumn, ...]:
-    """Return the column of loops that turned before their preload; none without a preload."""
-    if data.campaign.cycle.preload is None:
-        return ()
-    name = "short_of_preload"
-    return (TableColumn(name, attrgetter(name), "short", plain, only_if_any=True),)
-
-
-def _friction_columns(data: Aggregate) -> tuple[TableColumn, ...]:
-    """Return the columns of the two parts of the loss; none for one work of adhesion."""
-    if data.campaign.material.work_of_adhesion_open is None:
-        return ()
+def _note(data: Aggregate) -> str:
+    """Return what W~ and its errors are, and the method of the interval."""
+    student = "by Student's t"
+    both = f"{student} and Hall's transformation of it, the further end on each side"
+    methods = {interval_method(cell.done) for cell in data.cells} - {"none"}
+    interval = f"; 95 % interval of the mean {both if 'transformed' in methods else student}"
+    if len(methods) > 1:
+        interval += f", for fewer than {FEWEST_FOR_SKEWNESS} realisations {student}"
+    weight = "; under a weight: closed at the separation of its fall"
     return (
-        *estimated("friction", "mean", "friction", **_MILLI),
-        TableColumn(
-            "instability_mean [J/m^2]",
-            _if_done(lambda cell: np.mean(cell.values["loss"] - cell.values["friction"])),
-            *("instability", number(unit=1e-3)),
-        ),
+        "W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max) and Δ~ = Δ/h_max, each realisation with its own "
+        f"h_max; s.e.: standard error of the mean{interval if methods else ''}"
+        f"{weight if data.campaign.cycle.under_load else ''}"
     )
 
 
-def _if_done(value: Callable[[Cell], Any]) -> Callable[[Cell], float | None]:
-    """Take a number from the cells that have a finished task."""
-    return lambda cell: float(value(cell)) if cell.done else None
+def extreme(choose: Callable[[Array], Any], values: Array) -> float | None:
+    """Return the least or largest of the known values; None if none is finite."""
+    known = values[np.isfinite(values)]
+    return float(choose(known)) if known.size else None
 
 
-def _of_audit(value: Callable[[Array], Any]) -> Callable[[Cell], float | None]:
-    return _if_done(lambda cell: value(cell.values["audit_residual"]))
-
-
-def _pull_off_stress(cell: Cell) -> float:
-    scale = stress_scale(cell.campaign, cell.values["h_max"])
-    return float((cell.values["pull_off_stress"] / scale).mean())
+def _of_loops(name: str, choose: Callable[[Array], Any]) -> Callable[[Cell], float | None]:
+    return lambda cell: extreme(choose, cell.values[name])
 
 
 def _papers_m2(cell: Cell) -> float | None:
@@ -173,23 +183,21 @@ def precision(data: Aggregate) -> Table:
     """Tabulate the precision of the quantity of ``[stop]``; no rows without ``[stop]``."""
     verdict = {True: "yes", False: "no", None: "not finished"}
     three_digits = partial(percent, digits=3)
-    columns = (
+    columns = [
         *key_columns(data),
-        TableColumn("n", attrgetter("precision.estimate.n"), "n"),
-        TableColumn("quantity", attrgetter("precision.quantity"), "quantity"),
-        TableColumn("mean", attrgetter("precision.estimate.mean"), "mean", number()),
-        TableColumn("ci_low", attrgetter("precision.estimate.low"), "95 % from", number()),
-        TableColumn("ci_high", attrgetter("precision.estimate.high"), "to", number()),
+        TableColumn("n", "precision.estimate.n", "n"),
+        TableColumn("quantity", "precision.quantity", "quantity"),
+        TableColumn("mean", "precision.estimate.mean", "mean", number()),
+        TableColumn("ci_low", "precision.estimate.low", "95 % from", number()),
+        TableColumn("ci_high", "precision.estimate.high", "to", number()),
         TableColumn(
             "relative_error",
             lambda cell: finite(cell.precision.relative_error),
             *("±, further side", three_digits),
         ),
-        TableColumn(
-            "wanted_relative_error", attrgetter("precision.wanted"), "wanted", three_digits
-        ),
+        TableColumn("wanted_relative_error", "precision.wanted", "wanted", three_digits),
         TableColumn("met", lambda cell: verdict[cell.precision.met], "met"),
-    )
+    ]
     steered = [cell for cell in data.cells if cell.precision is not None]
     return make_table("Precision of the mean ([stop])", columns, steered)
 
@@ -201,21 +209,11 @@ def papers_loss(cell: Cell) -> float | None:
     return paper.table_1(cell.hurst, cell.work_of_adhesion)
 
 
-def extreme(choose: Callable[[Array], Any], values: Array) -> float | None:
-    """Return the least or largest of the known values; None if none is finite."""
-    known = values[np.isfinite(values)]
-    return float(choose(known)) if known.size else None
-
-
-def _least_of(name: str, cell: Cell) -> float | None:
-    return extreme(np.min, cell.values[name])
-
-
 def beside_the_paper(data: Aggregate) -> Table:
     """The paper's Table 1, cell by cell; no rows for others than the paper's."""
-    columns = (
+    columns = [
         *key_columns(data),
-        TableColumn("n", attrgetter("done"), "n"),
+        TableColumn("n", "done", "n"),
         *estimated("loss_dimensionless", "value ci_low ci_high", "W~"),
         TableColumn("paper", papers_loss, "paper", fixed(2)),
         TableColumn(
@@ -223,7 +221,7 @@ def beside_the_paper(data: Aggregate) -> Table:
             *("W~ off the paper by", partial(rounded_percent, sign="+")),
         ),
         TableColumn("inside", inside_interval, "paper in the interval"),
-    )
+    ]
     cells = [
         cell
         for cell in data.cells
@@ -263,112 +261,93 @@ def _error_of_load_steps(data: Aggregate, cell: Cell) -> float | None:
 
 def _deviation(kind: str, data: Aggregate, cell: Cell) -> float | None:
     """Largest mean difference of the loss from a companion of that kind."""
-    found = [
-        abs(pair.difference.mean)
-        for companion in data.companions
-        if companion.kind == kind
-        and (other := companion.like(cell)) is not None
-        and (pair := difference(cell, other)) is not None
-    ]
-    return max(found, default=None)
+    companions = [companion for companion in data.companions if companion.kind == kind]
+    pairs = [difference(cell, companion.like(cell)) for companion in companions]
+    return max((abs(pair.difference.mean) for pair in pairs if pair is not None), default=None)
 
 
 def paired(data: Aggregate) -> Table:
     """Tabulate the growth of the loss from one γ to the next on the same profiles."""
-    scaled, loss = attrgetter("loss_dimensionless"), attrgetter("loss")
-    columns = (
-        TableColumn("hurst", attrgetter("hurst"), "H"),
-        *axis_columns(data.further),
-        gamma_column(data, "_from", attrgetter("lower"), "γ from"),
-        gamma_column(data, "_to", attrgetter("upper"), "to"),
-        TableColumn("pairs", attrgetter("loss.n"), "pairs"),
+    scaled, loss = "loss_dimensionless.difference", "loss.difference"
+    columns = [
+        TableColumn("hurst", "lower.hurst", "H"),
+        *axis_columns(data.further, "lower."),
+        gamma_column(data, "_from", "lower.work_of_adhesion", "γ from"),
+        gamma_column(data, "_to", "upper.work_of_adhesion", "to"),
+        TableColumn("pairs", "loss.difference.n", "pairs"),
         *estimated("loss_dimensionless_difference", _DIFFERENCE, "W~ grows by", of=scaled),
         *estimated("loss_difference", "value", "loss by (mJ/m²)", **_MILLI, of=loss),
         *estimated("loss_difference", "sem ci_low ci_high", **_MILLI, of=loss),
-    )
+    ]
     return make_table("Growth of the loss with γ, profile by profile", columns, data.paired)
 
 
 def profiles(data: Aggregate) -> Table:
     """Statistics of the profiles of each H (and further key of the profile), the paper's slope."""
-    further = [k for k, axis in enumerate(data.further) if axis.table == "profile"]
-    columns = (
-        TableColumn("hurst", attrgetter("hurst"), "H"),
-        *axis_columns([data.further[k] for k in further]),
-        TableColumn("h_rms [m]", estimate("h_rms"), "mean h_rms (µm)", number(unit=1e-6)),
-        TableColumn("h_max [m]", estimate("h_max"), "mean h_max (µm)", number(unit=1e-6)),
-        TableColumn("m0 [m^2]", estimate("m0"), "m0 (µm²)", number(unit=1e-12)),
-        TableColumn("m2", estimate("m2"), "mean m2", number()),
+    further = [axis for axis in data.further if axis.table == "profile"]
+    columns = [
+        TableColumn("hurst", "hurst", "H"),
+        *axis_columns(further),
+        *estimated("h_rms", "mean", "mean h_rms (µm)", size=1e-6),
+        *estimated("h_max", "mean", "mean h_max (µm)", size=1e-6),
+        *estimated("m0", "mean", "m0 (µm²)", size=1e-12),
+        *estimated("m2", "mean", "mean m2"),
         TableColumn("m2_paper", _papers_m2, "m2, paper", number(2), only_if_any=True),
-        TableColumn("m4 [1/m^2]", estimate("m4"), "m4 (1/µm²)", number(unit=1e12)),
-    )
-    alike: dict[tuple[float, ...], list[Cell]] = {}
+        *estimated("m4", "mean", "m4 (1/µm²)", size=1e12),
+    ]
+    best: dict[tuple[float, ...], Cell] = {}  # all cells of a key have the same profiles
     for cell in data.cells:
-        at = (cell.hurst, *(cell.others[k][1] for k in further))
-        alike.setdefault(at, []).append(cell)
-    best = [max(cells, key=lambda cell: cell.done) for cells in alike.values()]
-    return make_table("Profiles", columns, best)
-
-
-@dataclass(frozen=True)
-class _Beside:
-    """A cell, the companion's like it, and the difference of their losses."""
-
-    companion: Companion
-    cell: Cell
-    other: Cell
-    loss: LossDifference
+        at = (cell.hurst, *(cell.further_values[axis.name] for axis in further))
+        if at not in best or cell.done > best[at].done:
+            best[at] = cell
+    return make_table("Profiles", columns, best.values())
 
 
 def companions(data: Aggregate) -> Table:
     """Losses of the campaigns beside this one, over the realisations that both have."""
-    columns = (
-        TableColumn("file", attrgetter("companion.path.name"), "campaign"),
+    columns = [
+        TableColumn("file", "companion.path.name", "campaign"),
         TableColumn(
             "differs",
-            lambda pair: "; ".join(pair.companion.differs) or "nothing",
+            lambda row: "; ".join(row["companion"].differs) or "nothing",
             "where it differs",
         ),
-        *key_columns(data, attrgetter("cell")),
-        TableColumn("pairs", attrgetter("loss.here.n"), "pairs"),
-        TableColumn("loss_dimensionless_here", attrgetter("loss.here.mean"), "W~ here", number()),
-        TableColumn("loss_dimensionless_there", attrgetter("loss.there.mean"), "there", number()),
-        *estimated(
-            *("difference", _DIFFERENCE, "difference", number(3)), of=attrgetter("loss.difference")
-        ),
+        *key_columns(data, "cell."),
+        TableColumn("pairs", "loss.difference.n", "pairs"),
+        TableColumn("loss_dimensionless_here", "loss.here.mean", "W~ here", number()),
+        TableColumn("loss_dimensionless_there", "loss.there.mean", "there", number()),
+        *estimated("difference", _DIFFERENCE, "difference", number(3), of="loss.difference"),
         TableColumn(
             "loss_dimensionless_paper",
-            lambda pair: papers_loss(pair.cell) if paper.is_cell_of(pair.other) else None,
+            lambda row: papers_loss(row["cell"]) if paper.is_cell_of(row["other"]) else None,
             *("paper", fixed(2)),
             only_if_any=True,
         ),
-    )
-    pairs = [
-        _Beside(companion, cell, other, pair)
+    ]
+    rows = [
+        {"companion": companion, "cell": cell, "other": companion.like(cell), "loss": loss}
         for companion in data.companions
         for cell in data.cells
-        if (other := companion.like(cell)) is not None
-        and (pair := difference(cell, other)) is not None
+        if (loss := difference(cell, companion.like(cell))) is not None
     ]
-    return make_table("Beside other campaigns", columns, pairs)
+    return make_table("Beside other campaigns", columns, rows)
 
 
 def works(data: Aggregate) -> Table:
     """What approach gains and separation spends: docs/theory.md, section 8."""
-    per_contact = {
-        "effective_work_of_approach": "per contact: approach (mJ/m²)",
-        "effective_work_of_separation": "separation (mJ/m²)",
-        "loss_per_contact": "loss (mJ/m²)",
-    }
     columns = [
         *key_columns(data),
-        TableColumn("n", attrgetter("done"), "n"),
+        TableColumn("n", "done", "n"),
         *estimated("work_gained", "mean", "gained on approach (mJ/m²)", **_MILLI),
         *estimated("work_spent", "mean", "spent on separation (mJ/m²)", **_MILLI),
         *estimated("largest_contact_fraction", "mean", "largest A/A0"),
         *estimated("largest_contact_fraction", "ci_low ci_high"),
     ]
-    for name, heading in per_contact.items():
+    for name, heading in (
+        ("effective_work_of_approach", "per contact: approach (mJ/m²)"),
+        ("effective_work_of_separation", "separation (mJ/m²)"),
+        ("loss_per_contact", "loss (mJ/m²)"),
+    ):
         columns += estimated(name, "mean", heading, **_MILLI)
         columns += estimated(name, "ci_low ci_high", **_MILLI)
     columns += estimated("full_contact_energy", "mean", "full contact (mJ/m²)", **_MILLI)

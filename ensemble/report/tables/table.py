@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
+from operator import itemgetter
 from pathlib import Path
 from typing import IO, Any
 
@@ -26,11 +28,6 @@ def number(digits: int = 4, unit: float = 1.0) -> Format:
     return show
 
 
-def at_least_0(value: Any, unit: float = 1.0) -> str:
-    """Show the lower end of an interval of what is never negative, as a loss."""
-    return number(unit=unit)(value) if value > 0 else "0"
-
-
 def plain(value: Any) -> str:
     """Show a value as it is."""
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -45,12 +42,26 @@ def fixed(digits: int) -> Format:
 class TableColumn:
     """One column of a table."""
 
-    name: str  # in the CSV file, with its unit in brackets unless dimensionless
-    value: Callable[[Any], Value]  # takes its value from what a row is about
+    # In the CSV file, with its unit in brackets unless dimensionless; empty if the column is for
+    # people only
+    name: str
+    # Takes its value from what a row is about: a function, or the path of attributes and keys
+    # ("estimates.loss.mean")
+    value: str | Callable[[Any], Value]
     heading: str = ""  # for people; empty if the column is for the CSV file only
     show: Format = plain  # turns a value into text
     only_if_any: bool = False  # for people only if a row has a value that is not zero
     last: bool = False  # for people behind the others
+    note: str = ""  # what the heading means, as a clause
+
+    def of(self, entry: Any) -> Value:
+        """Take the value from what a row is about."""
+        if callable(self.value):
+            return self.value(entry)
+        for name in self.value.split("."):
+            entry = entry[name] if isinstance(entry, Mapping) else getattr(entry, name)
+        found: Value = entry
+        return found
 
 
 @dataclass(frozen=True)
@@ -65,17 +76,23 @@ class Table:
         """Write every column, at full precision, one row of names first."""
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow([column.name for column in self.columns])
-            writer.writerows([[_exact(value) for value in row] for row in self.rows])
+            kept = [bool(column.name) for column in self.columns]
+            writer.writerow([column.name for column in self.columns if column.name])
+            writer.writerows(map(_exact, compress(row, kept)) for row in self.rows)
 
     def markdown(self) -> str:
         """Return the columns that have a heading as a Markdown table."""
-        shown = self._shown()
+        shown = self._texts()
         return markdown_table(shown[0], *([markdown(cell) for cell in row] for row in shown[1:]))
+
+    def notes(self) -> str:
+        """Return what the headings mean, as a sentence."""
+        shown = sorted(self._shown(), key=itemgetter(0))
+        return "; ".join(column.note for _, column in shown if column.note) + "."
 
     def print(self, stream: IO[str]) -> None:
         """Print the columns that have a heading: rich on a terminal, plain lines elsewhere."""
-        shown = self._shown()
+        shown = self._texts()
         if stream.isatty():
             from rich.console import Console
             from rich.table import Table as RichTable
@@ -93,14 +110,19 @@ class Table:
             cells = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))
             print("  ".join(cells).rstrip(), file=stream)
 
-    def _shown(self) -> list[list[str]]:
+    def _shown(self) -> list[tuple[int, TableColumn]]:
+        """Return the columns for people, each with its place in the rows."""
         kept = [
             (k, column)
             for k, column in enumerate(self.columns)
             if column.heading
             and not (column.only_if_any and all(_missing(r[k]) or not r[k] for r in self.rows))
         ]
-        kept.sort(key=lambda entry: entry[1].last)
+        return sorted(kept, key=lambda entry: entry[1].last)
+
+    def _texts(self) -> list[list[str]]:
+        """Return the headings, and the values of each row as texts."""
+        kept = self._shown()
         body = [
             [BLANK if _missing(row[k]) else column.show(row[k]) for k, column in kept]
             for row in self.rows
@@ -110,7 +132,7 @@ class Table:
 
 def make_table(title: str, columns: Sequence[TableColumn], of: Iterable[Any]) -> Table:
     """Build a table with one row for each entry of ``of``, from which the columns take values."""
-    rows = (tuple(column.value(entry) for column in columns) for entry in of)
+    rows = (tuple(column.of(entry) for column in columns) for entry in of)
     return Table(title, tuple(columns), tuple(rows))
 
 
