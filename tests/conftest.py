@@ -54,7 +54,6 @@ def quick_figures(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add ``--slow``."""
     parser.addoption("--slow", action="store_true", help="run what is marked slow, too")
 
 

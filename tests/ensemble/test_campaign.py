@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
-from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import field_plan
@@ -25,7 +24,6 @@ from tests.support.wrong_values import outside
 
 
 def refused(text: str) -> str:
-    """Return the sentence with which a campaign is refused."""
     with pytest.raises(InputError) as caught:
         parse_campaign(text, "c.toml")
     sentence = str(caught.value)
@@ -128,6 +126,10 @@ work_of_adhesion_open = 0.08; strength = 3e9 -> _open and a range or strength: a
 work_of_adhesion_open = 0.08; method = "grid" ->
     [solver] method is 'grid' beside a work_of_adhesion_open
 strength = 3e6 -> [solver] method is 'grid' beside a range or strength
+stripes = 2 -> the amplitude of stripes of the work of adhesion is missing
+stripe_phase = 1.0 -> the number of stripes of the work of adhesion is missing
+stripes = 2; stripe_amplitude = 0.1; strength = 1e8; method =; nodes_per_wave = ->
+    is given beside a strength
 # rules that hold in every cell
 n0 = [1, 2]; ratio = [3, 60000] -> n0 · ratio is 120000
 ratio = [4, 16]; rolloff = [2, 8] -> rolloff is 8
@@ -155,7 +157,6 @@ CASES = [
 
 
 def with_keys(changes: str) -> str:
-    """Return the campaign with these keys, each in its table."""
     text = campaign_text()
     for change in changes.split(";"):
         key, _, value = (word.strip() for word in change.partition("="))
@@ -304,7 +305,6 @@ def test_penetration_axes():
 
 
 def complaint(text: str) -> str:
-    """Return the sentence with which a campaign is refused, or nothing."""
     try:
         parse_campaign(text, "c.toml")
     except InputError as error:
@@ -448,23 +448,3 @@ def test_keys_of_the_interface_reach_every_task_and_may_be_axes(keys, name, foun
     campaign = parse_campaign(text.replace("poisson = 0.5", f"poisson = 0.5\n{keys}"))
     assert [getattr(make_problem(campaign, task), name) for task in campaign.tasks()] == found
     assert campaign.material.opens == (name == "strength" and keys != "")
-
-
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ("stripes = 0\nstripe_amplitude = 0.5", r"stripes is 0: it must be"),
-        ("stripes = 2\nstripe_amplitude = 1", r"stripe.amplitude is 1.*: it must be"),
-        ("stripes = 2", "the amplitude of stripes of the work of adhesion is missing"),
-        ("stripe_phase = 1.0", "the number of stripes of the work of adhesion is missing"),
-        ("stripes = 2\nstripe_amplitude = 0.1\nstrength = 1e8", "is given beside a strength"),
-    ],
-)
-def test_stripes_that_cannot_be_are_refused_by_file_and_command(keys, message, capsys):
-    text = campaign_text(work_of_adhesion="[0.04]", poisson=f"0.5\n{keys}")
-    text = text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
-    with pytest.raises(InputError, match=message):
-        parse_campaign(text)
-    words = [f"--{key}".replace(" = ", "=").replace("_", "-") for key in keys.splitlines()]
-    assert main(["loop", "--hurst", "0.8", "--n0", "2", "--ratio", "4", *words]) == 2
-    assert re.search(message, capsys.readouterr().err)

@@ -115,7 +115,6 @@ def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
 
 
 def required(name: str) -> list[str]:
-    """Return words with all that a command requires."""
     words = []
     for action in parser_of(name)._actions:
         value = str(next(iter(action.choices))) if action.choices else "1"

@@ -54,15 +54,12 @@ class SimulatedRanks:
         heapq.heappush(self._ends, (at, rank, ("alive", None, None)))
 
     def clock(self):
-        """Return the simulated time."""
         return self.now
 
     def sleep(self, seconds):
-        """Let simulated time pass."""
         self.now += seconds
 
     def send(self, to, message, *, urgent=False):
-        """Let the simulated worker act on a message."""
         self.now += self._message_time
         if message[0] == "dismissed":
             self._ends = [e for e in self._ends if (e[1], e[2][0]) != (to, "alive")]
@@ -87,7 +84,6 @@ class SimulatedRanks:
             heapq.heappush(self._ends, (end, to, ("outcome", Outcome(task, to, seconds))))
 
     def poll(self, *, urgent=False):
-        """Return what a simulated worker sent, if it is time."""
         self.looks += 1
         self.now += 1e-6
         if self._ends and self._ends[0][0] <= self.now:
@@ -181,7 +177,6 @@ class StopsAtTheDoor(SimulatedRanks):
     """Worker 1 is asked to stop just as it is dismissed."""
 
     def send(self, to, message, *, urgent=False):
-        """Let the signal come before the dismissal."""
         if message[0] == "dismissed" and to == 1:
             heapq.heappush(self._ends, (self.now, to, ("stop", "SIGUSR1 received")))
         super().send(to, message, urgent=urgent)
@@ -225,19 +220,15 @@ class Scripted:
         self.sent = []
 
     def clock(self):
-        """Return the time."""
         return self.now
 
     def sleep(self, seconds):
-        """Let time pass."""
         self.now += seconds
 
     def send(self, to, message, *, urgent=False):
-        """Keep what is sent."""
         self.sent.append((to, message))
 
     def poll(self, *, urgent=False):
-        """Return the next message, if it is time."""
         if self.messages and self.messages[0][0] <= self.now:
             return self.messages.pop(0)[1:]
         return None
@@ -356,7 +347,6 @@ def test_processes_are_workers_like_any_other():
 
 
 def never(task, check):
-    """Compute in a process until told to stop."""
     return half(100, check)
 
 

@@ -229,7 +229,6 @@ def test_a_figure_as_pdf_has_truetype_fonts_and_mathematics(wave_file, tmp_path)
 
 
 def fonts_of(path):
-    """Return the types of the fonts of a PDF."""
     fonts = re.findall(rb"/Subtype\s*/(Type0|Type1|Type3|TrueType|CIDFontType2)", path.read_bytes())
     assert fonts
     return {name.decode() for name in fonts}
@@ -315,7 +314,6 @@ def refused(capsys, *words) -> str:
 
 @pytest.fixture
 def no_computing(monkeypatch):
-    """Fail the test if a loop is started."""
 
     def start(*_, **__):
         raise AssertionError("bad input reached the computation")

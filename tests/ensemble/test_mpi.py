@@ -41,7 +41,6 @@ pytestmark = pytest.mark.mpi
 
 
 def here(path, out, fake="") -> Summary:
-    """Run a campaign of fake tasks, or resume it, in this process."""
     return run_campaign(load_campaign(path), out, engine=fake_engine(fake))
 
 

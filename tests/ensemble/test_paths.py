@@ -164,7 +164,6 @@ def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Return the path of a sound results file."""
     small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
     return str(write(tmp_path_factory.mktemp("results") / "sound.h5", small, rows(small)))
 
@@ -263,7 +262,6 @@ def test_a_crafted_path_is_refused_in_one_sentence_before_anything_is_done(
 
 
 def commanded(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """Run a command, and raise the one sentence with which it refuses."""
     code = main(words)
     out, error = capsys.readouterr()
     assert (code, out) == (2, ""), (code, out, error)

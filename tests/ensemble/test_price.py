@@ -44,7 +44,6 @@ def test_pilots_tell_what_the_campaign_costs():
 
 @pytest.fixture
 def made(monkeypatch):
-    """Count the tasks that are made."""
     tasks = []
 
     class Counted(Task):

@@ -85,6 +85,11 @@ LOOP --unit um -> --unit belongs to --trace
 LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
+LOOP --stripes 2 -> the amplitude of stripes of the work of adhesion is missing
+LOOP --stripe-phase 1.0 -> the number of stripes of the work of adhesion is missing
+LOOP --stripes 0 --stripe-amplitude 0.5 -> --stripes is 0: it must be
+LOOP --stripes 2 --stripe-amplitude 1 -> --stripe-amplitude is 1.0: it must be
+LOOP --stripes 2 --stripe-amplitude 0.1 --strength 1e8 -> is given beside a strength
 loop --heights none.npy --period 1e-3 -> with --heights the material has to be given
 loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
@@ -182,7 +187,6 @@ TRACE --unit um --to way -> trace.html is to be written there
 
 
 def cases() -> list[Any]:
-    """Return the words and the sentence of each case."""
     found = []
     for line in re.sub(r"->\n +", "-> ", REFUSED).split("\n"):
         if not line or line.startswith("#"):

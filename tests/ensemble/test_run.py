@@ -80,7 +80,6 @@ def test_a_finished_campaign_computes_nothing_again_unasked(tmp_path):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The fake campaign, run to its end at once."""
     return run(tmp_path_factory.mktemp("whole"))[1]
 
 

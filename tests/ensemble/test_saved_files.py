@@ -30,14 +30,12 @@ def loop() -> adhesis.LoopResult:
 
 @pytest.fixture(scope="module")
 def content(loop: adhesis.LoopResult, tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """Return the bytes of the saved loop."""
     path = tmp_path_factory.mktemp("saved") / "loop.nc"
     loop.save(path)
     return path.read_bytes()
 
 
 def refusal(path: Path) -> str:
-    """Return the sentence with which a file is refused."""
     with pytest.raises(InputError) as error:
         adhesis.load(path)
     sentence = str(error.value)

@@ -334,7 +334,6 @@ def test_one_run_a_file_and_a_killed_one_holds_nothing(tmp_path):
 
 
 def wanted_by_another_process(path):
-    """Whether a run of another process is refused."""
     code = HOLD_LOCK.replace("time.sleep(60)", "")
     command = [sys.executable, "-c", code, str(path), str(ROOT)]
     return subprocess.run(command, capture_output=True, check=False).returncode != 0

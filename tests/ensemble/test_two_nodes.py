@@ -35,7 +35,6 @@ NAMES, ADDRESSES = ("nodea", "nodeb"), ("10.77.0.1", "10.77.0.2")
 
 
 def missing() -> str:
-    """Why this cannot be tried here; empty if it can."""
     lacking = [name for name in ("ip", "unshare", "mount", MPIRUN) if shutil.which(name) is None]
     if lacking:
         return f"no {', '.join(lacking)} here"
@@ -53,14 +52,12 @@ class Nodes:
     folder: Path
 
     def words(self, words: list[str]) -> list[str]:
-        """Return the command that runs another on the first node."""
         enter = 'mount --bind "$0" /etc/hosts && hostname nodea && exec "$@"'
         unshare = ["unshare", "--uts", "--ipc", "--mount", "bash", "-c", enter]
         inside = ["ip", "netns", "exec", self.spaces[0], *unshare]
         return [*inside, str(self.folder / "hosts"), *words]
 
     def launch(self, *words: object, fake: str) -> subprocess.Popen[str]:
-        """Start a fake campaign on two ranks of each node."""
         options = {
             "plm": "rsh",
             "plm_rsh_agent": str(self.folder / "agent"),

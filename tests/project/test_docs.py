@@ -48,7 +48,6 @@ class Block:
 
     @property
     def name(self) -> str:
-        """For messages."""
         return f"{self.page.relative_to(ROOT)}: {self.text.splitlines()[0][:60]}"
 
 
@@ -87,7 +86,6 @@ def is_of_commands(block: Block) -> bool:
 
 
 def is_transcript(block: Block) -> bool:
-    """Whether the block shows what it prints."""
     return block.language in ("console", "pycon") or block.text.startswith("$ ")
 
 
@@ -136,7 +134,6 @@ def test_campaigns_are_valid(block: Block) -> None:
 
 
 def example() -> str:
-    """Return the campaign that docs/campaign-file.md gives as an example."""
     block = next(b for b in BLOCKS if b.language == "toml" and b.page.name == "campaign-file.md")
     return block.text
 
@@ -168,7 +165,6 @@ def adhesis_words(line: str) -> list[str] | None:
 
 
 def is_run(line: str) -> bool:
-    """Whether a command is one that is run here."""
     words = adhesis_words(line)
     return words is not None and (words[0] in RUN or "--plan" in words)
 

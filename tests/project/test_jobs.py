@@ -59,7 +59,6 @@ class Cluster:
     env: dict[str, str]
 
     def run(self, *command: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
-        """Run a command here."""
         return subprocess.run(
             [str(word) for word in command],
             cwd=self.folder,
@@ -71,7 +70,6 @@ class Cluster:
         )
 
     def calls(self, program: str) -> list[list[str]]:
-        """The arguments of each call of a program."""
         path = self.folder / "calls"
         lines = [line.split("|") for line in path.read_text().splitlines()] if path.exists() else []
         return [words[1:-1] for words in lines if words[0] == program]
@@ -315,7 +313,6 @@ def test_parts_are_counted(cluster: Cluster, parts: str) -> None:
 
 
 def pbs(cluster: Cluster, **env: str) -> subprocess.CompletedProcess[str]:
-    """Run jobs/pbs.sh as the first start of a job."""
     return cluster.run("bash", JOBS / "pbs.sh", **(pbs_variables(cluster) | env))
 
 

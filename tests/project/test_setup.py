@@ -138,7 +138,6 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
 
 
 def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
-    """Run a script with tools/parts.sh; its exit code and what it says."""
     (tmp_path / ".setup").mkdir(exist_ok=True)
     head = f"""
         set -eu

@@ -74,7 +74,6 @@ class Site:
     started: list[subprocess.Popen[str]] = field(default_factory=list)
 
     def start(self, *options: str, **env: str) -> subprocess.Popen[str]:
-        """Start jobs/slurm.sh, in a process group of its own."""
         return self.execute("bash", str(JOBS / "slurm.sh"), "s.toml", *options, **env)
 
     def run_by_hand(self, **env: str) -> subprocess.Popen[str]:
@@ -83,7 +82,6 @@ class Site:
         return self.execute(adhesis, "run", "s.toml", "--out", "s.h5", **env)
 
     def execute(self, *command: str, **env: str) -> subprocess.Popen[str]:
-        """Start a command with what a job has in its environment."""
         programs = self.folder / "bin"
         settings = {
             "PATH": f"{programs}:/usr/bin:/bin",
@@ -111,12 +109,10 @@ class Site:
         return job
 
     def lines(self, name: str) -> list[str]:
-        """The lines of a file, none if it is missing."""
         path = self.folder / name
         return path.read_text().split() if path.exists() else []
 
     def is_quiet(self) -> bool:
-        """Whether all processes of all jobs have ended."""
         for job in self.started:
             job.poll()
             try:
@@ -127,7 +123,6 @@ class Site:
         return True
 
     def kept(self) -> list[str]:
-        """The rows of all staged copies."""
         copies = self.folder.glob("disk*/*/s.h5")
         return [row for copy in copies for row in copy.read_text().split()]
 
@@ -195,7 +190,6 @@ class Job:
 
 
 def drawn_job(draw: random.Random, disks: list[str], first: bool) -> Job:
-    """Draw a job that starts up to three times."""
     ends = ["", "kill script", "kill all", "limit", "limit", "cancel"]
     starts = [
         Start(
@@ -308,7 +302,6 @@ def real(tmp_path: Path) -> Iterator[Site]:
 
 
 def staged(here: Site, disk: str = "disk1") -> Path:
-    """The staged copy of the results file, if there is one."""
     return next(here.folder.glob(f"{disk}/*/s.h5"), here.folder / "none")
 
 

@@ -313,6 +313,16 @@ make_method('grid', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0)) ->
     ValueError: method is 'grid' beside a work_of_adhesion_open
 make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), nodes_per_wave=32) ->
     ValueError: nodes_per_wave is 32 beside a work_of_adhesion_open
+stripes(3, 1.0) -> ValueError: amplitude is 1.0: it must be
+stripes(0, 0.5) -> ValueError: count is 0: it must be
+AdhesionPattern([0.1]) -> ValueError: it must be 0
+AdhesionPattern([0, np.nan]) -> ValueError: coefficients of a pattern hold
+AdhesionPattern([0, 0.4, 0, 0.2]) -> ValueError: the work of adhesion to -0.2 of its mean
+Problem(WAVE, SOLID, 0.004, strength=1e7, pattern=stripes(2, 0.1)) ->
+    ValueError: is given beside a strength of 1e+07 Pa: give one of them
+Problem(WAVE, SOLID, 0.0, pattern=stripes(2, 0.1)) ->
+    ValueError: is given beside γ = 0: give one of them
+Problem(WAVE, SOLID, 0.004, pattern=0.3) -> TypeError: pattern is 0.3
 # units
 Problem(WAVE.scaled(1000000.0), SOLID, 0.04) ->
     ValueError: rms slope is 4,443: it must be a positive number from 1e-12 to 100; are heights

@@ -37,7 +37,6 @@ class Curve:
     source: ClassVar[Any] = SimpleNamespace(is_patterned=False)
 
     def point(self, at: float) -> Point:
-        """Point of the curve."""
         a = 0.5 + float(np.sqrt(at - FOLD))
         gaps = np.array([[3 - a, 3 + a]])
         field = SimpleNamespace(gaps=gaps, nearly=(-at * at, at), separation=at)
@@ -48,7 +47,6 @@ class Curve:
     def equilibrium(
         self, gaps: Any, at: float, reach: float, memory: Array | None = None
     ) -> Point | None:
-        """Point of the curve, if it is within reach."""
         self.asked += 1
         if at <= FOLD:
             return None

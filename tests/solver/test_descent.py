@@ -28,8 +28,6 @@ SOLID = HalfSpace(1e6, 0.5)
 
 
 class Solved(NamedTuple):
-    """Edges with their field."""
-
     gaps: np.ndarray
     separation: float
     edges: EdgeMechanics
@@ -37,27 +35,22 @@ class Solved(NamedTuple):
 
     @property
     def residual(self) -> np.ndarray:
-        """C - C_c."""
         return imbalance(self.solution.opening, self.gaps, self.edges.law)
 
     def openings(self, motion: np.ndarray) -> np.ndarray:
-        """Openings of the field after outward motions."""
         gaps = self.gaps + (motion * np.tile([1.0, -1.0], len(self.gaps))).reshape(-1, 2)
         return self.with_gaps(gaps).solution.opening
 
     def with_gaps(self, gaps: np.ndarray) -> Solved:
-        """Other edges, solved."""
         solution = solve_densely(gaps, self.separation, self.edges.model)
         return self._replace(gaps=gaps, solution=solution)
 
     def model(self) -> EdgeModel:
-        """Make the model about the edges."""
         law, panels, every = self.edges.law, self.edges.model.panels, np.arange(self.gaps.size)
         tangent = dense_tangent(self.gaps, self.separation, self.edges)
         return EdgeModel(every, self.gaps, self.residual, tangent, law, panels)
 
     def model_openings(self, motion: np.ndarray, steps: int = 400) -> np.ndarray:
-        """Openings of the model after outward motions in many equal steps."""
         model = self.model()
         for _ in range(steps):
             model.advance(motion / steps)

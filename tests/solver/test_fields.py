@@ -21,7 +21,6 @@ BINS = np.logspace(-4, 2, 97)
 
 
 def loaded(method: Method, penetration: float) -> ContactState:
-    """State on loading at a penetration."""
     found: list[ContactState] = []
     s = method.problem.separation(penetration)
     run_loop(

@@ -201,7 +201,6 @@ def test_grid_sees_no_race_where_the_rules_agree():
 
 
 def equal_waves(n0: int, seed: int, g: float, shift: float = 0.0) -> Problem:
-    """Single harmonic: n0 equal crests."""
     profile = self_affine_profile(0.8, period=2e-3, n0=n0, ratio=1, seed=seed, h_rms=1e-6)
     gamma = g * SOLID.modulus * 1e-12 * profile.q0 * n0
     return Problem(profile.shifted(shift * 2e-3), SOLID, gamma)

@@ -49,7 +49,6 @@ def solved_field(
     tolerance: float,
     device: LoadingDevice = FIXED_SEPARATION,
 ) -> GapField:
-    """Solve the field of these gaps to a relative accuracy."""
     model = FieldModel(device, float(-np.log(tolerance)), source.panels)
     return GapField(source, gaps, prescribed, lambda: solve_field(gaps, prescribed, model))
 

@@ -127,7 +127,6 @@ def loaded(profile):
 
 @pytest.fixture
 def many_gaps(loaded):
-    """Edges of many gaps, and a point of theirs."""
     method, state = loaded
     edges = method.edges
     return edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)

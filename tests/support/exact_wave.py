@@ -30,8 +30,6 @@ from adhesis.solver.references.single_wave import SingleWave, WaveLoop
 
 @dataclass(frozen=True)
 class ExactWaveReport(MethodReport):
-    """Report with the only setting."""
-
     states_per_step: int
 
 
@@ -69,7 +67,6 @@ class ExactWave(Method):
         )
 
     def follow(self, state: ContactState, prescribed: float) -> Path:
-        """Follow the stable branch; see ``method.Method``."""
         control, amplitude = self.problem.control, self.wave.amplitude
         branch = self.problem.branch_to(state, prescribed)
         states: list[ContactState] = []
@@ -126,12 +123,10 @@ class ExactWave(Method):
         return [Opening(self.crest + x, self.wave.gap(x, a))]
 
     def report(self) -> ExactWaveReport:
-        """Return the only setting."""
         return ExactWaveReport(self.name, self.chosen, self.states_per_step)
 
     @cached_property
     def _loop(self) -> WaveLoop:
-        """The exact loop under the control."""
         control = self.problem.control
         return self.wave.loop if control.is_fixed else self.wave.loop_under(control.stiffness)
 

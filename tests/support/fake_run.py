@@ -67,7 +67,6 @@ class FakeTask:
         self.begun = 0
 
     def __call__(self, campaign, task, progress=None):
-        """Compute as the words of the behaviour have it."""
         settings = self.settings
         self.begun += 1
         if "log" in settings:

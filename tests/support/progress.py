@@ -28,7 +28,6 @@ class Waiting:
         threading.Thread(target=self._watch, daemon=True).start()
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
-        """Note the beginning of a test."""
         self._begun[nodeid] = time.monotonic()
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
@@ -37,7 +36,6 @@ class Waiting:
         self._last = time.monotonic()
 
     def pytest_sessionfinish(self) -> None:
-        """Write no more."""
         self._ended.set()
 
     def _watch(self) -> None:

@@ -21,7 +21,6 @@ LONG = (
 
 
 def group_of(nodeid: str) -> str:
-    """Return what a test is run together with."""
     path, _, name = nodeid.partition("::")
     module = path.rpartition("/")[2]
     if module in RANKS:
@@ -37,7 +36,6 @@ def rank_of(nodeid: str) -> int:
 
 
 def scheduler(config: Any, log: Any) -> Any:
-    """Return what hands the groups out."""
     from xdist.scheduler import LoadScopeScheduling
 
     class Groups(LoadScopeScheduling):

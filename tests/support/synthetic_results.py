@@ -56,7 +56,6 @@ def text_of(
 
 
 def campaign(*args, **changes) -> Campaign:
-    """Return the campaign of :func:`text_of`, by its arguments."""
     return parse_campaign(text_of(*args, **changes))
 
 
@@ -180,7 +179,6 @@ def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
 
 
 def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
-    """Write a results file with these rows."""
     create(path, campaign, versions={"adhesis_version": "0.1.0"})
     with h5py.File(path, "r+") as file:
         for name, value in rows.items():
