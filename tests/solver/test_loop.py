@@ -183,15 +183,3 @@ def test_a_drop_is_the_difference_of_the_energies_whatever_its_sign():
 def test_a_contact_that_never_detaches_is_reported():
     with pytest.raises(PathError, match="still in contact"):
         run_loop(_Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)
-
-
-def test_a_loop_prints_itself_in_a_few_lines():
-    result = run_loop(exact(0.3), max_penetration=0.5, load_steps=10)
-    lines = str(result).splitlines()
-    words = [line.split()[0] for line in lines]
-    names = ["profile", "contact", "cycle", "loss", "range", "audit", "error", "jumps"]
-    names += ["pull-off", "method"]
-    assert words == names + ["WARNING"] * len(result.warnings)
-    assert f"{result.loss:.6g} J/m², " in lines[3]
-    assert "(no tension inside patches; at edges: " in lines[4]
-    assert lines[7] == "jumps       1 snap-in, 1 pull-off"

@@ -204,7 +204,7 @@ def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     """The whole of ``adhesis validate``; without --slow a part of the long claims.
 
     Other α are in test_sharp_path.py, a trough that opens in test_opening.py, a stiffness and a
-    load in test_control_loops.py, audits of rough loops in test_grid.py and test_sharp.py.
+    load in test_control_loops.py, audits of rough loops in test_grid.py and test_touch.py.
     """
     alphas = validation.ALPHAS
     if not request.config.getoption("--slow"):
