@@ -36,9 +36,6 @@ def campaign():
     return parse_campaign(campaign_text())
 
 
-# ---------------------------------------------------------------------------------- texts
-
-
 @pytest.mark.parametrize("text", HOSTILE)
 @pytest.mark.parametrize("shown", [markdown, code_span])
 def test_a_text_from_a_file_is_shown_letter_by_letter(text, shown):
@@ -83,8 +80,6 @@ def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeyp
         assert "second line" in shown
 
 
-# ---------------------------------------------------------------------------------- images
-
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)
 
 
@@ -125,9 +120,6 @@ def test_images_come_from_the_folder_of_the_page_alone(tmp_path):
         *("/etc/passwd", "missing.png", "../report/below/../../outside.png"),
     ):
         assert not shows(name), name
-
-
-# ---------------------------------------------------------------------------------- links
 
 
 def test_two_names_of_one_results_file_have_one_lock(tmp_path):

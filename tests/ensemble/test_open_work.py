@@ -41,9 +41,6 @@ def text(value: str, **changes: str) -> str:
     return given.replace('method = "grid"\nnodes_per_wave = 16\n', "accuracy = 1e-2\n")
 
 
-# ---------------------------------------------------------------------- loop
-
-
 def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     out = tmp_path / "loop.json"
     words = ("--work-of-adhesion", "40mJ/m2", "--work-of-adhesion-open", "80mJ/m2")
@@ -59,9 +56,6 @@ def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     line = f"friction    {data['friction']:.6g} J/m² at edges, which recede at 0.08 J/m²; "
     line += f"{data['loss'] - data['friction']:.6g} J/m² lost by instability"
     assert line in capsys.readouterr().out.splitlines()
-
-
-# ---------------------------------------------------------------------- trace
 
 
 def small_trace():
@@ -104,9 +98,6 @@ def test_the_answer_of_a_trace_has_its_friction(monkeypatch):
     assert "which recede at 0.02 J/m²" in str(answer)
 
 
-# ---------------------------------------------------------------------- campaign
-
-
 def test_a_row_has_its_friction():
     campaign = parse_campaign(text("0.08", work_of_adhesion="[0.04]", hurst="[0.8]"))
     row = Runner()(campaign, campaign.tasks()[0])
@@ -126,9 +117,6 @@ def test_a_loss_is_doubted_by_the_work_of_adhesion_that_it_spends():
     assert beyond_zero_range(values | {"gamma_open": 0.04})
     assert not beyond_zero_range(values | {"gamma_open": 0.4})
     assert beyond_zero_range(values | {"gamma_open": np.nan})
-
-
-# ---------------------------------------------------------------------- report
 
 
 @pytest.fixture(scope="module")

@@ -54,9 +54,6 @@ def ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     return run
 
 
-# ---------------------------------------------------------------------- adhesis loop
-
-
 def test_a_write_protected_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "o.json"
     path.write_text("old")
@@ -191,9 +188,6 @@ def test_older_files_of_the_writers_own_names_are_removed(tmp_path: Path) -> Non
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
         **{"a": "new", "notes": "old"}
     }
-
-
-# ---------------------------------------------------------------------- folders of other commands
 
 
 def test_a_report_on_a_full_disk_ends_in_one_sentence_and_leaves_the_old_one(ask: Ask) -> None:

@@ -35,9 +35,6 @@ PROBLEM = adhesis.Problem(adhesis.single_wave(1e-6, 1e-3), adhesis.HalfSpace(1e6
 MATERIAL = ("--work-of-adhesion", "0.01", "--young", "1e6", "--poisson", "0.5")
 LOOP = ("loop", "--heights", "wave.csv", "--period", "1e-3", *MATERIAL, "--load-steps", "2")
 
-# ------------------------------------------------------------------------------- crafted paths
-
-
 def _socket(path: Path) -> None:
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(path.name)  # of the current folder: longer names are not possible
@@ -173,8 +170,6 @@ def loop() -> adhesis.LoopResult:
     return adhesis.run_loop(ExactWave(PROBLEM), max_penetration=0.6, load_steps=4)
 
 
-# ------------------------------------------------------------------------------------ commands
-
 # {} is the crafted path and SOUND a sound results file; what follows -> is how the path ends.
 COMMANDS = {
     OF_READING: """
@@ -276,9 +271,6 @@ def refused_by(call: Callable[[], object]) -> None:
         call()
     assert "\n" not in str(error.value)
     assert kept(folder) == before
-
-
-# ------------------------------------------------------------- files beside the results of a run
 
 
 @pytest.mark.parametrize("kind", [kind for kind in MADE if kind != "file"])

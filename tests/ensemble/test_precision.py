@@ -59,9 +59,6 @@ def run(path, out, fake="", **options):
     )
 
 
-# ---------------------------------------------------------------------- the rule
-
-
 def test_the_rule_goes_by_the_interval_that_tables_print():
     values = np.random.default_rng(3).lognormal(0, 0.6, 40)
     (printed,) = estimates(values)
@@ -180,9 +177,6 @@ def test_intervals_of_real_losses_at_the_stop_cover_the_mean_and_are_as_narrow_a
     _, reach, fewer = of_the_study(loops, 1, 0.05, np.random.default_rng(17), 10, **rule)
     assert reach > 0.06
     assert fewer < count
-
-
-# ---------------------------------------------------------------------- runs
 
 
 @pytest.mark.parametrize("quantity", ["", "loss"])

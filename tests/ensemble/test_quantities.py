@@ -96,9 +96,6 @@ def test_blanks_within_a_unit_make_no_unit_of_it() -> None:
         LENGTH.unit_named("m m")
 
 
-# ---------------------------------------------------------------------- campaign files
-
-
 def test_lengths_of_a_campaign_may_have_units() -> None:
     assert parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"')) == parse_campaign(
         campaign_text(period="1e-3", h_rms="1e-6")
@@ -112,9 +109,6 @@ def test_a_number_that_is_asked_about_is_taken_with_its_unit(tmp_path):
     text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
     (tmp_path / "c.toml").write_text(text)
     assert load_campaign(tmp_path / "c.toml").sweep.work_of_adhesion == (40.0,)
-
-
-# ---------------------------------------------------------------------- stresses
 
 
 def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_units() -> None:
@@ -143,9 +137,6 @@ def test_a_share_is_shown_in_percent_without_an_exponent() -> None:
     assert [rounded_percent(share, sign="+") for share in (0.03, -0.0123, -1e-5)] == [
         *("+3.0 %", "-1.2 %", "0.0 %")
     ]
-
-
-# ---------------------------------------------------------------------- as commands print them
 
 
 @pytest.mark.parametrize(

@@ -85,9 +85,6 @@ def test_another_program_that_writes_leaves_no_checksum(content: bytes, tmp_path
     assert "checksum" in refusal(path)
 
 
-# ------------------------------------------------------- crafted files with a right checksum
-
-
 STRESS = "mean_stress"
 
 

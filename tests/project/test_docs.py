@@ -103,9 +103,6 @@ def commands(block: Block) -> list[str]:
 LINES = [(block, line) for block in BLOCKS if is_of_commands(block) for line in commands(block)]
 
 
-# ---------------------------------------------------------------------- code
-
-
 @pytest.mark.parametrize(
     "block",
     [b for b in BLOCKS if b.language == "python" and b.page not in LESSONS],
@@ -128,9 +125,6 @@ def test_python_runs(block, tmp_path, monkeypatch, capsys):
 )
 def test_campaigns_are_valid(block: Block) -> None:
     assert parse_campaign(block.text).tasks()
-
-
-# ---------------------------------------------------------------------- commands
 
 
 def example() -> str:
@@ -238,9 +232,6 @@ def test_exit_codes_of_the_page_are_those_of_the_commands() -> None:
     assert listed == {int(code) for name, code in vars(exit_codes).items() if name.isupper()}
 
 
-# ---------------------------------------------------------------------- examples
-
-
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_run(path, monkeypatch, capsys):
     """Each says something and draws something."""
@@ -267,9 +258,6 @@ def test_the_made_up_measurement_is_read_as_it_was_made(tmp_path):
     prepared = prepare_trace(trace)
     assert prepared.spectrum.noise == pytest.approx(5e-9, rel=0.1)
     assert 5e-6 <= prepared.cut_off < 10e-6
-
-
-# ---------------------------------------------------------------------- links and images
 
 
 @cache

@@ -55,8 +55,6 @@ def test_the_wheel_works_in_a_bare_environment() -> None:
     assert "package: good" in done.stdout
 
 
-# ---------------------------------------------------------------------- public names
-
 REFERENCE = (ROOT / "docs" / "reference.rst").read_text()
 PUBLIC = sorted({*re.findall(r"auto\w+:: adhesis\.(\w+)$", REFERENCE, re.MULTILINE)} - {"open"})
 BESIDE = ["open"]
@@ -94,7 +92,6 @@ def test_a_star_import_leaves_the_built_in_names_alone() -> None:
     assert names["Profile"] is adhesis.Profile
 
 
-# ---------------------------------------------------------------------- modules that are loaded
 # (The rules of imports are contracts of import-linter, in pyproject.toml.)
 
 COMMANDS = """

@@ -56,8 +56,6 @@ def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
     assert str(answer).startswith("ValueError")  # from the solver, so that was found
 
 
-# --------------------------------------------------------------------- the end of the parent
-
 PARENT = """
 import json, subprocess, sys, time
 from adhesis.ensemble.run.launch import python, python_environment

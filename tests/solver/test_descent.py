@@ -24,9 +24,6 @@ from tests.support.dense import DenseSolution, dense_tangent, solve_densely
 SOLID = HalfSpace(1e6, 0.5)
 
 
-# ------------------------------------------------------------------ model of the openings
-
-
 class Solved(NamedTuple):
     gaps: np.ndarray
     separation: float
@@ -104,9 +101,6 @@ def test_openings_beside_a_narrow_patch_or_gap(rough, narrow, motion):
     assert error < 0.2 * np.abs(exact - before).max()
 
 
-# ------------------------------------------------------------------ steps
-
-
 @pytest.mark.parametrize("equal_speeds", [False, True])
 @pytest.mark.parametrize("count", [1, 3, 7, 8, 9, 41])  # kernels take blocks of eight rows
 def test_an_implicit_step_is_downhill_and_within_its_length(count, equal_speeds):
@@ -130,9 +124,6 @@ def test_a_model_without_a_minimum_has_none_at_any_distance():
     assert size < 1e-2 * distance_to_minimum(matrix, force)
     assert distance_to_minimum(matrix, force) == pytest.approx(0.1)
     assert distance_to_minimum(-matrix, force) == np.inf
-
-
-# ------------------------------------------------------------------ events
 
 
 @pytest.fixture(scope="module")

@@ -41,9 +41,6 @@ def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) ->
     return Problem(WAVE, HalfSpace(young, 0.5), share * FULL, Control(stiffness * unit))
 
 
-# ---------------------------------------------------------------------- turning points
-
-
 @pytest.mark.parametrize("name", ["sharp", "grid"])
 def test_shallow_and_deep_loops_tend_to_limits(name):
     """At first touch alone, and next to full contact, where only the last gap closes further."""
@@ -66,9 +63,6 @@ def test_a_load_that_is_next_to_none_ends():
     loop = run_loop(make_method("sharp", problem), max_stress=1e-30, load_steps=6)
     deep = run_loop(make_method("sharp", problem), max_stress=1e-3, load_steps=6)
     assert loop.loss == pytest.approx(deep.loss, rel=1e-3)
-
-
-# ---------------------------------------------------------------------- adhesion
 
 
 @pytest.mark.parametrize("name", ["sharp", "grid", "auto"])
@@ -102,9 +96,6 @@ def test_no_adhesion_at_all_is_accepted_whatever_the_modulus():
             make_method("auto", wave_problem(0.0, young=young)), max_penetration=0.3, load_steps=2
         )
         assert abs(loop.loss_dimensionless) < 1e-9
-
-
-# ---------------------------------------------------------------------- one rule of unloading
 
 
 @pytest.mark.parametrize(
@@ -148,9 +139,6 @@ def test_turning_points_far_below_first_touch_are_marks_of_the_way_out():
     assert path.work == pytest.approx(path.loss_from_drops, rel=1e-4)
 
 
-# ---------------------------------------------------------------------- what went wrong, in words
-
-
 def test_a_state_that_is_not_found_is_reported_in_the_units_of_the_turning_point(monkeypatch):
     def lost(self, gaps, prescribed, *args, **options):
         raise NoState("edges that descend in energy do not come to rest", prescribed)
@@ -183,9 +171,6 @@ def test_full_contact_is_reported_with_where_it_happens(share, max_stress, where
     method = SharpMethod(wave_problem(share, 0.0))
     with pytest.raises(PathError, match=f"drawn into full contact {where}"):
         run_loop(method, max_stress=max_stress, load_steps=2)
-
-
-# ---------------------------------------------------------------------- threads and copies
 
 
 def methods(problem: Problem) -> list[Method]:

@@ -42,9 +42,6 @@ def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6, **opti
     return run_loop(method, max_penetration=0.8, load_steps=12)
 
 
-# ------------------------------------------------------------------ rough profiles
-
-
 @pytest.fixture(scope="module")
 def loop() -> LoopResult:
     return rough_loop(rough_profile())
@@ -119,9 +116,6 @@ def test_no_state_overlaps_not_even_before_a_touch_is_followed():
     assert least > -1.1e-6 * profile.h_max
 
 
-# ------------------------------------------------------------------ hard cases
-
-
 def test_first_touch_is_a_jump_at_the_highest_crest():
     profile = single_wave(AMPLITUDE, PERIOD).shifted(0.43 * PERIOD / 512)
     gamma = wave(0.2).work_of_adhesion
@@ -186,9 +180,6 @@ def test_any_hurst_exponent_gives_an_audited_loop(hurst):
     result = rough_loop(profile, nodes=256)
     assert result.loss > 0
     assert abs(result.audit_residual) < 5e-3
-
-
-# ------------------------------------------------------------------ input
 
 
 def test_number_of_nodes():

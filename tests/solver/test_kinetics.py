@@ -32,9 +32,6 @@ def race() -> Problem:
     return Problem(profile.scaled(1e-6 / profile.h_rms), SOLID, 0.07)
 
 
-# ------------------------------------------------------------------ one step
-
-
 @pytest.mark.parametrize("turn", range(4))
 def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     """Four equal edges on a ring: the way out is the same but for the place of its leader."""
@@ -46,9 +43,6 @@ def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     reference = leaving_step(ring, np.full(4, 0.1), np.arange(4.0))
     np.testing.assert_allclose(np.roll(step, -lead), reference, atol=1e-9)
     assert step[lead] == pytest.approx(0.1)
-
-
-# ------------------------------------------------------------------ a race
 
 
 @pytest.mark.parametrize("share", [1.0, 0.2])
@@ -195,9 +189,6 @@ def test_grid_sees_no_race_where_the_rules_agree():
     result = run_loop(GridMethod(Problem(profile, SOLID, 0.02)), max_penetration=0.9, load_steps=9)
     assert len(result.jumps) > 5
     assert (result.races, result.energy_at_stake) == (0, 0)
-
-
-# ------------------------------------------------------------------ symmetry
 
 
 def equal_waves(n0: int, seed: int, g: float, shift: float = 0.0) -> Problem:

@@ -164,9 +164,6 @@ def test_work_and_energy_agree_between_openings():
     assert abs(loop.audit_residual) < 1e-5
 
 
-# ---------------------------------------------------------------------- the crack
-
-
 def test_a_crack_grows_by_the_field_with_the_crack():
     """That is the closed form where it is short beside all else, and less where gaps share it."""
     method = make_method("sharp", troughs_problem(), accuracy=1e-5)
@@ -189,9 +186,6 @@ def test_an_energy_that_rises_by_a_barrier_is_no_error():
     assert estimated_error(0.0, [beyond], 0.0, problem) == 0.75
 
 
-# ---------------------------------------------------------------------- doubts
-
-
 def test_openings_at_a_range_and_tensions_that_are_not_small_make_a_loss_doubtful():
     problem = troughs_problem()
     opened = [jump for jump in rough_loop(4e6)[0].jumps if jump.kind == "opening"]
@@ -210,9 +204,6 @@ def test_openings_at_a_range_and_tensions_that_are_not_small_make_a_loss_doubtfu
         0.02 / (1e9 * 0.5),
     )
     assert wrong.tolist() == [False, True, False, True, False, True]
-
-
-# ---------------------------------------------------------------------- the problem
 
 
 def test_a_range_is_a_strength():

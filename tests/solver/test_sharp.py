@@ -27,9 +27,6 @@ def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, s
     return run_loop(method, max_penetration=max_penetration, load_steps=load_steps)
 
 
-# ------------------------------------------------------------------ limit of the grid
-
-
 def test_grid_converges_to_sharp():
     """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
     problem = Problem(rough(n0=2, ratio=6), HALF_SPACE, 0.01)
@@ -58,9 +55,6 @@ def test_touching_is_looked_for_before_a_branch_ends():
     """Surfaces touch at s = 0.10517 h_max, just before a branch that is followed finely ends."""
     losses = [loop(rough(5, n0=10, ratio=100), 0.04, accuracy=a).loss for a in (1e-3, 1e-5)]
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
-
-
-# ------------------------------------------------------------------ hard cases
 
 
 def test_no_loss_without_adhesion():

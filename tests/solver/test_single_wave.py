@@ -211,9 +211,6 @@ def test_no_state_beyond_full_contact_or_pull_off():
         assert float(w.separation(w.half_width(s))) == pytest.approx(s, rel=1e-12)
 
 
-# ------------------------------------------------------------------ other controls
-
-
 STIFFNESSES = (0.0, 0.1, 1.0, 10.0)  # in p*/A
 
 

@@ -25,9 +25,6 @@ SOFT = HalfSpace(1e6, 0.5)
 SHIFT = np.exp(1e-7j)
 
 
-# ---------------------------------------------------------------------- mirror, shift and scale
-
-
 def rough(n0: int, ratio: int, seed: int) -> Profile:
     return self_affine_profile(0.8, period=2e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
 
@@ -78,9 +75,6 @@ def test_mirror_shift_and_scale_change_nothing(name):
         assert getattr(there, value) == pytest.approx(expected, rel=near, abs=0)
     for value in ("valid_range", "edge_range", "touch_range"):
         assert getattr(there, value) == pytest.approx(lengths * getattr(here, value), rel=1e-3)
-
-
-# ---------------------------------------------------------------------- symmetric profiles
 
 
 def bumpy(wave: int, amplitude: float, shift: complex = 1.0) -> Profile:
@@ -168,8 +162,6 @@ def test_axes_and_equal_parts_of_a_profile():
         2,
     )
 
-
-# ---------------------------------------------------------------------- arc and flat measure
 
 PERIOD = 1e-3
 STEEP = Profile(PERIOD, 1e-5 * np.array([0, 1, 0.5j, -0.4, 0.3j, 0.2]))  # rms slope 0.12
