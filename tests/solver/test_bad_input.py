@@ -311,6 +311,10 @@ Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, strength=1000000.0) ->
     ValueError: beside a strength of 1e+06 Pa: give
 make_method('grid', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0)) ->
     ValueError: method is 'grid' beside a work_of_adhesion_open
+make_method('grid', Problem(WAVE, SOLID, 0.004, adhesion_range=1e-9)) ->
+    ValueError: method is 'grid' beside a range or strength
+make_method('auto', Problem(WAVE, SOLID, 0.004, adhesion_range=1e-9), nodes_per_wave=64) ->
+    ValueError: nodes_per_wave is 64 beside a range or strength
 make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), nodes_per_wave=32) ->
     ValueError: nodes_per_wave is 32 beside a work_of_adhesion_open
 stripes(3, 1.0) -> ValueError: amplitude is 1.0: it must be

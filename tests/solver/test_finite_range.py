@@ -37,6 +37,7 @@ def wave_of(alpha: float) -> SingleWave:
     return SingleWave(A, PERIOD, SOLID.modulus, gamma)
 
 
+@cache
 def loop_at(
     alpha: float, share: float, control: Control | None = None, turn: float = 0.7
 ) -> LoopResult:
@@ -64,8 +65,8 @@ def rough_loop(range_: float | None, change: str = "none") -> LoopResult:
 def touching_at(wave: SingleWave, range_: float, stiffness: float = np.inf) -> float:
     """Loss if surfaces jump together at a gap of ``range_``, edges being those of zero range."""
 
-    def prescribed(a: float) -> float:
-        return float(wave.separation(a)) - float(wave.mean_stress(a)) / stiffness
+    def prescribed(a: float | Array) -> Array:
+        return wave.separation(a) - wave.mean_stress(a) / stiffness
 
     most = 0.49 * wave.period if np.isinf(stiffness) else wave.stable_range(stiffness)[1]
     fold = minimize_scalar(
@@ -74,7 +75,7 @@ def touching_at(wave: SingleWave, range_: float, stiffness: float = np.inf) -> f
     )  # fmt: skip
     touched = brentq(lambda a: prescribed(a) - wave.amplitude - range_, fold.x, most)
     widths = np.linspace(fold.x, touched, 4001)
-    return float(np.trapezoid(wave.mean_stress(widths), [prescribed(a) for a in widths]))
+    return float(np.trapezoid(wave.mean_stress(widths), prescribed(widths)))
 
 
 def minima(theta: Array, opening: Array) -> list[float]:
@@ -95,12 +96,9 @@ def minima(theta: Array, opening: Array) -> list[float]:
     [
         (0.1, 0.01, 3e-4),
         (0.1, 0.02, 5e-3),
-        (0.3, 0.01, 1e-5),
         (0.3, 0.05, 6e-4),
         (0.3, 0.1, 8e-3),
-        (0.5, 0.01, 1e-5),
         (0.5, 0.05, 1e-4),
-        (0.5, 0.1, 7e-4),
         (0.5, 0.2, 1e-2),
     ],
 )
@@ -221,11 +219,3 @@ def test_a_minor_loop_inside_the_range_closes():
     path = run_path(make_method("sharp", problem), [0.7, 0.1, 0.5], load_steps=10)
     assert [loop.closes for loop in path.minor_loops] == [True]
     assert path.work == pytest.approx(loop_at(0.3, 0.05).loss, rel=1e-4)
-
-
-def test_the_method_grid_refuses_a_range():
-    problem = loop_at(0.3, 0.05).problem
-    with pytest.raises(ValueError, match="method is 'grid' beside a range or strength"):
-        make_method("grid", problem)
-    with pytest.raises(ValueError, match="nodes_per_wave is 64 beside a range or strength"):
-        make_method("auto", problem, nodes_per_wave=64)

@@ -36,18 +36,8 @@ class ExactWaveReport(MethodReport):
 class ExactWave(Method):
     """Johnson's single wave as a ``method.Method``.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its profile must be one wave over the whole period (harmonic 1 only).
-    states_per_step : int
-        Number of states that ``follow`` returns along the branch, evenly spaced in the contact
-        half-width, of which p̄ and s are smooth functions even at the fold.
-
-    Raises
-    ------
-    ValueError
-        If the profile is not a single wave.
+    ``follow`` returns ``states_per_step`` states along the branch, evenly spaced in the contact
+    half-width, of which p̄ and s are smooth functions even at the fold.
     """
 
     name: ClassVar[str] = "exact wave"
@@ -131,13 +121,7 @@ class ExactWave(Method):
         return self.wave.loop if control.is_fixed else self.wave.loop_under(control.stiffness)
 
     def _contact_width(self, prescribed: float) -> float:
-        """Compute the half-width at x = ``prescribed``; beyond the branch, that at its end.
-
-        Raises
-        ------
-        PathError
-            If the wave has run to full contact.
-        """
+        """Compute the half-width at x = ``prescribed``; beyond the branch, that at its end."""
         control, loop = self.problem.control, self._loop
         end = control.prescribed(loop.fold_separation, loop.fold_mean_stress)
         if control.is_fixed:
