@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -61,7 +62,9 @@ run c.toml --out r.h5 --redo failed --hurst 0.75 ->
     --hurst is 0.75: this campaign has no such task
 run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5
 run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
-status text -> is not a results file
+status {{text,empty.h5,other.h5}} -> is not a results file
+status none.h5 -> does not exist
+status directory ->
 status r.h5 --interval {{x,-1,0,nan,inf,1e9}} -> --interval is '{{}}'
 status r.h5 --watch --json -> --watch and --json
 merge r.h5 -> required: --out
@@ -225,7 +228,10 @@ def fill(folder: Path) -> None:
     for name in ("directory", "sub", "ow", "r", "way/trace.html"):
         Path(name).mkdir(parents=True)
     Path("text").write_text("notes")
-    Path("r/curves.nc").write_bytes(b"")
+    for name in ("r/curves.nc", "empty.h5"):
+        Path(name).touch()
+    with h5py.File("other.h5", "w") as file:
+        file["x"] = 1
     heights = 1e-9 * np.cos(np.arange(16) * np.pi / 8)
     Path("wave.csv").write_text("\n".join(map(repr, heights.tolist())))
     os.link("wave.csv", "hard.csv")

@@ -255,17 +255,6 @@ def refused(path) -> str:
     return str(caught.value)
 
 
-def test_foreign_files_are_refused(tmp_path, path):
-    assert "does not exist" in refused(tmp_path / "none.h5")
-    (tmp_path / "empty.h5").touch()
-    (tmp_path / "text.h5").write_text("no results\n")
-    with h5py.File(tmp_path / "other.h5", "w") as file:
-        file["x"] = 1
-    for name in ("empty", "text", "other"):
-        assert "is not a results file" in refused(tmp_path / f"{name}.h5")
-    refused(tmp_path)
-
-
 @pytest.mark.parametrize(
     ("version", "shown"),
     [(np.int32(0), "0"), (np.int32(2), "2"), (np.array([1, 0]), "1.0"), (np.array([1, 4]), "1.4")],

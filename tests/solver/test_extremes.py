@@ -44,10 +44,10 @@ def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) ->
 @pytest.mark.parametrize("name", ["sharp", "grid"])
 def test_shallow_and_deep_loops_tend_to_limits(name):
     """At first touch alone, and next to full contact, where only the last gap closes further."""
-    problem = Problem(ROUGH, HALF_SPACE, 0.02)
+    problem, accuracy = Problem(ROUGH, HALF_SPACE, 0.02), 1e-2 if name == "grid" else 1e-3
 
     def loss(max_penetration: float) -> tuple[float, float]:
-        method = make_method(name, problem)
+        method = make_method(name, problem, accuracy=accuracy)
         loop = run_loop(method, max_penetration=max_penetration, load_steps=6)
         assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
         return loop.loss, loop.loss_error
@@ -101,13 +101,11 @@ def test_no_adhesion_at_all_is_accepted_whatever_the_modulus():
 @pytest.mark.parametrize(
     ("share", "stiffness", "turn", "load_steps"),
     [
-        (0.9, np.inf, 1e-4, 1),  # shallow: thousands of strokes to pull-off
-        (0.9, np.inf, 1e-6, 1),
+        (0.9, np.inf, 1e-6, 1),  # shallow: thousands of strokes to pull-off
         (1e-5, np.inf, 1e-6, 3),
         (50.0, np.inf, 0.999999, 1),
         (0.9, np.inf, 0.8, 6),  # 0.8 * 6 / 6 is not 0.8
         (0.2, 1.0, 1e-3, 1),
-        (0.2, 0.01, 0.1, 2),
         (0.2, 0.0, 1e-6, 1),
         (0.2, 0.0, 0.1, 4),
     ],

@@ -20,7 +20,7 @@ def test_a_hostile_loop_keeps_every_promise(number):
     assert found["kind"] == ("tight" if number % 4 == 0 else "loop")
 
 
-@pytest.mark.parametrize(("number", "flagged"), [(21, True), (30, False)])
+@pytest.mark.parametrize(("number", "flagged"), [(21, True), (9, False)])
 def test_tension_above_the_strength_is_stated(number, flagged):
     """No state has more inside a patch unless the loss is doubtful for it."""
     found = judge(draw(41270, number, "range"), number)

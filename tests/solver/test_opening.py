@@ -113,16 +113,11 @@ def test_no_state_that_is_kept_is_above_the_strength_inside():
     kept = [state for state in states if state.patches and state.separation not in opened]
     found = loop.new_method().largest_tension(kept)
     assert found.tension < 4e6 * (1 + 1e-3)
-
-
-def test_energy_rises_in_no_jump_but_by_a_barrier():
-    loop, _ = rough_loop(4e6)
+    # energy rises in no jump but by a barrier
     assert all(jump.energy_drop > -jump.barrier - 1e-9 * loop.loss for jump in loop.jumps)
     assert all((jump.barrier > 0) == (jump.kind == "opening") for jump in loop.jumps)
-
-
-def test_openings_lose_less_than_valleys_that_are_held_closed():
-    assert rough_loop(4e6)[0].loss < 0.8 * rough_loop(math.inf)[0].loss
+    # and valleys that are held closed lose more
+    assert loop.loss < 0.8 * rough_loop(math.inf)[0].loss
 
 
 @pytest.mark.parametrize(
