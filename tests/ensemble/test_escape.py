@@ -31,11 +31,6 @@ HOSTILE = [
 ]
 
 
-@pytest.fixture
-def campaign():
-    return parse_campaign(campaign_text())
-
-
 @pytest.mark.parametrize("text", HOSTILE)
 @pytest.mark.parametrize("shown", [markdown, code_span])
 def test_a_text_from_a_file_is_shown_letter_by_letter(text, shown):
@@ -58,9 +53,9 @@ def test_control_characters_are_spelled_out_and_letters_stay():
     assert str(InputError("column \x1b[31m")) == r"column \x1b[31m"
 
 
-def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeypatch):
+def test_status_prints_no_control_characters(tmp_path, capsys, monkeypatch):
     path = tmp_path / "r.h5"
-    create(path, campaign)
+    create(path, parse_campaign(campaign_text()))
     with Writer(path) as writer:
         writer.write_failure(0, "diverged \x1b]0;title\x07\nsecond line \x9b31m", 1.0)
     with RunLock(path) as lock:

@@ -64,7 +64,7 @@ run c.toml --out none.h5 --redo all -> --redo computes again what is in a result
 run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
 status {{text,empty.h5,other.h5}} -> is not a results file
 status none.h5 -> does not exist
-status directory ->
+status directory -> is a directory, not a file
 status r.h5 --interval {{x,-1,0,nan,inf,1e9}} -> --interval is '{{}}'
 status r.h5 --watch --json -> --watch and --json
 merge r.h5 -> required: --out
