@@ -15,12 +15,7 @@ from adhesis.ensemble.bench.bench_figure import draw
 from adhesis.ensemble.bench.bench_page import page
 from adhesis.ensemble.bench.equal_error import Line, Reference, benchmark, exponents, ratios
 from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
-from adhesis.ensemble.bench.scenes import (
-    GROWTH,
-    ONE_WAVE,
-    SMALL_ROUGH,
-    TWO_WAVES,
-)
+from adhesis.ensemble.bench.scenes import GROWTH, ONE_WAVE, SMALL_ROUGH, TWO_WAVES
 from adhesis.ensemble.command.main import main
 
 REFERENCE = Reference(1.0, "made up")

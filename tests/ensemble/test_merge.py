@@ -17,12 +17,7 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Options, run_campaign
-from tests.support.campaign_support import (
-    campaign_text,
-    differences,
-    run_python,
-    write_campaign,
-)
+from tests.support.campaign_support import campaign_text, differences, run_python, write_campaign
 from tests.support.fake_run import fake_engine, fake_result
 from tests.support.synthetic_results import sign
 

@@ -17,13 +17,7 @@ from matplotlib.figure import Figure
 import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import (
-    check_outputs,
-    staged_folder,
-    whole_file,
-    write_json,
-    write_new,
-)
+from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json, write_new
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.single_wave import SingleWave

@@ -28,12 +28,7 @@ from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings, paper
-from adhesis.ensemble.report.figures import (
-    catalogue,
-    loops,
-    loss_figures,
-    selection,
-)
+from adhesis.ensemble.report.figures import catalogue, loops, loss_figures, selection
 from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page

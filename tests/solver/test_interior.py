@@ -116,7 +116,7 @@ def test_valid_range_of_two_scenes_measured_apart(young, valid_range):
     assert loop_of(young, 25).valid_range == pytest.approx(valid_range, rel=0.1)
 
 
-@pytest.mark.parametrize(("young", "seed"), [(1e6, 1), (1e7, 1), (1e8, 0), (1e9, 2)])
+@pytest.mark.parametrize(("young", "seed"), [(1e6, 1), (1e9, 2)])
 def test_no_state_that_is_left_out_has_more_tension(young, seed):
     method, states = method_of(rough(seed=seed), young), []
     loop = run_loop(

@@ -22,11 +22,7 @@ from adhesis import (
 )
 from adhesis.solver.crack import Crack, griffith_length, largest_excess
 from adhesis.solver.loading.ledger import estimated_error
-from adhesis.solver.loading.zero_range import (
-    beyond_limit,
-    opening_warnings,
-    range_warnings,
-)
+from adhesis.solver.loading.zero_range import beyond_limit, opening_warnings, range_warnings
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress

@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis import (
-    Problem,
-    Profile,
-    make_method,
-    run_loop,
-    self_affine_profile,
-)
+from adhesis import Problem, Profile, make_method, run_loop, self_affine_profile
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE
 

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 
 from adhesis import Problem, self_affine_profile, single_wave
-from adhesis.solver._kernels import (
-    FieldModel,
-    LoadingDevice,
-    solve_field,
-)
+from adhesis.solver._kernels import FieldModel, LoadingDevice, solve_field
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField, respond_at_fixed_edges
 from adhesis.solver.sharp.field.opening_series import fine_opening
