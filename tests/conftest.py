@@ -3,8 +3,6 @@
 Values and helpers that several tests use are in :mod:`tests.support`.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

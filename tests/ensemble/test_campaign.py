@@ -1,7 +1,5 @@
 """Campaign files: what is read, what is refused and how, and how two compare."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -1,7 +1,5 @@
 """Check what all commands share: bad options, help, interrupts, full devices, several ranks."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import math

@@ -1,7 +1,5 @@
 """Damaged results files: found, named, never taken for sound; whole in bytes that a run wrote."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Hand-out: order, balance, failures and stops, with workers that are simulated."""
 
-from __future__ import annotations
-
 import heapq
 import os
 import random

@@ -1,7 +1,5 @@
 """`adhesis doctor`: what it says is what was tried."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

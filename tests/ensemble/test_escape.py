@@ -1,7 +1,5 @@
 """Texts from files are shown as texts; links in place of our own files are not followed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from markdown_it import MarkdownIt

@@ -1,7 +1,5 @@
 """The film of a loop: which states are its frames, what each shows, and the page in a browser."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

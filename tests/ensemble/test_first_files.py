@@ -1,7 +1,5 @@
 """The commands that write files to start from: a campaign, a sample trace, a shell's completion."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """The heights of one period: read as traces are, and warned of where the ends do not meet."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import json

@@ -1,7 +1,5 @@
 """Under limits of the system a command ends in one sentence, and leaves nothing half-written."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

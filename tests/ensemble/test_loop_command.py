@@ -1,7 +1,5 @@
 """``adhesis loop``: what it writes, and what it refuses before it computes or writes anything."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

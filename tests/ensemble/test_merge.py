@@ -1,7 +1,5 @@
 """Parts of a campaign that were computed apart, joined into one results file."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Campaigns under mpirun: the same bits for any number of ranks, and what happens when some die."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

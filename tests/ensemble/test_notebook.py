@@ -1,7 +1,5 @@
 """Results as a notebook's user handles them: shown, as tables, saved, copied, with a bar."""
 
-from __future__ import annotations
-
 import asyncio
 import copy
 import doctest

@@ -1,7 +1,5 @@
 """The work of adhesion of receding edges in commands, campaigns, results files and reports."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Outputs of commands: refused before any work where they would destroy something, else whole."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

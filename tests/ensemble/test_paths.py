@@ -4,8 +4,6 @@ None holds it up, none is followed where it must not be, none is replaced, and t
 sentence.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

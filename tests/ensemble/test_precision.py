@@ -1,7 +1,5 @@
 """Realisations in batches until the mean is known well enough: the rule, and its runs."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

@@ -1,7 +1,5 @@
 """A preload on the command line, of a trace and in campaigns."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a campaign costs, estimated before it starts."""
 
-from __future__ import annotations
-
 import shutil
 import time
 

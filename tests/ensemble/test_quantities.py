@@ -1,7 +1,5 @@
 """Quantities with units: read from options and campaign files by one reader, and printed."""
 
-from __future__ import annotations
-
 import argparse
 from math import inf, nan
 

@@ -1,7 +1,5 @@
 """Command lines that are refused: code 2, one sentence with the option's name, and nothing done."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

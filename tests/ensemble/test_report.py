@@ -1,7 +1,5 @@
 """The report: what the tables say, what the figures draw, what the page shows."""
 
-from __future__ import annotations
-
 import base64
 import csv
 import io

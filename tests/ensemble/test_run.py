@@ -1,7 +1,5 @@
 """A campaign in one process, by the command: resume, growth, stops, failures, bad input."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Saved loops and paths: what was saved is loaded, and nothing else, from whatever a file holds."""
 
-from __future__ import annotations
-
 import os
 import random
 from collections.abc import Callable

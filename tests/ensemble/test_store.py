@@ -1,7 +1,5 @@
 """The results file: its shape, what readers see at any moment, and files that are refused."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import itertools

@@ -1,7 +1,5 @@
 """A task is a pure function: its row repeats to the bit and follows from the loop."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ network only, and a whole node that dies. Needs root, namespaces and Open MPI; n
 machine's own network is touched, and the namespaces are removed afterwards.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

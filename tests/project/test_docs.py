@@ -1,7 +1,5 @@
 """Documentation that runs: code, commands, links and images of README and docs/; examples."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shlex

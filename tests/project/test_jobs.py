@@ -3,8 +3,6 @@
 tests/ensemble/test_slurm.py runs the same scripts in a real Slurm.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The package: what it says of itself, its wheel, its public names, what a process loads."""
 
-from __future__ import annotations
-
 import ast
 import builtins
 import inspect

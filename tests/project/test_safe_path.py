@@ -1,7 +1,5 @@
 """No process that adhesis starts imports anything from the user's working directory."""
 
-from __future__ import annotations
-
 import json
 import os
 import pickle

@@ -1,7 +1,5 @@
 """Set-up, launch scripts and packaging: what can be checked without installing anything."""
 
-from __future__ import annotations
-
 import ast
 import fcntl
 import importlib.metadata

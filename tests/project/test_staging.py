@@ -5,8 +5,6 @@ other, and keeps others out by a lock, as adhesis does. Some jobs have the real 
 take no time.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

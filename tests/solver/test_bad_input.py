@@ -1,7 +1,5 @@
 """Bad input of every public function and class: one sentence with name, value and rule."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import re

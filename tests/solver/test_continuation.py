@@ -3,8 +3,6 @@
 The branch is one gap whose half-width is a = a0 + sqrt(d - d_fold); no elastic field is solved.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, ClassVar, cast

@@ -1,7 +1,5 @@
 """Adhesion, turning points and controls at either end of what can be followed, and sharing."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import sys

@@ -1,7 +1,5 @@
 """Density of the gap, against closed forms and brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

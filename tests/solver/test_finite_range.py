@@ -1,7 +1,5 @@
 """Adhesion of a finite range: loops of ``sharp`` against closed forms and other solutions."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

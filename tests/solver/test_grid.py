@@ -1,7 +1,5 @@
 """Method ``grid`` against closed forms, invariances, the energy audit and hard cases."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Parts of the method ``grid``: conjugate gradients, edge compliance, relaxation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Scenes far from the ordinary, as `make fuzz` draws them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

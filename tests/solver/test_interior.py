@@ -1,7 +1,5 @@
 """The range of adhesion below which the zero-range limit holds: largest tension inside patches."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """What the handler of a signal raises arrives as it is, wherever the signal comes."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

@@ -1,7 +1,5 @@
 """Rule of descent: linear kinetics of the edges, in both methods, and the way off a saddle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

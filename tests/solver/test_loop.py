@@ -1,7 +1,5 @@
 """The loading path and the energy audit, with a method that is exact (Johnson's single wave)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Patches that open from inside at a finite strength of the interface."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

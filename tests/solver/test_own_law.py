@@ -1,7 +1,5 @@
 """A law of edges that is written here alone: what the contract in ``edge_law.hpp`` promises."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

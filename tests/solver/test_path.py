@@ -1,7 +1,5 @@
 """Paths of several legs: shared loading branches, minor loops, memory, and their audits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Work of adhesion that varies along the profile: closed forms, invariances, both methods."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

@@ -1,7 +1,5 @@
 """Full contact, Koiter's punch and the parabola, each checked independently."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

@@ -1,7 +1,5 @@
 """Method sharp, whole loops: exact losses, the grid's limit, invariances and hard cases."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

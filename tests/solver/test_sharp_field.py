@@ -1,7 +1,5 @@
 """Method sharp, given edges: the field against closed forms, another solution, and differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Method sharp, many gaps: the tree of gaps against the dense solution, and what it costs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

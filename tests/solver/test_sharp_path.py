@@ -1,7 +1,5 @@
 """Method sharp on scenes that mislead a path: overlaps, late touches, weak and steep ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

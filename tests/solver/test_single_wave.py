@@ -1,7 +1,5 @@
 """Johnson's single wave against quadrature, identities and limits that it was not written from."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

@@ -1,7 +1,5 @@
 """Invariances of every kind of loop, mirror-symmetric profiles, and both measures of adhesion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Where surfaces touch: which of several places gets a patch, and how wide its seed is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Two works of adhesion: an edge advances at γ, recedes at γ_open, and is pinned between both."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The validation itself: an exact method passes, a slightly wrong one fails; then the real ones."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What the tests of campaigns share: campaigns, fake tasks, commands under mpirun."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

@@ -19,8 +19,6 @@ Sources: Dugdale, J. Mech. Phys. Solids 8 (1960) 100; Maugis, J. Colloid Interfa
 243, for a sphere. The integrals above follow from those of a half-line.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

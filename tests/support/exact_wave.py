@@ -5,8 +5,6 @@ be measured alone, and other methods compared state by state. The adhesive area 
 the profile, as ``problem.Problem`` defines it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar

@@ -11,8 +11,6 @@ there is the file of ``free=FILE``,
 reach, ``full=BYTES`` no file may be written beyond so many bytes.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import signal

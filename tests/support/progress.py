@@ -1,7 +1,5 @@
 """Lines that name the tests under way while none ends, so that a long wait is never silent."""
 
-from __future__ import annotations
-
 import threading
 import time
 from typing import TextIO

@@ -5,8 +5,6 @@ on what another process does. Modules that start ranks or jobs stay together, to
 crowd each other out. What takes longest begins first.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py")

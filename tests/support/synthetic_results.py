@@ -1,7 +1,5 @@
 """Results files with numbers whose averages are known, for the tests of aggregator and report."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py
