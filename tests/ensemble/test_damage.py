@@ -120,10 +120,7 @@ def test_a_row_that_lost_its_status_is_pending_and_not_damaged(damage, path):
     assert damage.judge(changed(path, _set("status", 2, PENDING))) == ("pending", "rows (2,)")
 
 
-@pytest.mark.parametrize(
-    ("name", "pending"),
-    [("hurst", False), ("work_of_adhesion", True), ("realisation", True), ("seed", False)],
-)
+@pytest.mark.parametrize(("name", "pending"), [("hurst", False), ("realisation", True)])
 def test_a_task_of_another_campaign_is_refused(damage, path, name, pending):
     """Whatever the status of its row, and also where all checksums are right."""
 
