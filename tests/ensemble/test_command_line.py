@@ -79,11 +79,6 @@ def test_an_option_whose_value_is_two_hyphens_is_refused(option, capsys):
     assert line.startswith(f"adhesis loop: {option} is '--'")
 
 
-def test_the_thickness_of_a_layer_has_the_name_of_its_option(capsys):
-    line = refused(capsys, ["loop", "--hurst", "0.8", "--layer", "0"])
-    assert line.startswith("adhesis loop: --layer is 0.0: it must be a positive number")
-
-
 @pytest.mark.parametrize(
     "words",
     [

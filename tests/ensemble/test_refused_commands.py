@@ -84,6 +84,7 @@ LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
 LOOP --method magic -> --method is 'magic': it must be one of grid
 LOOP --unit um -> --unit belongs to --trace
 LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
+LOOP --layer 0 -> --layer is 0.0: it must be a positive number
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
 LOOP --stripes 2 -> the amplitude of stripes of the work of adhesion is missing

@@ -128,17 +128,6 @@ def test_no_state_that_is_left_out_has_more_tension(young, seed):
     assert loop.largest_interior_tension == pytest.approx(everywhere.tension, rel=0.02)
 
 
-def test_where_and_when_are_those_of_a_state_of_the_loop():
-    loop = loop_of(1e8)
-    found = loop.interior
-    assert found is not None
-    here = (loop.branch == found.branch) & (loop.penetration == found.penetration)
-    assert here.any()
-    assert found.branch == "unloading"
-    assert 0 <= found.position < PERIOD
-    assert loop.valid_range == loop.problem.work_of_adhesion / found.tension
-
-
 def test_grid_and_sharp_agree():
     sharp = loop_of(1e8, 4, 1)
     method = method_of(rough(4, 1), 1e8, name="grid")
@@ -183,16 +172,21 @@ def test_without_adhesion_nothing_bounds_the_range():
     assert loop.warnings == ()
 
 
-def test_a_path_and_loops_with_one_loading_branch_know_it_too():
+def test_where_and_when_are_those_of_a_state_also_of_a_path_and_of_one_loading_branch():
     method, loop = method_of(rough(), 1e8), loop_of(1e8)
     path = run_path(method, [0.9], load_steps=20)
     assert path.interior == loop.interior
     assert path.narrowest_length == loop.narrowest_length
     assert path.warnings == ()
-    assert loop.interior is not None
+    found = loop.interior
+    assert found is not None
+    assert ((loop.branch == found.branch) & (loop.penetration == found.penetration)).any()
+    assert found.branch == "unloading"
+    assert 0 <= found.position < PERIOD
+    assert loop.valid_range == loop.problem.work_of_adhesion / found.tension
     (shared,) = run_loops(method, max_penetration=[0.9], load_steps=20)
     assert shared == loop
-    assert replace(path, interior=replace(loop.interior, tension=1e9)).warnings
+    assert replace(path, interior=replace(found, tension=1e9)).warnings
 
 
 def test_the_cohesive_zone_of_the_edge_range_is_as_long_as_the_narrowest_length():

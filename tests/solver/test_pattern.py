@@ -131,13 +131,18 @@ def test_a_step_over_a_stripe_with_equal_slopes_at_both_ends_is_not_too_long():
     assert abs(loop_of(problem, 1e-5, max_penetration=0.7156).audit_residual) < 1e-5
 
 
-def test_two_works_and_a_pattern_share_their_variation():
+def test_two_works_and_a_pattern_share_their_variation_and_are_kept_in_a_file(tmp_path):
     """Friction counts each place by its own γ, also on a leg that ends in contact."""
     problem = Problem(ROUGH, SOLID, 2e-3, work_of_adhesion_open=3e-3, pattern=UNEVEN)
     method = make_method("sharp", problem, accuracy=1e-4)
     path = run_path(method, [0.5, 0.2, 0.4], load_steps=20, out=False)
     assert path.friction > 0.05 * path.work  # without it the audit is off by as much
     assert abs(path.audit_residual) < 1e-4
+    path.save(tmp_path / "path.nc")
+    again = adhesis.load(tmp_path / "path.nc")
+    assert again == path
+    assert (again.problem, again.numbers()) == (problem, path.numbers())
+    assert f"({problem.least_work_of_adhesion:.4g} to " in str(path)
 
 
 def test_both_methods_agree_on_a_pattern():
@@ -180,14 +185,3 @@ def test_a_range_of_a_loop_is_that_of_the_weakest_place():
     assert loop.valid_range == pytest.approx(weakest / loop.largest_interior_tension, rel=1e-6)
     area = 4 * weakest * loop.narrowest_length / (np.pi * SOLID.modulus)
     assert loop.edge_range == pytest.approx(np.sqrt(area), rel=1e-6)
-
-
-def test_a_saved_loop_keeps_its_pattern(tmp_path):
-    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, pattern=UNEVEN)
-    loop = loop_of(problem, 1e-2, load_steps=5)
-    loop.save(tmp_path / "loop.nc")
-    again = adhesis.load(tmp_path / "loop.nc")
-    assert again == loop
-    assert again.problem.pattern == UNEVEN
-    assert again.numbers() == loop.numbers()
-    assert f"({problem.least_work_of_adhesion:.4g} to " in str(loop)
