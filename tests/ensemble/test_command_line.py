@@ -43,9 +43,6 @@ def refused(capsys, words) -> str:
     return line
 
 
-# ---------------------------------------------------------------------- bad options
-
-
 # Options of `adhesis loop` that are one number, with the rule that Python and campaigns have too.
 BOUNDED = {
     **{"--hurst": checks.HURST, "--period": checks.LENGTH, "--n0": checks.HARMONIC},
@@ -148,9 +145,6 @@ def test_an_unknown_command_is_refused_with_the_list(words, capsys):
     assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of new, run, ")
 
 
-# ---------------------------------------------------------------------- help
-
-
 @pytest.mark.parametrize("name", [*COMMANDS, ""])
 def test_help_ends_with_two_examples_that_are_understood(name, capsys):
     assert main([*filter(None, [name]), "--help"]) == 0
@@ -166,9 +160,6 @@ def test_the_package_can_be_run():
     done = process("--version")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("adhesis 0.")
-
-
-# ---------------------------------------------------------------------- interrupts
 
 
 @pytest.fixture
@@ -308,9 +299,6 @@ def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatc
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
-# ---------------------------------------------------------------------- streams
-
-
 def process(*words, package="adhesis", before="", **options) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, by a shell where something stands before it."""
     command = [sys.executable, "-m", package, *words]
@@ -363,9 +351,6 @@ def test_an_ascii_terminal_shows_what_it_can():
     assert "J/m\\xb2" in done.stdout
 
 
-# ---------------------------------------------------------------------- ranks of a launcher
-
-
 @pytest.fixture
 def rank_one(monkeypatch):
     """Make this process rank 1 of 3; returns the times that it waited for rank 0."""
@@ -395,9 +380,6 @@ def test_an_error_of_one_rank_is_reported_when_rank_0_had_its_time(rank_one, cap
     assert main(["run", "c.toml"]) == 2
     assert len(rank_one) == 2
     assert capsys.readouterr().err == "adhesis run: no mpi4py here\n"
-
-
-# ---------------------------------------------------------------------- abbreviations
 
 
 @pytest.mark.parametrize("name", COMMANDS)

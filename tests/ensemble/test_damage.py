@@ -46,9 +46,6 @@ def changed(path, change) -> bytes:
     return path.read_bytes()
 
 
-# ---------------------------------------------------------------- at random
-
-
 def test_a_sound_file_is_sound(damage):
     assert damage.judge(damage.content) == ("harmless", "")
 
@@ -76,9 +73,6 @@ def test_random_bytes_beside_the_rows_and_cuts_are_refused(damage):
     for size in rng.integers(0, len(damage.content), 5).tolist():
         verdict, reason = damage.judge(damage.content[:size])
         assert verdict == "refused", (size, reason)
-
-
-# ---------------------------------------------------------------- chosen
 
 
 def _set(name, row, value):
@@ -258,9 +252,6 @@ def test_an_attribute_that_is_not_the_campaigns_is_refused(path, name, capsys):
     assert name != "no part" or "is damaged: its attribute part is '3/2'" in line
 
 
-# ---------------------------------------------------------------- what commands say
-
-
 def test_verify_names_the_rows_and_what_is_to_be_done(path, capsys):
     assert main(["verify", str(path)]) == 0
     assert "r.h5 is sound: 8 rows have their checksum (7 done, 1 failed), 0 are pending" in (
@@ -340,9 +331,6 @@ def test_a_row_that_a_run_empties_while_it_is_read_is_not_called_damaged(path, m
         assert results.status()[3] == PENDING
         assert DAMAGED not in results.status()
     assert len(looks) == 2
-
-
-# ---------------------------------------------------------------- versions and processors
 
 
 def test_rows_of_several_versions_are_told_apart(tmp_path, monkeypatch):

@@ -206,9 +206,6 @@ def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
         )
 
 
-# ---------------------------------------------------------------- workers that are silent
-
-
 class Scripted:
     """A channel whose messages come at given times of a clock that sleep moves on."""
 
@@ -313,9 +310,6 @@ def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
     assert [message[0] for message in sent[-2:]] == ["outcome", "goodbye"]
 
 
-# ---------------------------------------------------------------- processes
-
-
 def hand_out(channel, tasks, limits=None, tick=lambda: None):
     group_of = dict.fromkeys(range(tasks), 0)
     outcomes: list[Outcome] = []
@@ -359,9 +353,6 @@ def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
     with Processes(1, never) as channel:
         os.kill(channel.pids[0], signal.SIGSTOP)
     assert calls[0] == "kill"
-
-
-# ---------------------------------------------------------------- one process, one task
 
 
 def alone(compute, tasks=3, limits=None):

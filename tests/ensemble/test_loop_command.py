@@ -298,9 +298,6 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
     assert not any(turn["warnings"] for turn in data.get("turns", []))
 
 
-# ---------------------------------------------------------------------- refusals
-
-
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
@@ -370,8 +367,6 @@ def test_given_heights_take_no_defaults(wave_file, capsys):
     assert run(*wave_words(wave_file, "--load-steps", 2, "--quiet")) == 0
     assert "defaults" not in capsys.readouterr().out
 
-
-# ---------------------------------------------------------------------- turning points, controls
 
 SCENE = [
     "loop", "--hurst", "0.8", "--seed", "4", "--period", "1e-3", "--n0", "3", "--ratio", "6",

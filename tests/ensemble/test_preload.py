@@ -186,8 +186,6 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     assert "(under a weight; it falls off at " in page.split("pull-off", 1)[0]
 
 
-# ---------------------------------------------------------------------- campaigns
-
 PRELOADS = [100.0, 400.0]
 
 

@@ -221,9 +221,6 @@ def test_a_task_that_hangs_meets_the_time_limit_and_the_limit_may_change(tmp_pat
     assert process.returncode == 0
 
 
-# ---------------------------------------------------------------- bad input
-
-
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
@@ -340,9 +337,6 @@ def test_a_disk_that_fills_while_running(tmp_path):
     assert done_rows(out) == 4
 
 
-# ---------------------------------------------------------------- status and times
-
-
 @pytest.mark.parametrize(
     ("text", "seconds"),
     [
@@ -382,20 +376,17 @@ def test_the_deadline_of_the_batch_system():
     assert deadline(None, 5.0, {}) is None
 
 
-def test_workers_have_as_long_to_answer_as_the_walltime_leaves(tmp_path):
+def test_workers_have_as_long_to_answer_as_the_walltime_leaves_by_any_clock(tmp_path, monkeypatch):
     campaign = load_campaign(write_campaign(tmp_path))
     plan = Plan(campaign.tasks(), [0], 0, 0)
+
+    def session_of(options):
+        return session._Session(campaign, plan, None, options, StopSignals(), Engine())
+
     for options, grace in ((Options(), 30.0), (Options(deadline=deadline(70.0, 0.0, {})), 3.5)):
-        found = session._Session(campaign, plan, None, options, StopSignals(), Engine())
-        assert found._limits.grace == pytest.approx(grace)
-
-
-def test_a_clock_that_is_set_back_does_not_move_the_walltime(tmp_path, monkeypatch):
-    campaign = load_campaign(write_campaign(tmp_path))
-    plan = Plan(campaign.tasks(), [0], 0, 0)
-    options = Options(deadline=deadline(1000.0, time.time(), {}))
-    found = session._Session(campaign, plan, None, options, StopSignals(), Engine())
-    monkeypatch.setattr(time, "time", lambda: 0.0)
+        assert session_of(options)._limits.grace == pytest.approx(grace)
+    found = session_of(Options(deadline=deadline(1000.0, time.time(), {})))
+    monkeypatch.setattr(time, "time", lambda: 0.0)  # the clock is set back
     assert found._time_left() <= 970.0
 
 

@@ -57,7 +57,7 @@ def test_the_documentation_describes_every_dataset_and_no_other():
     assert described == known
 
 
-def test_a_new_file_is_whole_and_pending(path, campaign):
+def test_a_new_file_is_whole_and_pending_with_units_names_and_scales(path, campaign):
     with Results(path) as results:
         assert results.campaign == campaign
         assert list(results.tasks()) == list(campaign.tasks())
@@ -68,6 +68,11 @@ def test_a_new_file_is_whole_and_pending(path, campaign):
             assert empty.all(), column.name
         assert not results.column("error").view(np.uint8).any()
     assert not list(path.parent.glob("*.part"))
+    with h5py.File(path) as file:
+        for name, dataset in file.items():
+            assert dataset.attrs["units"], name
+            assert dataset.attrs["long_name"], name
+            assert dataset.is_scale or all(len(dim) == 1 for dim in dataset.dims), name
 
 
 class Late(TimeoutError):
@@ -99,15 +104,6 @@ def test_an_interrupt_of_writing_arrives_as_itself_after_a_whole_row(
     with Results(path) as results:
         assert results.status()[0] == DONE
         assert not results.damaged().size
-
-
-def test_every_dataset_has_unit_name_and_scales(path):
-    with h5py.File(path) as file:
-        for name, dataset in file.items():
-            assert dataset.attrs["units"], name
-            assert dataset.attrs["long_name"], name
-            if not dataset.is_scale:
-                assert all(len(dim) == 1 for dim in dataset.dims), name
 
 
 def test_rows_come_back_as_they_were_written(path, campaign):
@@ -243,9 +239,6 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
     assert states == {(0, 0), (1, 0), (1, 2), (0, 2)} | {(1, 1)}
 
 
-# ---------------------------------------------------------------- files that are refused
-
-
 def refused(path) -> str:
     with pytest.raises(InputError) as caught:
         Results(path)
@@ -265,9 +258,6 @@ def test_a_file_of_another_version_is_refused(path, version, shown):
     said = refused(path)
     assert f"has file version {shown}, and this adhesis reads version 1: read it with" in said
     assert main(["status", str(path)]) == 2
-
-
-# ---------------------------------------------------------------- scale and lock
 
 
 def test_a_file_of_many_tasks_is_as_large_as_its_data(tmp_path):
@@ -429,9 +419,6 @@ def test_a_lock_file_that_is_replaced_while_a_run_waits_is_not_taken_for_the_loc
     finally:
         holders[0].kill()
         holders[0].wait()
-
-
-# ------------------------------------------------------- a file that is taken away from its writer
 
 
 def _replace(path):

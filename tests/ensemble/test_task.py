@@ -302,8 +302,6 @@ def test_a_loss_is_doubtful_where_it_misses_the_accuracy_asked_for():
     assert flags.tolist() == [False, True, True, True]
 
 
-# ---------------------------------------------------------------------- fields of chosen states
-
 KEPT_COLUMNS = [column.name for column in DATASETS if column.dims[0] == KEPT]
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
-from adhesis import prepare_trace, read_trace
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
@@ -245,17 +244,6 @@ def test_examples_run(path, monkeypatch, capsys):
     plt.close("all")
     assert figures
     assert capsys.readouterr().out
-
-
-def test_the_made_up_measurement_is_read_as_it_was_made(tmp_path):
-    example = runpy.run_path(str(ROOT / "examples" / "measured_profile.py"))
-    example["write_made_up_measurement"](tmp_path / "t.csv")
-    trace = read_trace(tmp_path / "t.csv")
-    assert (trace.points, trace.drop_outs) == (2001, 3)
-    assert trace.length == pytest.approx(2e-3)
-    prepared = prepare_trace(trace)
-    assert prepared.spectrum.noise == pytest.approx(5e-9, rel=0.1)
-    assert 5e-6 <= prepared.cut_off < 10e-6
 
 
 @cache

@@ -307,9 +307,6 @@ def test_parts_are_counted(cluster: Cluster, parts: str) -> None:
     assert f"PARTS is '{parts}'" in done.stderr
 
 
-# ------------------------------------------------------------------------------- PBS
-
-
 def pbs(cluster: Cluster, **env: str) -> subprocess.CompletedProcess[str]:
     return cluster.run("bash", JOBS / "pbs.sh", **(pbs_variables(cluster) | env))
 

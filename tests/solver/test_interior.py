@@ -215,9 +215,6 @@ def test_the_narrowest_length_is_beside_an_edge_that_moves(before, after, narrow
     assert _narrowest_moved(np.array(before), np.array(after), 1.0) == pytest.approx(narrowest)
 
 
-# ---------------------------------------------------------------------- ranges at edges and touches
-
-
 def dugdale_scene(alpha: float) -> tuple[LoopResult, SingleWave]:
     """One wave of 1 µm and A = 10 nm, E* = 1 GPa, with zero range and in closed form."""
     wave = SingleWave.with_alpha(alpha, 1e-8, 1e-6, 1e9)
@@ -294,9 +291,6 @@ def test_a_soft_control_moves_the_touches_by_what_it_gives():
     assert touch_stress([jump], [1], *states, Control(0.0)) == pytest.approx(0.5 * 0.1)
     free = np.array([1.0, 1.0]), np.array([0.0, 0.0]), np.array([0, 1])
     assert touch_stress([jump], [0], *free, Control(0.0)) == 0
-
-
-# ---------------------------------------------------------------------- range beyond the turn
 
 
 def next_touch() -> float:
