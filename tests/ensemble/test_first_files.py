@@ -17,6 +17,7 @@ from adhesis.ensemble.trace.reading.measured_trace import read_trace
 ROOT = Path(__file__).resolve().parent.parent.parent
 KEYS = [(name, entry.name) for name, table in TABLES.items() for entry in dataclasses.fields(table)]
 
+
 def listed(text: str) -> list[tuple[str, str]]:
     """Return table and key of every line of a campaign file, in a comment or not."""
     table, found = "", []

@@ -33,6 +33,7 @@ PROBLEM = adhesis.Problem(adhesis.single_wave(1e-6, 1e-3), adhesis.HalfSpace(1e6
 MATERIAL = ("--work-of-adhesion", "0.01", "--young", "1e6", "--poisson", "0.5")
 LOOP = ("loop", "--heights", "wave.csv", "--period", "1e-3", *MATERIAL, "--load-steps", "2")
 
+
 def _socket(path: Path) -> None:
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(path.name)  # of the current folder: longer names are not possible
