@@ -5,7 +5,7 @@ from math import inf, nan
 
 import pytest
 
-from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import parser_of
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.cycle import turns_of
@@ -94,31 +94,23 @@ def test_blanks_within_a_unit_make_no_unit_of_it() -> None:
         LENGTH.unit_named("m m")
 
 
-def test_lengths_of_a_campaign_may_have_units() -> None:
-    assert parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"')) == parse_campaign(
-        campaign_text(period="1e-3", h_rms="1e-6")
-    )
+def test_keys_of_a_campaign_take_quantities_with_units() -> None:
+    units = parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"', young='"1 MPa"'))
+    assert units == parse_campaign(campaign_text(period="1e-3", h_rms="1e-6", young="1e6"))
     several = parse_campaign(campaign_text(h_rms='["1 µm", 2e-6]'))
     assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
-
-
-def test_a_number_that_is_asked_about_is_taken_with_its_unit(tmp_path):
-    """The question: test_campaign.py."""
+    # without its unit it is asked about (test_campaign.py)
     text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
-    (tmp_path / "c.toml").write_text(text)
-    assert load_campaign(tmp_path / "c.toml").sweep.work_of_adhesion == (40.0,)
+    assert parse_campaign(text).sweep.work_of_adhesion == (40.0,)
 
 
-def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_units() -> None:
+def test_turning_points_under_a_load_are_stresses_with_units() -> None:
     parser = parser_of("loop")
     args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500, 1e-3MPa"])
     assert turns_of(args, Control(0.0)).points == (200.0, 500.0, 1000.0)
     args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,5bar"])
     with pytest.raises(InputError, match="--max-stress is '5bar': its unit must be one of Pa, kPa"):
         turns_of(args, Control(0.0))
-    assert parse_campaign(campaign_text(young='"1 MPa"')) == parse_campaign(
-        campaign_text(young="1e6")
-    )
 
 
 def test_quantities_are_shown_in_a_unit_of_their_size() -> None:

@@ -566,27 +566,17 @@ def test_findings_compare_with_the_paper(data):
 
 def test_contact_is_compared_at_equal_load():
     """Unloading has twice the contact of loading at each stress, by construction."""
-
-    class Fake:
-        done = 3
-
-    class Curve:
-        def __init__(self, mean):
-            self.mean = np.asarray(mean, dtype=float)
-
     stress = np.linspace(-1, 3, 41)
-    fake = Fake()
-    fake.curves = {
-        "loading_mean_stress_dimensionless": Curve(stress),
-        "loading_contact_fraction": Curve(0.1 * (stress + 1.5)),
-        "unloading_mean_stress_dimensionless": Curve(np.concatenate([stress[::-1], [-0.5, 0.0]])),
-        "unloading_contact_fraction": Curve(
-            np.concatenate([0.2 * (stress[::-1] + 1.5), [0.01, 0.0]])
-        ),
+    curves = {
+        "loading_mean_stress_dimensionless": stress,
+        "loading_contact_fraction": 0.1 * (stress + 1.5),
+        "unloading_mean_stress_dimensionless": np.append(stress[::-1], [-0.5, 0.0]),
+        "unloading_contact_fraction": np.append(0.2 * (stress[::-1] + 1.5), [0.01, 0.0]),
     }
+    curves = {name: SimpleNamespace(mean=mean) for name, mean in curves.items()}
+    fake = SimpleNamespace(done=3, curves=curves)
     assert findings.area_ratio(fake) == pytest.approx(2)
-    name = "unloading_mean_stress_dimensionless"
-    fake.curves[name] = Curve(fake.curves[name].mean - 10)
+    curves["unloading_mean_stress_dimensionless"].mean -= 10
     assert findings.area_ratio(fake) is None
 
 

@@ -145,6 +145,7 @@ def slurm(
         (1, {}, "report"),  # some tasks failed
         (1, {"PENDING": "3"}, "nothing"),  # the launcher was ended, or --max-failures
         (0, {"REPORT": "no"}, "nothing"),
+        (0, {"JOBS": "4"}, "report"),  # as make and build systems leave it: it is no folder
         *((code, {}, "requeue") for code in (75, 137, 139, 205, 9, 255)),
         *((code, {}, "nothing") for code in (2, 70, 74, 127, 134)),
         (75, {"SLURM_RESTART_COUNT": "49"}, "requeue"),
@@ -158,12 +159,6 @@ def slurm(
 def test_slurm_job_is_requeued_reported_or_left(cluster, code, env, action):
     done, seen = slurm(cluster, "study.toml", CODE=str(code), **env)
     assert (done.returncode, seen) == (code, action), done.stdout + done.stderr
-
-
-def test_number_of_jobs_in_the_environment_is_not_taken_for_a_folder(cluster: Cluster) -> None:
-    """``make JOBS=4`` and build systems leave such a variable."""
-    done, seen = slurm(cluster, "study.toml", JOBS="4")
-    assert (done.returncode, seen) == (0, "report"), done.stderr
 
 
 def test_job_that_could_not_write_says_that_it_does_not_come_back(cluster: Cluster) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from adhesis import ContactState, Control, Path, Problem, run_loop, single_wave
 from adhesis.solver.loading.ledger import estimated_error
-from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
+from adhesis.solver.method import PathError
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
@@ -91,23 +91,12 @@ class _Untrue(ExactWave):
         )
 
 
-class _Sticking(Method):
+class _Sticking(ExactWave):
     """One patch that never comes off."""
-
-    name = "sticking"
 
     def follow(self, state: ContactState, separation: float) -> Path:
         patch = np.array([[0.0, 1e-4]])
         return Path((ContactState(separation, patch, -1.0, 0.0, 0.0, 0.1),), ())
-
-    def fields(self, state: ContactState, n: int) -> Fields:
-        raise NotImplementedError
-
-    def openings(self, state: ContactState) -> list[Opening]:
-        raise NotImplementedError
-
-    def report(self) -> MethodReport:
-        return MethodReport(self.name, self.chosen)
 
 
 def test_audit_catches_energy_drops_that_are_not_the_loss():
