@@ -56,19 +56,16 @@ def wave_method(control: Control | None = None) -> ExactWave:
     return ExactWave(problem, states_per_step=4)
 
 
+HALF: dict[str, Any] = {"max_penetration": 0.5, "load_steps": 4}
 LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
-    "loop": lambda: run_loop(wave_method(), max_penetration=0.5, load_steps=4),
-    "under a stiffness": lambda: run_loop(
-        wave_method(Control(1e9)), max_penetration=0.5, load_steps=4
-    ),
+    "loop": lambda: run_loop(wave_method(), **HALF),
+    "under a stiffness": lambda: run_loop(wave_method(Control(1e9)), **HALF),
     "under a load": lambda: run_loop(wave_method(Control(0.0)), max_stress=400.0, load_steps=4),
     "without adhesion": lambda: run_loop(
-        ExactWave(Problem(WAVE, HalfSpace(1e6, 0.5), 0.0)), max_penetration=0.5, load_steps=4
+        ExactWave(replace(wave_method().problem, work_of_adhesion=0.0)), **HALF
     ),
     "to a preload": lambda: run_loop(wave_method(), preload=500.0, load_steps=4),
-    "flat": lambda: run_loop(
-        ExactWave(replace(wave_method().problem, measure="flat")), max_penetration=0.5, load_steps=4
-    ),
+    "flat": lambda: run_loop(ExactWave(replace(wave_method().problem, measure="flat")), **HALF),
     "path": lambda: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4),
 }
 
@@ -76,9 +73,6 @@ LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
 @pytest.fixture(scope="module", params=LOOPS)
 def result(request: pytest.FixtureRequest) -> LoopResult | PathResult:
     return LOOPS[request.param]()
-
-
-# ---------------------------------------------------------------------- shown
 
 
 def check_short_repr(*objects: Any) -> None:
@@ -122,9 +116,6 @@ def test_a_notebook_shows_the_main_numbers_and_the_figure(result):
     figure = result.plot()
     assert isinstance(figure, Figure)
     assert [axes.get_xlabel() for axes in figure.axes] == [r"penetration $\Delta/h_{\max}$"] * 2
-
-
-# ---------------------------------------------------------------------- tables and files
 
 
 def test_tables_dataset_and_numbers_hold_every_state_and_jump_with_units(result):
@@ -171,9 +162,6 @@ def test_what_was_saved_is_loaded_as_it_was(result, tmp_path):
         found.film()
 
 
-# ---------------------------------------------------------------------- copies and processes
-
-
 def same(thing: Any) -> Any:
     return thing
 
@@ -185,17 +173,14 @@ def test_results_are_sent_to_spawned_processes():
         things = [*results, trace, WAVE, wave_method().problem, results[0].contact_states[3]]
         assert pool.map(same, things) == things
         method = wave_method()
-        loop = pool.apply(run_loop, (method,), {"max_penetration": 0.5, "load_steps": 4})
+        loop = pool.apply(run_loop, (method,), HALF)
     assert loop == results[0]
-
-
-# ---------------------------------------------------------------------- progress
 
 
 @pytest.mark.parametrize(
     "run",
     [
-        lambda **more: run_loop(wave_method(), max_penetration=0.5, load_steps=4, **more),
+        lambda **more: run_loop(wave_method(), **HALF, **more),
         lambda **more: run_loops(wave_method(), max_penetration=[0.3, 0.5], load_steps=4, **more),
         lambda **more: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4, **more),
     ],
@@ -278,8 +263,6 @@ def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_p
     with pytest.raises(TypeError, match="folder is 3"):
         answer.page(3)
 
-
-# ---------------------------------------------------------------------- campaigns
 
 TABLES: dict[str, Any] = {
     "profile": {"period": 2e-3, "n0": 2, "ratio": 4, "h_rms": 1e-6},
@@ -474,7 +457,7 @@ def test_the_examples_of_the_docstrings_are_right(module):
 
 def test_a_loop_is_drawn_into_axes_that_are_given():
     problem = Problem(single_wave(1e-9, 1e-3), HalfSpace(1e6, 0.5), 1e-9)
-    loop = run_loop(ExactWave(problem), max_penetration=0.5, load_steps=4)
+    loop = run_loop(ExactWave(problem), **HALF)
     figure = Figure()
     stress, contact = figure.subplots(1, 2)
     assert loop.plot(ax=(stress, contact)) is figure

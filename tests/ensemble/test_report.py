@@ -112,9 +112,6 @@ def lines_of(axes) -> dict[str, np.ndarray]:
     return {line.get_label(): line.get_xydata() for line in axes.lines}
 
 
-# ---------------------------------------------------------------------- tables
-
-
 def test_losses_csv_holds_the_averages_with_units(report, data):
     with (report / "losses.csv").open(encoding="utf-8") as stream:
         table = list(csv.DictReader(stream))
@@ -214,9 +211,6 @@ def test_curves_open_in_xarray_with_units(report, data):
         assert curves["realisations"].values.tolist() == [[5] * 3] * 2
         quantiles = curves["loading_contact_fraction_quantiles"]
         assert (quantiles.diff("quantile") >= 0).all()
-
-
-# ---------------------------------------------------------------------- figures
 
 
 def test_contact_is_drawn_against_stress_over_slope(data, drawn):
@@ -449,9 +443,6 @@ def test_every_figure_is_legible_at_column_width_in_colour_and_grey(drawn, monke
                 assert solid.setdefault(looks, line.get_label()) == line.get_label(), name
 
 
-# ---------------------------------------------------------------------- page and command
-
-
 def test_the_page_embeds_every_figure_that_exists(report):
     page = (report / "report.md").read_text(encoding="utf-8")
     shown = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page)
@@ -524,9 +515,6 @@ def test_one_finished_task_of_one_cell_is_enough(tmp_path, quick_figures):
     assert parts == ["averages", "tables", *figures, "pages"]
 
 
-# ---------------------------------------------------------------------- findings
-
-
 @pytest.mark.parametrize(
     ("losses", "verb"),
     [((1, 2, 3), "grows with"), ((3, 2, 1), "falls with"), ((1, 3, 2), "is not monotone in")],
@@ -578,9 +566,6 @@ def test_contact_is_compared_at_equal_load():
     assert findings.area_ratio(fake) == pytest.approx(2)
     curves["unloading_mean_stress_dimensionless"].mean -= 10
     assert findings.area_ratio(fake) is None
-
-
-# ---------------------------------------------------------------------- beside other campaigns
 
 
 def companion(tmp_path, name: str, factor: float, **replaced: str) -> Path:
@@ -644,9 +629,6 @@ def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
         if h < 0.9
     ]
     assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(found))):.1f} %" in sentence
-
-
-# ---------------------------------------------------------------------- how well it is known
 
 
 def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):

@@ -277,9 +277,6 @@ def test_results_that_are_not_copied_back_whole_stay(
         assert "mine" not in (tmp_path / "s.h5").read_text()
 
 
-# ------------------------------------------------------------------------------- the real run
-
-
 @pytest.fixture
 def real(tmp_path: Path) -> Iterator[Site]:
     """A site with the real command, and a campaign of 40 tasks that take no time.
@@ -355,8 +352,6 @@ def test_a_run_of_somebody_else_and_a_job_do_not_destroy_each_other(real: Site) 
     joined = adhesis_here("merge", staged(real), "--out", results)
     assert joined.returncode == 0, joined.stderr
 
-
-# ------------------------------------------------------------------------------- whose folder
 
 VICTIM, ATTACKER = 64_001, 64_002  # two accounts, which need no name
 root_only = pytest.mark.skipif(os.geteuid() != 0, reason="only root can act for other accounts")

@@ -472,9 +472,6 @@ def test_a_generator_of_turning_points_is_followed_and_the_order_is_kept() -> No
     assert path(iter([0.5, 0.4]), load_steps=1, out=False).turning_points == (0.5, 0.4)
 
 
-# ---------------------------------------------------------------------- values
-
-
 def test_equal_values_are_equal_and_have_equal_hashes() -> None:
     other = Problem(single_wave(AMPLITUDE, PERIOD), HalfSpace(1e6, 0.5), 0.04)
     pairs: list[tuple[Any, Any]] = [
@@ -528,9 +525,6 @@ def test_an_array_that_was_given_stays_the_callers() -> None:
     profile = Profile(PERIOD, given)
     given[1] = 5.0
     assert profile.coefficients[1] == 1e-6
-
-
-# ---------------------------------------------------------------------- what is printed
 
 
 def test_warnings_are_printed_with_the_loop() -> None:
