@@ -326,27 +326,17 @@ def test_files_that_are_not_one_period_of_heights_are_refused(
 
 
 @pytest.mark.usefixtures("exact_method")
-def test_the_strength_of_the_interface_is_an_option_and_stands_in_the_json(wave_file, tmp_path):
+def test_strength_and_measure_are_options_and_stand_in_the_json(wave_file, tmp_path, capsys):
     out = tmp_path / "loop.json"
-    for words in (("--strength", 1e4), ("--adhesion-range", GAMMA / 1e4)):
-        steps = ("--max-penetration", 0.8, "--load-steps", 2)
-        assert run(*wave_words(wave_file, *steps, "--json", out, *words)) == 0
-        data = json.loads(out.read_text())
+    steps = ("--max-penetration", 0.8, "--load-steps", 2, "--json", out)
+    for words in (("--strength", 1e4), ("--adhesion-range", GAMMA / 1e4, "--measure", "flat")):
+        assert run(*wave_words(wave_file, *steps, *words)) == 0
+        data, text = json.loads(out.read_text()), capsys.readouterr().out
         assert data["strength"] == pytest.approx(1e4)
         assert (data["openings"], data["barrier"]) == (0, 0.0)
         assert {jump["barrier"] for jump in data["jumps"]} == {0.0}
-
-
-@pytest.mark.usefixtures("exact_method")
-def test_the_measure_is_an_option_and_is_stated(wave_file, tmp_path, capsys):
-    out = tmp_path / "loop.json"
-    steps = ("--max-penetration", 0.8, "--load-steps", 2, "--json", out)
-    assert run(*wave_words(wave_file, *steps, "--measure", "flat")) == 0
-    assert json.loads(out.read_text())["measure"] == "flat"
-    assert ", flat measure, " in capsys.readouterr().out
-    assert run(*wave_words(wave_file, *steps)) == 0
-    assert json.loads(out.read_text())["measure"] == "arc"
-    assert "measure, " not in capsys.readouterr().out
+        assert data["measure"] == ("flat" if "flat" in words else "arc")
+        assert (", flat measure, " in text) == ("flat" in words)
 
 
 def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(capsys):
