@@ -192,8 +192,8 @@ def sign_all(path):
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
+        *(("loss", kind) for kind in ("sound", "soft", "nowhere", "pipe")),
         *((name, "pipe") for name in ("status", "hurst", "task", "unloading_penetration", "x")),
-        *(("loss", kind) for kind in ("pipe", "sound", "soft", "nowhere")),
     ],
 )
 def test_a_link_is_refused_before_it_is_followed(path, name, kind, tmp_path):

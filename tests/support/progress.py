@@ -11,11 +11,7 @@ class Waiting:
     """Write which tests are under way, whenever none has ended for some seconds.
 
     Of several processes, the one that hands the tests out is notified when each begins and ends.
-
-    Parameters
-    ----------
-    terminal : TextIO
-        Where the lines go: a stream of its own, which no test captures.
+    ``terminal`` is a stream of its own, which no test captures.
     """
 
     def __init__(self, terminal: TextIO) -> None:
