@@ -82,7 +82,6 @@ def wrong_values(entry: dataclasses.Field) -> Iterator[str]:
 
 @pytest.mark.parametrize("key", RULES, ids=".".join)
 def test_what_breaks_the_rule_of_a_key_is_named_with_it(key):
-    """Made from the rules themselves: bounds and choices stand nowhere else."""
     (table, name), entry = key, RULES[key]
     text = re.sub(rf"(?m)^{name} = .*\n", "", campaign_text())
     text = text if f"[{table}]" in text else f"{text}\n[{table}]\n"
@@ -265,7 +264,6 @@ def test_seeds_are_a_promise():
 
 
 def test_too_many_tasks_are_counted_and_not_made():
-    """Three lists of two thousand values make 8e9 cells, which no memory holds."""
     many = [f"[{', '.join(f'{low + k * step:.4g}' for k in range(2000))}]" for low, step in (
         (0.1, 1e-4), (0.01, 1e-4), (1e6, 1e3)
     )]  # fmt: skip

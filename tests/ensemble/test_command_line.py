@@ -57,7 +57,6 @@ BOUNDED = {
 
 @pytest.mark.parametrize("option", BOUNDED)
 def test_a_number_beyond_the_bounds_of_its_rule_is_refused(option, capsys, monkeypatch):
-    """Before any loop, with the option's own name."""
     monkeypatch.setattr("adhesis.ensemble.command.loop.run_loop", None)
     bounds = BOUNDED[option]
     unit = bounds.unit.partition(" ")[0].replace("²", "2")
@@ -117,7 +116,6 @@ def required(name: str) -> list[str]:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_refuses_what_it_cannot_read(name, capsys):
-    """Unknown or without a value, empty, another unit, no choice, a text in place of a number."""
     assert "unrecognized arguments: --speed" in refused(capsys, [name, *required(name), "--speed"])
     for action in parser_of(name)._actions:
         if not action.option_strings or action.nargs == 0:

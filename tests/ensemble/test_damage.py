@@ -116,7 +116,6 @@ def test_a_row_that_lost_its_status_is_pending_and_not_damaged(damage, path):
 
 @pytest.mark.parametrize(("name", "pending"), [("hurst", False), ("realisation", True)])
 def test_a_task_of_another_campaign_is_refused(damage, path, name, pending):
-    """Whatever the status of its row, and also where all checksums are right."""
 
     def change(file):
         file[name][3] = file[name][3] + 1

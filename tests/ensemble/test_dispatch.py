@@ -40,8 +40,6 @@ class SimulatedRanks:
         self._queue = {rank: [] for rank in range(1, workers + 1)}
         self._ends: list[tuple[float, int, tuple]] = []
         self._halted = False
-        self.looks = 0
-        self.answered: list[int] = []
         if signal_at is not None:
             heapq.heappush(self._ends, (signal_at, 1, ("stop", "SIGUSR1 received")))
         for rank in self._queue:
@@ -82,16 +80,12 @@ class SimulatedRanks:
             heapq.heappush(self._ends, (end, to, ("outcome", Outcome(task, to, seconds))))
 
     def poll(self, *, urgent=False):
-        self.looks += 1
         self.now += 1e-6
         if self._ends and self._ends[0][0] <= self.now:
             _, rank, message = heapq.heappop(self._ends)
             self.now += self._message_time
             if message[0] == "alive":
                 self._report_later(rank)
-            if message[0] in ("outcome", "given up"):
-                task = message[1].task if message[0] == "outcome" else message[1]
-                self.answered.append(task)
             return rank, message
         return None
 
@@ -420,7 +414,6 @@ def test_a_task_cannot_swallow_the_end_of_its_time():
 
 
 def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
-    """Whatever their number, and each of them is answered."""
     seconds = [0.2 + 0.01 * task for task in range(30)]
     group_of = dict.fromkeys(range(30), 0)
     together = {task: task // 3 for task in range(30)}

@@ -47,7 +47,6 @@ def run(path, out, part="1/1"):
 
 
 def test_parts_merged_equal_the_file_of_one_run(tmp_path, capsys):
-    """With more parts than realisations, merged in any order."""
     path, whole = write_campaign(tmp_path), tmp_path / "whole.h5"
     run(path, whole)
     names = [tmp_path / f"part{k}.h5" for k in range(1, 6)]
@@ -78,7 +77,6 @@ def test_a_merge_is_resumed_and_grown(tmp_path):
 
 
 def test_rows_stay_sound_when_a_number_of_the_campaign_becomes_an_axis(tmp_path):
-    """The file gains a dataset for the axis; what was computed is neither damaged nor lost."""
     out = computed(tmp_path / "all.h5", skip=(2,))
     part = computed(tmp_path / "part.h5")
     grown = write_campaign(tmp_path, realisations="3", young="[1e6, 2e6]")

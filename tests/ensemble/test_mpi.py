@@ -193,7 +193,6 @@ KILLS = int(os.environ.get("ADHESIS_KILLS", "0"))
 )
 @pytest.mark.parametrize("victim", ["worker", "master", "all"])
 def test_kills_at_random_moments(tmp_path, victim):
-    """The file opens after each kill, nothing done is computed again, and all bits are the same."""
     random.seed(victim)
     path, out, whole = write_campaign(tmp_path, realisations="4"), tmp_path / "r.h5", tmp_path / "w"
     assert here(path, whole).done == 16

@@ -284,7 +284,6 @@ def test_failures_count_as_looked_at_and_may_be_computed_again(tmp_path):
 @pytest.mark.mpi
 @pytest.mark.skipif(shutil.which(MPIRUN) is None, reason="there is no mpirun here")
 def test_ranks_and_kills_change_no_bit_of_a_precision_campaign(tmp_path):
-    """Two workers begin it, are killed, and one ends it; one process has done the whole."""
     path, out, whole = tmp_path / "c.toml", tmp_path / "r.h5", tmp_path / "w.h5"
     path.write_text(text())
     run(path, whole)

@@ -200,7 +200,6 @@ def text_of(
 
 @pytest.mark.usefixtures("quick_figures")
 def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
-    """Run, status, extend, run again, and report; each row is the loop of its preload."""
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"
     file.write_text(text_of(realisations="1"))
     assert main(["run", str(file), "--out", str(out)]) == 0

@@ -129,7 +129,6 @@ def test_growing_computes_exactly_what_is_new(tmp_path):
 
 
 def test_a_campaign_on_further_axes(tmp_path):
-    """Run, listed by status along its axes, interrupted by nothing, grown along one of them."""
     axes = {"ratio": "[4, 2]", "max_penetration": "[0.6, 0.3]", "realisations": "1"}
     process, out = run(tmp_path, hurst="[0.7]", **axes)
     assert "8 of 8 tasks done" in process.stderr

@@ -118,9 +118,7 @@ CRAFTED: dict[str, Callable[[h5py.File, Path], object]] = {
 
 
 @pytest.mark.parametrize("name", CRAFTED)
-def test_what_would_be_read_from_elsewhere_or_fill_the_memory_is_refused(
-    name: str, content: bytes, tmp_path: Path
-) -> None:
+def test_what_would_be_read_from_elsewhere_or_fill_the_memory_is_refused(name, content, tmp_path):
     path, pipe = tmp_path / "loop.nc", tmp_path / "pipe"
     os.mkfifo(pipe)
     path.write_bytes(content[:-SEAL])

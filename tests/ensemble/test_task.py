@@ -247,7 +247,6 @@ def test_loads_share_a_loading_branch_and_what_runs_away_is_told():
 
 
 def test_the_time_of_a_shared_loading_branch_counts_once(monkeypatch):
-    """The sum over the loops is what the process took."""
     clock = iter(range(1000))
     process_time = "adhesis.ensemble.task.compute.time.process_time"
     monkeypatch.setattr(process_time, lambda: float(next(clock)))

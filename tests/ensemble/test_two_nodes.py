@@ -124,7 +124,6 @@ def nodes(tmp_path: Path) -> Iterator[Nodes]:
 
 
 def test_a_campaign_runs_over_two_nodes_and_outlives_one(nodes: Nodes, tmp_path: Path) -> None:
-    """The job ends promptly with a dead node; the next one goes on with what is left."""
     path, out, whole = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "whole.h5"
     assert adhesis_here("run", path, "--out", whole, fake="").returncode == 0
     process = nodes.launch("run", path, "--out", out, fake="hold=1")

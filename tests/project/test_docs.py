@@ -231,7 +231,6 @@ def test_exit_codes_of_the_page_are_those_of_the_commands() -> None:
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_run(path, monkeypatch, capsys):
-    """Each says something and draws something."""
     import matplotlib as mpl
 
     mpl.use("Agg")

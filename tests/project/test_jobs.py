@@ -334,7 +334,6 @@ def test_pbs_job_tells_the_run_its_time_and_submits_the_report(cluster: Cluster)
 
 
 def test_pbs_job_submits_a_continuation_with_all_that_it_was_given(cluster: Cluster) -> None:
-    """Name, queue, account, project, resources and variables; folders with commas and spaces."""
     mine = cluster.folder / "bin" / "mine"
     mine.write_text((cluster.folder / "bin" / "mpirun").read_text().replace("mpirun", "mine"))
     mine.chmod(0o755)

@@ -249,9 +249,7 @@ SHORT_COPY = 'cp() { head -c 3 "$2" >"$3"; }'
     ],
     ids=["changed", "changed in length alone", "written", "copied back in part", "copied in part"],
 )
-def test_results_that_are_not_copied_back_whole_stay(
-    before: str, within: str, words: str, tmp_path: Path
-) -> None:
+def test_results_that_are_not_copied_back_whole_stay(before, within, words, tmp_path):
     """``written`` makes the stand-in of status report a run."""
     (tmp_path / "s.h5").write_text("earlier\n")
     done = subprocess.run(

@@ -11,7 +11,6 @@ from tools.hostile import draw, judge
 
 @pytest.mark.parametrize("number", [2, 3, 4, 7])
 def test_a_hostile_loop_keeps_every_promise(number):
-    """Ends, no overlap, in order, audited; every fourth beside a far more accurate run."""
     scene = draw(5, number)
     found = judge(scene, number)
     assert found["wrong"] == []

@@ -149,7 +149,6 @@ def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
 
 
 def test_strains_that_are_not_small_are_doubtful():
-    """By a tension of a third of E, or necks of a third of the period."""
     problem = loop_of(1e7).problem
     young, period = problem.half_space.young, problem.profile.period
     patches, stress = np.array([1, 0]), np.array([-0.4 * young, 0.0])
@@ -374,7 +373,6 @@ def test_the_way_beyond_a_turn_is_one_of_the_separation(control):
 
 
 def test_nothing_is_known_beyond_a_path_that_cannot_be_followed(monkeypatch):
-    """The way up to there counts."""
     method, jump = method_of(rough(), 1e7), next_touch()
     loop = run_loop(method, max_penetration=jump - 0.03, load_steps=20)
     assert loop.turn_range == math.inf

@@ -104,7 +104,6 @@ def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
     ids=["a patch goes or stays", "contact is lost or stays on a crest", "a shallow minimum"],
 )
 def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ratio, gamma, seed):
-    """Loops in which edges run past saddles and shallow minima, and could end elsewhere."""
     profile = self_affine_profile(hurst, period=1e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
 
     def loss_with(share: float) -> float:
