@@ -40,7 +40,6 @@ def wave_file(tmp_path):
 
 @pytest.fixture
 def exact_method(monkeypatch):
-    """Put the exact single wave in the place of the numerical methods."""
     monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
 
 
@@ -365,7 +364,6 @@ SCENE = [
 
 
 def rough(tmp_path, capsys, *words: str) -> tuple[dict, str]:
-    """Run a rough loop; returns its document and what is printed."""
     out = tmp_path / "loop.json"
     assert main([*SCENE, *words, "--json", str(out)]) == 0
     return json.loads(out.read_text()), capsys.readouterr().out

@@ -41,7 +41,6 @@ def parts(folder, count, **others):
 
 
 def run(path, out, part="1/1"):
-    """Run the fake campaign, or a part of it, in this process."""
     options = Options(part=Part.parse(part), patience=0.0)
     return run_campaign(load_campaign(path), out, None, options, engine=fake_engine(""))
 

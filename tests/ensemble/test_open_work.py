@@ -34,7 +34,6 @@ def run(*words) -> int:
 
 
 def text(value: str, **changes: str) -> str:
-    """A campaign of method ``auto`` with a work of adhesion of receding edges."""
     given = campaign_text(poisson=f"0.5\nwork_of_adhesion_open = {value}", **changes)
     return given.replace('method = "grid"\nnodes_per_wave = 16\n', "accuracy = 1e-2\n")
 

@@ -44,7 +44,6 @@ STOP = "[stop]\nrelative_error = {}\nbatch = 4\nmost = {}\n"
 
 
 def text(relative_error=0.2, most=80, quantity="", **changes):
-    """Return a campaign of two cells, with little to write."""
     small = {"realisations": "8", "work_of_adhesion": "[0.04]", "load_steps": "1", "jumps": "1"}
     fields = "field_penetrations = []\nfield_realisations = 0\n"
     steered = f'quantity = "{quantity}"\n' if quantity else ""

@@ -249,7 +249,6 @@ SHORT = "loops short of the preload"
 
 
 def hollow(axes: Axes) -> list[float]:
-    """Places of the hollow marks of a panel."""
     lines = [line for line in axes.lines if line.get_markerfacecolor() == "white"]
     return [x for line in lines for x in line.get_xdata()]
 

@@ -81,7 +81,6 @@ def report(file) -> Path:
 
 @pytest.fixture
 def drawn(report) -> dict[str, Figure]:
-    """The figures of the report, by name."""
     return FIGURES
 
 

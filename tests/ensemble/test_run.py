@@ -35,7 +35,6 @@ from tests.support.fake_run import fake_engine
 
 
 def run(folder, *words, fake="", **changes):
-    """Run the fake campaign of a folder to its end; returns how it ended and the results file."""
     path = write_campaign(folder, **changes)
     out = folder / "r.h5"
     return adhesis_here("run", path, "--out", out, *words, fake=fake), out

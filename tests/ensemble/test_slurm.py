@@ -206,7 +206,6 @@ class Job:
     env: dict[str, str]
 
     def again(self, *words: str) -> Job:
-        """Submit the same campaign once more, from the same folder."""
         words = ("sbatch", "--parsable", "--ntasks=2", str(SCRIPT), "study.toml", *words)
         done = subprocess.run(words, env=self.env, cwd=self.folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr

@@ -76,7 +76,6 @@ class Nodes:
         )
 
     def kill(self, node: int) -> None:
-        """Let a node die: every process on it, at once."""
         pids = subprocess.run(
             ["ip", "netns", "pids", self.spaces[node]], capture_output=True, text=True, check=True
         )

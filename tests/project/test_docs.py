@@ -247,7 +247,6 @@ def test_examples_run(path, monkeypatch, capsys):
 
 @cache
 def is_picture(path: Path) -> bool:
-    """Whether an image can be read, and is none of a few pixels."""
     return bool(imread(path).shape[0] > 100)
 
 

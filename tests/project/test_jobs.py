@@ -119,7 +119,6 @@ def cluster(tmp_path: Path) -> Cluster:
 def slurm(
     cluster: Cluster, *arguments: str, **env: str
 ) -> tuple[subprocess.CompletedProcess[str], str]:
-    """Run jobs/slurm.sh; the process, and what it did in the end."""
     copy = cluster.folder / "slurm_script"  # Slurm runs a copy
     copy.write_bytes((JOBS / "slurm.sh").read_bytes())
     settings = {

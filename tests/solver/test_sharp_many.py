@@ -131,7 +131,6 @@ def many_gaps(loaded):
 
 
 def relaxed(edges, gaps, at):
-    """Return the minimum that a descent from these gaps leads to."""
     while not isinstance(gaps, Point):
         gaps, _ = edges.relax(gaps, at, edges.wave)
     return gaps

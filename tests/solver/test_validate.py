@@ -84,13 +84,11 @@ class _Tense(ExactWave):
 
 
 def stickier(problem: Problem) -> ExactWave:
-    """Return the exact method for a work of adhesion that is 0.1 % too high."""
     gamma = 1.001 * problem.work_of_adhesion
     return exact(replace(problem, work_of_adhesion=gamma))
 
 
 def stiffer(problem: Problem) -> ExactWave:
-    """Return the exact method for a half-space that is 0.1 % too stiff."""
     half_space = HalfSpace(1.001 * problem.half_space.young, problem.half_space.poisson)
     return exact(replace(problem, half_space=half_space))
 
