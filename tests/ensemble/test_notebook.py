@@ -418,7 +418,7 @@ def test_campaigns_run_outside_the_main_thread(tmp_path):
     small = adhesis.Campaign(campaign_text(realisations="1", hurst="[0.7]"))
     before = sys.stderr
 
-    async def both() -> list[adhesis.CampaignResults]:
+    async def both() -> list[Any]:
         runs = (asyncio.to_thread(small.run, tmp_path / f"{i}.h5") for i in range(2))
         return await asyncio.gather(*runs)
 
