@@ -3,8 +3,6 @@
 Values and helpers that several tests use are in :mod:`tests.support`.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import signal
@@ -54,7 +52,6 @@ def quick_figures(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add ``--slow``."""
     parser.addoption("--slow", action="store_true", help="run what is marked slow, too")
 
 

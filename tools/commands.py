@@ -5,8 +5,6 @@
 The text above the first command stays as it is.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path

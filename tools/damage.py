@@ -12,8 +12,6 @@ damaged copy is
 - *WRONG*: anything else, with what was wrong.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -6,8 +6,6 @@
 A stamp is a text "Source" inside the PNG: version and commit of adhesis, and the command.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import shutil
@@ -27,7 +25,6 @@ from adhesis.ensemble.versions import commit, versions  # noqa: E402  # needs th
 
 BESIDE = tuple(sorted((ROOT / "jobs" / "beside").glob("*.toml")))
 KEPT = (".png", ".csv", ".md")  # PDF, NetCDF and HTML are made anew by whoever wants them
-_NAME = "Source"
 
 
 @dataclass(frozen=True)
@@ -76,20 +73,15 @@ PARTS = {
 def stamp(path: Path, text: str) -> None:
     """Put a text into a PNG, in place of an older one."""
     about = PngInfo()
-    about.add_text(_NAME, text)
+    about.add_text("Source", text)
     with Image.open(path) as picture:
         picture.save(path, pnginfo=about, dpi=picture.info.get("dpi"))
-
-
-def source(name: str) -> str:
-    """Return the stamp of a part's figures."""
-    version = versions()["adhesis_version"]
-    return f"adhesis {version}, commit {commit()}: make figures-of-docs ARGS={name}"
 
 
 def make(name: str, ranks: int) -> None:
     """Run the commands of a part and put what they made into docs/, stamped."""
     part = PARTS[name]
+    source = f"adhesis {versions()['adhesis_version']}, commit {commit()}"
     with tempfile.TemporaryDirectory() as folder:
         for command in part.commands:
             words = command.replace("OUT", folder).split()
@@ -106,7 +98,7 @@ def make(name: str, ranks: int) -> None:
             if to.suffix == ".md":  # links to what is not kept
                 to.write_text(re.sub(r" \(\[PDF\]\([^)]*\)\)", "", to.read_text("utf-8")), "utf-8")
             if to.suffix == ".png":
-                stamp(to, source(name))
+                stamp(to, f"{source}: make figures-of-docs ARGS={name}")
             print(to.relative_to(ROOT), flush=True)
 
 

@@ -7,8 +7,6 @@ draws from the seed alone, stops by itself at the end of its time and exits with
 failure, having printed what repeats it.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import secrets

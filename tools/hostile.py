@@ -1,7 +1,5 @@
 """Hostile scenes: how they are drawn, followed and judged; see tools/fuzz/loops.py."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass, replace

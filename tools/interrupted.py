@@ -1,7 +1,5 @@
 """Interrupts on purpose: the handler of a timer's signal raises while something is at work."""
 
-from __future__ import annotations
-
 import gc
 import signal
 from collections.abc import Callable

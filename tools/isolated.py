@@ -1,7 +1,5 @@
 """Work of the fuzzing programs in a process of its own, which may crash or hang."""
 
-from __future__ import annotations
-
 import faulthandler
 import resource
 import time

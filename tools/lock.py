@@ -6,8 +6,6 @@
 what tests, linters and the optional formats of instruments need besides.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """``read_package.py WHEEL SDIST COMMIT``: look for what they have to hold, and nothing else."""
 
-from __future__ import annotations
-
 import re
 import sys
 import tarfile

@@ -1,7 +1,5 @@
 """The README of the package: without images and links of the checkout, dead ends elsewhere."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

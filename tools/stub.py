@@ -3,8 +3,6 @@
 python tools/stub.py
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

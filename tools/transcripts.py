@@ -12,8 +12,6 @@ The blocks of a page run one after the other in one folder:
 A line ``…`` stands for any lines that are left out.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import io
@@ -40,7 +38,6 @@ _TOKEN = re.compile(
 )
 # Lines that report progress: how many there are depends on the machine.
 _PROGRESS = re.compile(r"^((un)?loading( +(Δ/h_max|p̄) .*)?|frames( .*)?)\n", re.MULTILINE)
-_FACTOR = 3.0
 
 
 @dataclass(frozen=True)
@@ -149,7 +146,7 @@ def _pattern(shown: str) -> tuple[str, list[tuple[str, bool]]]:
 def _close(old: str, new: str, is_estimate: bool) -> bool:
     a, b = (float(text.replace(",", "")) for text in (old, new))
     if is_estimate:
-        return a == b or (a * b > 0 and 1 / _FACTOR < a / b < _FACTOR)
+        return a == b or (a * b > 0 and 1 / 3 < a / b < 3)
     mantissa, _, exponent = old.partition("e")
     places = len(mantissa.partition(".")[2])
     whole = not places and not exponent

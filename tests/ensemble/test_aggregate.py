@@ -1,7 +1,5 @@
 """Averages of a results file against the raw rows, with plain numpy; error bars that cover."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py

@@ -1,7 +1,5 @@
 """The benchmark: ratios at equal error, runs in processes of their own, tables, figure, command."""
 
-from __future__ import annotations
-
 import csv
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Check what all commands share: bad options, help, interrupts, full devices, several ranks."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import math
@@ -45,9 +43,6 @@ def refused(capsys, words) -> str:
     return line
 
 
-# ---------------------------------------------------------------------- bad options
-
-
 # Options of `adhesis loop` that are one number, with the rule that Python and campaigns have too.
 BOUNDED = {
     **{"--hurst": checks.HURST, "--period": checks.LENGTH, "--n0": checks.HARMONIC},
@@ -62,7 +57,6 @@ BOUNDED = {
 
 @pytest.mark.parametrize("option", BOUNDED)
 def test_a_number_beyond_the_bounds_of_its_rule_is_refused(option, capsys, monkeypatch):
-    """Before any loop, with the option's own name."""
     monkeypatch.setattr("adhesis.ensemble.command.loop.run_loop", None)
     bounds = BOUNDED[option]
     unit = bounds.unit.partition(" ")[0].replace("²", "2")
@@ -79,11 +73,6 @@ def test_a_number_beyond_the_bounds_of_its_rule_is_refused(option, capsys, monke
 def test_an_option_whose_value_is_two_hyphens_is_refused(option, capsys):
     line = refused(capsys, ["loop", "--hurst", "0.8", f"{option}=--"])
     assert line.startswith(f"adhesis loop: {option} is '--'")
-
-
-def test_the_thickness_of_a_layer_has_the_name_of_its_option(capsys):
-    line = refused(capsys, ["loop", "--hurst", "0.8", "--layer", "0"])
-    assert line.startswith("adhesis loop: --layer is 0.0: it must be a positive number")
 
 
 @pytest.mark.parametrize(
@@ -115,7 +104,6 @@ def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
 
 
 def required(name: str) -> list[str]:
-    """Return words with all that a command requires."""
     words = []
     for action in parser_of(name)._actions:
         value = str(next(iter(action.choices))) if action.choices else "1"
@@ -128,7 +116,6 @@ def required(name: str) -> list[str]:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_refuses_what_it_cannot_read(name, capsys):
-    """Unknown or without a value, empty, another unit, no choice, a text in place of a number."""
     assert "unrecognized arguments: --speed" in refused(capsys, [name, *required(name), "--speed"])
     for action in parser_of(name)._actions:
         if not action.option_strings or action.nargs == 0:
@@ -156,9 +143,6 @@ def test_an_unknown_command_is_refused_with_the_list(words, capsys):
     assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of new, run, ")
 
 
-# ---------------------------------------------------------------------- help
-
-
 @pytest.mark.parametrize("name", [*COMMANDS, ""])
 def test_help_ends_with_two_examples_that_are_understood(name, capsys):
     assert main([*filter(None, [name]), "--help"]) == 0
@@ -174,9 +158,6 @@ def test_the_package_can_be_run():
     done = process("--version")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("adhesis 0.")
-
-
-# ---------------------------------------------------------------------- interrupts
 
 
 @pytest.fixture
@@ -316,9 +297,6 @@ def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatc
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
-# ---------------------------------------------------------------------- streams
-
-
 def process(*words, package="adhesis", before="", **options) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, by a shell where something stands before it."""
     command = [sys.executable, "-m", package, *words]
@@ -371,9 +349,6 @@ def test_an_ascii_terminal_shows_what_it_can():
     assert "J/m\\xb2" in done.stdout
 
 
-# ---------------------------------------------------------------------- ranks of a launcher
-
-
 @pytest.fixture
 def rank_one(monkeypatch):
     """Make this process rank 1 of 3; returns the times that it waited for rank 0."""
@@ -403,9 +378,6 @@ def test_an_error_of_one_rank_is_reported_when_rank_0_had_its_time(rank_one, cap
     assert main(["run", "c.toml"]) == 2
     assert len(rank_one) == 2
     assert capsys.readouterr().err == "adhesis run: no mpi4py here\n"
-
-
-# ---------------------------------------------------------------------- abbreviations
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -1,7 +1,5 @@
 """Hand-out: order, balance, failures and stops, with workers that are simulated."""
 
-from __future__ import annotations
-
 import heapq
 import os
 import random
@@ -42,8 +40,6 @@ class SimulatedRanks:
         self._queue = {rank: [] for rank in range(1, workers + 1)}
         self._ends: list[tuple[float, int, tuple]] = []
         self._halted = False
-        self.looks = 0
-        self.answered: list[int] = []
         if signal_at is not None:
             heapq.heappush(self._ends, (signal_at, 1, ("stop", "SIGUSR1 received")))
         for rank in self._queue:
@@ -54,15 +50,12 @@ class SimulatedRanks:
         heapq.heappush(self._ends, (at, rank, ("alive", None, None)))
 
     def clock(self):
-        """Return the simulated time."""
         return self.now
 
     def sleep(self, seconds):
-        """Let simulated time pass."""
         self.now += seconds
 
     def send(self, to, message, *, urgent=False):
-        """Let the simulated worker act on a message."""
         self.now += self._message_time
         if message[0] == "dismissed":
             self._ends = [e for e in self._ends if (e[1], e[2][0]) != (to, "alive")]
@@ -87,17 +80,12 @@ class SimulatedRanks:
             heapq.heappush(self._ends, (end, to, ("outcome", Outcome(task, to, seconds))))
 
     def poll(self, *, urgent=False):
-        """Return what a simulated worker sent, if it is time."""
-        self.looks += 1
         self.now += 1e-6
         if self._ends and self._ends[0][0] <= self.now:
             _, rank, message = heapq.heappop(self._ends)
             self.now += self._message_time
             if message[0] == "alive":
                 self._report_later(rank)
-            if message[0] in ("outcome", "given up"):
-                task = message[1].task if message[0] == "outcome" else message[1]
-                self.answered.append(task)
             return rank, message
         return None
 
@@ -181,7 +169,6 @@ class StopsAtTheDoor(SimulatedRanks):
     """Worker 1 is asked to stop just as it is dismissed."""
 
     def send(self, to, message, *, urgent=False):
-        """Let the signal come before the dismissal."""
         if message[0] == "dismissed" and to == 1:
             heapq.heappush(self._ends, (self.now, to, ("stop", "SIGUSR1 received")))
         super().send(to, message, urgent=urgent)
@@ -213,9 +200,6 @@ def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
         )
 
 
-# ---------------------------------------------------------------- workers that are silent
-
-
 class Scripted:
     """A channel whose messages come at given times of a clock that sleep moves on."""
 
@@ -225,19 +209,15 @@ class Scripted:
         self.sent = []
 
     def clock(self):
-        """Return the time."""
         return self.now
 
     def sleep(self, seconds):
-        """Let time pass."""
         self.now += seconds
 
     def send(self, to, message, *, urgent=False):
-        """Keep what is sent."""
         self.sent.append((to, message))
 
     def poll(self, *, urgent=False):
-        """Return the next message, if it is time."""
         if self.messages and self.messages[0][0] <= self.now:
             return self.messages.pop(0)[1:]
         return None
@@ -324,9 +304,6 @@ def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
     assert [message[0] for message in sent[-2:]] == ["outcome", "goodbye"]
 
 
-# ---------------------------------------------------------------- processes
-
-
 def hand_out(channel, tasks, limits=None, tick=lambda: None):
     group_of = dict.fromkeys(range(tasks), 0)
     outcomes: list[Outcome] = []
@@ -356,7 +333,6 @@ def test_processes_are_workers_like_any_other():
 
 
 def never(task, check):
-    """Compute in a process until told to stop."""
     return half(100, check)
 
 
@@ -371,9 +347,6 @@ def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
     with Processes(1, never) as channel:
         os.kill(channel.pids[0], signal.SIGSTOP)
     assert calls[0] == "kill"
-
-
-# ---------------------------------------------------------------- one process, one task
 
 
 def alone(compute, tasks=3, limits=None):
@@ -441,7 +414,6 @@ def test_a_task_cannot_swallow_the_end_of_its_time():
 
 
 def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
-    """Whatever their number, and each of them is answered."""
     seconds = [0.2 + 0.01 * task for task in range(30)]
     group_of = dict.fromkeys(range(30), 0)
     together = {task: task // 3 for task in range(30)}

@@ -1,7 +1,5 @@
 """Texts from files are shown as texts; links in place of our own files are not followed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from markdown_it import MarkdownIt
@@ -31,14 +29,6 @@ HOSTILE = [
 ]
 
 
-@pytest.fixture
-def campaign():
-    return parse_campaign(campaign_text())
-
-
-# ---------------------------------------------------------------------------------- texts
-
-
 @pytest.mark.parametrize("text", HOSTILE)
 @pytest.mark.parametrize("shown", [markdown, code_span])
 def test_a_text_from_a_file_is_shown_letter_by_letter(text, shown):
@@ -61,9 +51,9 @@ def test_control_characters_are_spelled_out_and_letters_stay():
     assert str(InputError("column \x1b[31m")) == r"column \x1b[31m"
 
 
-def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeypatch):
+def test_status_prints_no_control_characters(tmp_path, capsys, monkeypatch):
     path = tmp_path / "r.h5"
-    create(path, campaign)
+    create(path, parse_campaign(campaign_text()))
     with Writer(path) as writer:
         writer.write_failure(0, "diverged \x1b]0;title\x07\nsecond line \x9b31m", 1.0)
     with RunLock(path) as lock:
@@ -82,8 +72,6 @@ def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeyp
         assert "diverged" in shown
         assert "second line" in shown
 
-
-# ---------------------------------------------------------------------------------- images
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)
 
@@ -125,9 +113,6 @@ def test_images_come_from_the_folder_of_the_page_alone(tmp_path):
         *("/etc/passwd", "missing.png", "../report/below/../../outside.png"),
     ):
         assert not shows(name), name
-
-
-# ---------------------------------------------------------------------------------- links
 
 
 def test_two_names_of_one_results_file_have_one_lock(tmp_path):

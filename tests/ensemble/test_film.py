@@ -1,7 +1,5 @@
 """The film of a loop: which states are its frames, what each shows, and the page in a browser."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
@@ -48,9 +46,6 @@ def data_of(page: str) -> dict:
     found = re.search(r"^const film = (\{.*\});$", page, re.MULTILINE)
     assert found is not None
     return json.loads(found[1])
-
-
-# ---------------------------------------------------------------------- frames
 
 
 def test_every_jump_has_a_frame_before_and_one_after_it_that_announces_its_drop(loop, film):
@@ -113,9 +108,6 @@ def test_a_frame_shows_the_exact_surface_and_patches(control):
     assert next(len(s.patches) for s in scenes.scenes if len(s.patches)) == 2  # across the period
 
 
-# ---------------------------------------------------------------------- files
-
-
 def test_the_page_holds_every_frame_and_nothing_from_elsewhere(loop, film, tmp_path):
     file = tmp_path / "loop.html"
     made = loop.film(file, frames=30)
@@ -155,9 +147,6 @@ def test_without_ffmpeg_an_mp4_is_refused(loop, monkeypatch):
         loop.film("a.mp4")
 
 
-# ---------------------------------------------------------------------- command
-
-
 def run(*words: object) -> int:
     scene = ("--hurst", 0.8, "--n0", 2, "--ratio", 4, "--load-steps", 4, "--quiet")
     return main(["loop", *map(str, (*scene, *words))])
@@ -170,8 +159,6 @@ def test_the_command_writes_the_film_of_a_loop_and_of_a_path(tmp_path, capsys):
         assert f"wrote       {file}" in capsys.readouterr().out
         assert len(data_of(file.read_text())["frames"]) > 20
 
-
-# ---------------------------------------------------------------------- a browser
 
 _PROBE = """
 const look = () => ({

@@ -1,7 +1,5 @@
 """The commands that write files to start from: a campaign, a sample trace, a shell's completion."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import re
@@ -18,8 +16,6 @@ from adhesis.ensemble.trace.reading.measured_trace import read_trace
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 KEYS = [(name, entry.name) for name, table in TABLES.items() for entry in dataclasses.fields(table)]
-
-# ---------------------------------------------------------------------- a campaign
 
 
 def listed(text: str) -> list[tuple[str, str]]:
@@ -82,9 +78,6 @@ def test_a_key_in_a_comment_shows_its_default_or_a_value_that_is_allowed(table, 
         assert value == entry.default
 
 
-# ---------------------------------------------------------------------- a trace
-
-
 # The same on every machine.
 SAMPLE = "ee3eef042a9a60b37058b75ada90394d5b83ad112bde53187398f61592cdd5e7"
 
@@ -101,9 +94,6 @@ def test_the_sample_is_a_trace_and_the_same_everywhere(tmp_path, monkeypatch, ca
     assert following is not None
     assert main([*following[1].split(), "--plan"]) == 0
     assert "form        tilt and bow subtracted" in capsys.readouterr().out
-
-
-# ---------------------------------------------------------------------- a shell's completion
 
 
 def completed(script: str, *words: str) -> set[str]:

@@ -1,7 +1,5 @@
 """The heights of one period: read as traces are, and warned of where the ends do not meet."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import json
@@ -28,8 +26,6 @@ SINGLE = single_wave(1e-9, 1e-3)
 WAVE = 1e-9 * np.cos(2 * np.pi * np.arange(N) / N)
 GAMMA = SingleWave.with_alpha(0.2, 1e-9, 1e-3, 1e6 / 0.75).work_of_adhesion
 CONTACT = ("--work-of-adhesion", GAMMA, "--young", 1e6, "--poisson", 0.5)
-
-# ---------------------------------------------------------------------- reading
 
 NM = [f"{1e9 * h:.6f}" for h in WAVE]
 METRES = [repr(float(h)) for h in WAVE]
@@ -167,9 +163,6 @@ def test_doubtful_heights_are_refused(kind: str, tmp_path: Path) -> None:
         read_heights(path, **options)
 
 
-# ---------------------------------------------------------------------- closure
-
-
 def rough(seed: int, n0: int) -> Array:
     """A self-affine profile of 801 points; of one period for n0 = 1, else a part of it."""
     profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=20, seed=seed, h_rms=1e-6)
@@ -253,9 +246,6 @@ def test_the_warning_goes_to_stderr_json_and_exit_code(path, tmp_path, monkeypat
     code, reported = run("--heights", "few.csv", "--strict")
     assert code == 1
     assert "few.csv holds 7 heights only: fewer than 8 make a profile of a few waves" in reported
-
-
-# ---------------------------------------------------------------------- campaign files
 
 
 def test_a_campaign_may_have_a_utf_8_mark(tmp_path: Path) -> None:

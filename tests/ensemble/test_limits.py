@@ -1,7 +1,5 @@
 """Under limits of the system a command ends in one sentence, and leaves nothing half-written."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -36,8 +34,8 @@ WORDS: dict[str, tuple[object, ...]] = {
 CASES = [
     (limit, value, name)
     for limit, value, names in (
-        *(("n", 5, "run loop doctor"), ("n", 16, "status")),
-        *(("v", 600_000, "run loop"), ("f", 0, "new run loop"), ("f", 50, "run")),
+        *(("n", 5, "run doctor"), ("n", 16, "status")),
+        *(("v", 600_000, "loop"), ("f", 0, "new run loop"), ("f", 50, "run")),
         *(("u", 1, "run bench doctor"), ("u", 8, "status")),
     )
     for name in names.split()

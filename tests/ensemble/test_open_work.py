@@ -1,7 +1,5 @@
 """The work of adhesion of receding edges in commands, campaigns, results files and reports."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace
@@ -36,12 +34,8 @@ def run(*words) -> int:
 
 
 def text(value: str, **changes: str) -> str:
-    """A campaign of method ``auto`` with a work of adhesion of receding edges."""
     given = campaign_text(poisson=f"0.5\nwork_of_adhesion_open = {value}", **changes)
     return given.replace('method = "grid"\nnodes_per_wave = 16\n', "accuracy = 1e-2\n")
-
-
-# ---------------------------------------------------------------------- loop
 
 
 def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
@@ -59,9 +53,6 @@ def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     line = f"friction    {data['friction']:.6g} J/m² at edges, which recede at 0.08 J/m²; "
     line += f"{data['loss'] - data['friction']:.6g} J/m² lost by instability"
     assert line in capsys.readouterr().out.splitlines()
-
-
-# ---------------------------------------------------------------------- trace
 
 
 def small_trace():
@@ -104,9 +95,6 @@ def test_the_answer_of_a_trace_has_its_friction(monkeypatch):
     assert "which recede at 0.02 J/m²" in str(answer)
 
 
-# ---------------------------------------------------------------------- campaign
-
-
 def test_a_row_has_its_friction():
     campaign = parse_campaign(text("0.08", work_of_adhesion="[0.04]", hurst="[0.8]"))
     row = Runner()(campaign, campaign.tasks()[0])
@@ -126,9 +114,6 @@ def test_a_loss_is_doubted_by_the_work_of_adhesion_that_it_spends():
     assert beyond_zero_range(values | {"gamma_open": 0.04})
     assert not beyond_zero_range(values | {"gamma_open": 0.4})
     assert beyond_zero_range(values | {"gamma_open": np.nan})
-
-
-# ---------------------------------------------------------------------- report
 
 
 @pytest.fixture(scope="module")

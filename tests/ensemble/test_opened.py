@@ -1,7 +1,5 @@
 """A results file opened in Python: labelled axes, tables, figures; the report's numbers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py

@@ -1,7 +1,5 @@
 """Outputs of commands: refused before any work where they would destroy something, else whole."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -17,13 +15,7 @@ from matplotlib.figure import Figure
 import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import (
-    check_outputs,
-    staged_folder,
-    whole_file,
-    write_json,
-    write_new,
-)
+from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json, write_new
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.single_wave import SingleWave
@@ -52,9 +44,6 @@ def ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
         return code, text.out, text.err
 
     return run
-
-
-# ---------------------------------------------------------------------- adhesis loop
 
 
 def test_a_write_protected_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,9 +180,6 @@ def test_older_files_of_the_writers_own_names_are_removed(tmp_path: Path) -> Non
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
         **{"a": "new", "notes": "old"}
     }
-
-
-# ---------------------------------------------------------------------- folders of other commands
 
 
 def test_a_report_on_a_full_disk_ends_in_one_sentence_and_leaves_the_old_one(ask: Ask) -> None:

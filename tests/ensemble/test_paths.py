@@ -4,8 +4,6 @@ None holds it up, none is followed where it must not be, none is replaced, and t
 sentence.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import socket
@@ -34,8 +32,6 @@ LONGEST = 20  # s; nothing here takes one
 PROBLEM = adhesis.Problem(adhesis.single_wave(1e-6, 1e-3), adhesis.HalfSpace(1e6, 0.5), 1e-4)
 MATERIAL = ("--work-of-adhesion", "0.01", "--young", "1e6", "--poisson", "0.5")
 LOOP = ("loop", "--heights", "wave.csv", "--period", "1e-3", *MATERIAL, "--load-steps", "2")
-
-# ------------------------------------------------------------------------------- crafted paths
 
 
 def _socket(path: Path) -> None:
@@ -164,7 +160,6 @@ def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Return the path of a sound results file."""
     small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
     return str(write(tmp_path_factory.mktemp("results") / "sound.h5", small, rows(small)))
 
@@ -173,8 +168,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> str:
 def loop() -> adhesis.LoopResult:
     return adhesis.run_loop(ExactWave(PROBLEM), max_penetration=0.6, load_steps=4)
 
-
-# ------------------------------------------------------------------------------------ commands
 
 # {} is the crafted path and SOUND a sound results file; what follows -> is how the path ends.
 COMMANDS = {
@@ -263,7 +256,6 @@ def test_a_crafted_path_is_refused_in_one_sentence_before_anything_is_done(
 
 
 def commanded(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """Run a command, and raise the one sentence with which it refuses."""
     code = main(words)
     out, error = capsys.readouterr()
     assert (code, out) == (2, ""), (code, out, error)
@@ -278,9 +270,6 @@ def refused_by(call: Callable[[], object]) -> None:
         call()
     assert "\n" not in str(error.value)
     assert kept(folder) == before
-
-
-# ------------------------------------------------------------- files beside the results of a run
 
 
 @pytest.mark.parametrize("kind", [kind for kind in MADE if kind != "file"])

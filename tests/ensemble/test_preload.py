@@ -1,7 +1,5 @@
 """A preload on the command line, of a trace and in campaigns."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -188,8 +186,6 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     assert "(under a weight; it falls off at " in page.split("pull-off", 1)[0]
 
 
-# ---------------------------------------------------------------------- campaigns
-
 PRELOADS = [100.0, 400.0]
 
 
@@ -204,7 +200,6 @@ def text_of(
 
 @pytest.mark.usefixtures("quick_figures")
 def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
-    """Run, status, extend, run again, and report; each row is the loop of its preload."""
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"
     file.write_text(text_of(realisations="1"))
     assert main(["run", str(file), "--out", str(out)]) == 0
@@ -254,7 +249,6 @@ SHORT = "loops short of the preload"
 
 
 def hollow(axes: Axes) -> list[float]:
-    """Places of the hollow marks of a panel."""
     lines = [line for line in axes.lines if line.get_markerfacecolor() == "white"]
     return [x for line in lines for x in line.get_xdata()]
 
@@ -334,20 +328,7 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
         assert loops.turning_penetration.values.ravel()[1] == 0.999
 
 
-def test_a_campaign_under_a_weight_says_so_in_its_status_and_report(tmp_path, capsys):
-    file, out = tmp_path / "c.toml", tmp_path / "c.h5"
-    file.write_text(text_of('control = "load"\nmax_stress = 200', realisations="2"))
-    assert main(["run", str(file), "--out", str(out)]) == 0
-    capsys.readouterr()
-    assert main(["status", str(out)]) == 0
-    assert "under a weight: closed at the separation of its fall" in capsys.readouterr().out
-    data = aggregate(out)
-    outcome = findings.verdict(data)[0]
-    assert "under a weight, which falls off at " in outcome
-    assert "(the loop is closed at the separation of the fall)" in outcome
-
-
-def test_shares_of_a_campaign_under_a_weight_are_of_the_drops_before_the_fall(tmp_path):
+def test_a_campaign_under_a_weight_says_so_and_its_shares_are_of_the_drops_before(tmp_path, capsys):
     """Of profiles that are nearly in full contact when the weight tears them off."""
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"
     changes = {"realisations": "2", "ratio": "6", "work_of_adhesion": "[0.014]"}
@@ -361,7 +342,13 @@ def test_shares_of_a_campaign_under_a_weight_are_of_the_drops_before_the_fall(tm
         scales = results["loss_small_scale"][:] + results["loss_large_scale"][:]
         np.testing.assert_allclose(scales, before, rtol=1e-12)
         np.testing.assert_allclose(results["loss_from_drops"][:], before + last, rtol=1e-9)
+    capsys.readouterr()
+    assert main(["status", str(out)]) == 0
+    assert "under a weight: closed at the separation of its fall" in capsys.readouterr().out
     data = aggregate(out)
+    outcome = findings.verdict(data)[0]
+    assert "under a weight, which falls off at " in outcome
+    assert "(the loop is closed at the separation of the fall)" in outcome
     (cell,) = data.cells
     assert ((cell.values["small_scale_share"] >= 0) & (cell.values["small_scale_share"] <= 1)).all()
     table = mechanism_tables.jumps(data)

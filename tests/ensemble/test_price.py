@@ -1,7 +1,5 @@
 """What a campaign costs, estimated before it starts."""
 
-from __future__ import annotations
-
 import shutil
 import time
 
@@ -44,7 +42,6 @@ def test_pilots_tell_what_the_campaign_costs():
 
 @pytest.fixture
 def made(monkeypatch):
-    """Count the tasks that are made."""
     tasks = []
 
     class Counted(Task):

@@ -1,13 +1,11 @@
 """Quantities with units: read from options and campaign files by one reader, and printed."""
 
-from __future__ import annotations
-
 import argparse
 from math import inf, nan
 
 import pytest
 
-from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import parser_of
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.cycle import turns_of
@@ -96,37 +94,23 @@ def test_blanks_within_a_unit_make_no_unit_of_it() -> None:
         LENGTH.unit_named("m m")
 
 
-# ---------------------------------------------------------------------- campaign files
-
-
-def test_lengths_of_a_campaign_may_have_units() -> None:
-    assert parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"')) == parse_campaign(
-        campaign_text(period="1e-3", h_rms="1e-6")
-    )
+def test_keys_of_a_campaign_take_quantities_with_units() -> None:
+    units = parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"', young='"1 MPa"'))
+    assert units == parse_campaign(campaign_text(period="1e-3", h_rms="1e-6", young="1e6"))
     several = parse_campaign(campaign_text(h_rms='["1 µm", 2e-6]'))
     assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
-
-
-def test_a_number_that_is_asked_about_is_taken_with_its_unit(tmp_path):
-    """The question: test_campaign.py."""
+    # without its unit it is asked about (test_campaign.py)
     text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
-    (tmp_path / "c.toml").write_text(text)
-    assert load_campaign(tmp_path / "c.toml").sweep.work_of_adhesion == (40.0,)
+    assert parse_campaign(text).sweep.work_of_adhesion == (40.0,)
 
 
-# ---------------------------------------------------------------------- stresses
-
-
-def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_units() -> None:
+def test_turning_points_under_a_load_are_stresses_with_units() -> None:
     parser = parser_of("loop")
     args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500, 1e-3MPa"])
     assert turns_of(args, Control(0.0)).points == (200.0, 500.0, 1000.0)
     args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,5bar"])
     with pytest.raises(InputError, match="--max-stress is '5bar': its unit must be one of Pa, kPa"):
         turns_of(args, Control(0.0))
-    assert parse_campaign(campaign_text(young='"1 MPa"')) == parse_campaign(
-        campaign_text(young="1e6")
-    )
 
 
 def test_quantities_are_shown_in_a_unit_of_their_size() -> None:
@@ -145,42 +129,29 @@ def test_a_share_is_shown_in_percent_without_an_exponent() -> None:
     ]
 
 
-# ---------------------------------------------------------------------- as commands print them
-
-
 @pytest.mark.parametrize(
-    ("value", "error", "text"),
+    ("values", "text"),
     [
-        (9705.0, 19317.0, "10000 ± 19000"),
-        (9705.0, 612.0, "9700 ± 600"),
-        (35.12, 4.2, "35 ± 4"),
-        (0.03512, 0.00123, "0.0351 ± 0.0012"),
-        (0.5144, 0.112, "0.51 ± 0.11"),
-        (-3.0, 0.96, "-3.0 ± 1.0"),
-        (4.0, 1e-12, "4 ± 1e-12"),
-        (4.0, 0.0, "4 ± 0"),
-        (4.0, inf, "4 ± inf"),
-        (4.0, nan, "4 ± nan"),
+        ((9705.0, 19317.0), "10000 ± 19000"),
+        ((9705.0, 612.0), "9700 ± 600"),
+        ((35.12, 4.2), "35 ± 4"),
+        ((0.03512, 0.00123), "0.0351 ± 0.0012"),
+        ((-3.0, 0.96), "-3.0 ± 1.0"),
+        ((4.0, 1e-12), "4 ± 1e-12"),
+        ((4.0, 0.0), "4 ± 0"),
+        ((4.0, inf), "4 ± inf"),
+        ((4.0, nan), "4 ± nan"),
+        # of a fraction of contact: more than 1 is not printed, unless it was given
+        ((0.995, 0.020, 0, 1), "0.995, from 0.975 to 1.000"),
+        ((0.6, 0.7, 0, 1), "0.6, from 0.0 to 1.0"),
+        ((0.5, 0.112, 0, 1), "0.50 ± 0.11"),
+        ((1.0, 0.0, 0, 1), "1 ± 0"),
+        ((0.98, 0.02, 0, 1), "0.980 ± 0.020"),
+        ((1.2, 0.112, 0, 1), "1.20 ± 0.11"),
     ],
 )
-def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: str) -> None:
-    assert with_error(value, error) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "text"),
-    [
-        (0.995, 0.020, "0.995, from 0.975 to 1.000"),
-        (0.6, 0.7, "0.6, from 0.0 to 1.0"),
-        (0.5, 0.112, "0.50 ± 0.11"),
-        (1.0, 0.0, "1 ± 0"),
-        (0.98, 0.02, "0.980 ± 0.020"),
-        (1.2, 0.112, "1.20 ± 0.11"),
-    ],
-)
-def test_no_interval_leaves_the_bounds_of_its_quantity(value, error, text):
-    """A fraction of contact of more than 1 is not printed, unless it was given."""
-    assert with_error(value, error, 0.0, 1.0) == text
+def test_a_value_has_the_digits_of_its_error_and_its_interval_keeps_to_its_bounds(values, text):
+    assert with_error(*values) == text
 
 
 def test_a_small_size_is_not_zero() -> None:

@@ -1,7 +1,5 @@
 """Command lines that are refused: code 2, one sentence with the option's name, and nothing done."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -9,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -61,7 +60,9 @@ run c.toml --out r.h5 --redo failed --hurst 0.75 ->
     --hurst is 0.75: this campaign has no such task
 run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5
 run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
-status text -> is not a results file
+status {{text,empty.h5,other.h5}} -> is not a results file
+status none.h5 -> does not exist
+status directory -> is a directory, not a file
 status r.h5 --interval {{x,-1,0,nan,inf,1e9}} -> --interval is '{{}}'
 status r.h5 --watch --json -> --watch and --json
 merge r.h5 -> required: --out
@@ -83,8 +84,14 @@ LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
 LOOP --method magic -> --method is 'magic': it must be one of grid
 LOOP --unit um -> --unit belongs to --trace
 LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
+LOOP --layer 0 -> --layer is 0.0: it must be a positive number
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
+LOOP --stripes 2 -> the amplitude of stripes of the work of adhesion is missing
+LOOP --stripe-phase 1.0 -> the number of stripes of the work of adhesion is missing
+LOOP --stripes 0 --stripe-amplitude 0.5 -> --stripes is 0: it must be
+LOOP --stripes 2 --stripe-amplitude 1 -> --stripe-amplitude is 1.0: it must be
+LOOP --stripes 2 --stripe-amplitude 0.1 --strength 1e8 -> is given beside a strength
 loop --heights none.npy --period 1e-3 -> with --heights the material has to be given
 loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
@@ -182,7 +189,6 @@ TRACE --unit um --to way -> trace.html is to be written there
 
 
 def cases() -> list[Any]:
-    """Return the words and the sentence of each case."""
     found = []
     for line in re.sub(r"->\n +", "-> ", REFUSED).split("\n"):
         if not line or line.startswith("#"):
@@ -221,7 +227,10 @@ def fill(folder: Path) -> None:
     for name in ("directory", "sub", "ow", "r", "way/trace.html"):
         Path(name).mkdir(parents=True)
     Path("text").write_text("notes")
-    Path("r/curves.nc").write_bytes(b"")
+    for name in ("r/curves.nc", "empty.h5"):
+        Path(name).touch()
+    with h5py.File("other.h5", "w") as file:
+        file["x"] = 1
     heights = 1e-9 * np.cos(np.arange(16) * np.pi / 8)
     Path("wave.csv").write_text("\n".join(map(repr, heights.tolist())))
     os.link("wave.csv", "hard.csv")

@@ -1,7 +1,5 @@
 """The report: what the tables say, what the figures draw, what the page shows."""
 
-from __future__ import annotations
-
 import base64
 import csv
 import io
@@ -34,7 +32,6 @@ from adhesis.ensemble.report.figures import (
     loss_figures,
     shapes_and_spectra,
 )
-from adhesis.ensemble.report.figures.catalogue import LOOPS
 from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
@@ -87,6 +84,11 @@ def report(file) -> Path:
     return directory
 
 
+@pytest.fixture
+def drawn(report) -> dict[str, Figure]:
+    return FIGURES
+
+
 def margin(figure) -> float:
     with style():
         box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
@@ -112,9 +114,6 @@ def undrawn(monkeypatch, quick_figures) -> list[str]:
 
 def lines_of(axes) -> dict[str, np.ndarray]:
     return {line.get_label(): line.get_xydata() for line in axes.lines}
-
-
-# ---------------------------------------------------------------------- tables
 
 
 def test_losses_csv_holds_the_averages_with_units(report, data):
@@ -218,17 +217,13 @@ def test_curves_open_in_xarray_with_units(report, data):
         assert (quantiles.diff("quantile") >= 0).all()
 
 
-# ---------------------------------------------------------------------- figures
-
-
-def test_contact_is_drawn_against_stress_over_slope(data):
-    with style():
-        figure = loops.contact_against_stress(data)
+def test_contact_is_drawn_against_stress_over_slope(data, drawn):
+    figure = drawn["fig6_contact_against_stress"]
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["H = 0.7", "H = 0.8"]
-    drawn = lines_of(figure.axes[1])
-    assert len(drawn) == 6
+    lines = lines_of(figure.axes[1])
+    assert len(lines) == 6
     cell = data.cell(0.8, 0.04)
-    line = drawn[r"$\gamma$ = 0.04 J/m², unloading"]
+    line = lines[r"$\gamma$ = 0.04 J/m², unloading"]
     sigma = (
         2
         * h5_values(data, cell, "unloading_mean_stress")
@@ -259,9 +254,8 @@ def h5_values(data, cell, name: str) -> np.ndarray:
         return raw[name][:][cell.rows]
 
 
-def test_loops_are_drawn_with_one_standard_deviation(data):
-    with style():
-        figure = loops.loop_against_penetration(data)
+def test_loops_are_drawn_with_one_standard_deviation(data, drawn):
+    figure = drawn["fig7_loop_against_penetration"]
     assert len(figure.axes) == 4
     for column in (figure.axes[::2], figure.axes[1::2]):  # one scale for all H
         assert len({axes.get_ylim() for axes in column}) == 1
@@ -278,10 +272,9 @@ def test_loops_are_drawn_with_one_standard_deviation(data):
     assert "sigma" in axes.get_ylabel()
 
 
-def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
+def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data, drawn):
     """A panel for each γ; few points are not joined by a line."""
-    with style():
-        figure = loss_figures.loss_against_hurst(data)
+    figure = drawn["table1_losses"]
     for axes, gamma in zip(figure.axes, GAMMAS, strict=True):
         assert f"= {gamma:g} J" in axes.get_title(loc="left")
         found = [data.cell(h, gamma).estimates["loss_dimensionless"] for h in (0.7, 0.8)]
@@ -300,9 +293,8 @@ def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
     assert "H" in figure.axes[0].get_xlabel()
 
 
-def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
-    with style():
-        axes = loss_figures.loss_by_mechanism(data).axes[0]
+def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data, drawn):
+    axes = drawn["loss_by_mechanism"].axes[0]
     large, small = (c for c in axes.containers if isinstance(c, BarContainer))
     for k, cell in enumerate(data.cells):
         top = small[k].get_y() + small[k].get_height()
@@ -315,12 +307,10 @@ def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
         np.testing.assert_allclose(np.ptp(ends, axis=1), [1e3 * (e.high - e.low) for e in found])
 
 
-def test_jump_densities_integrate_to_the_number_of_jumps(data):
-    with style():
-        figure = loss_figures.jump_energies(data)
+def test_jump_densities_integrate_to_the_number_of_jumps(data, drawn):
     cell = data.cell(0.7, 0.01)
     total = 0.0
-    for axes in figure.axes[:2]:
+    for axes in drawn["jump_energies"].axes[:2]:
         label = r"$\gamma$ = 0.01 J/m²"
         patch = next(p for p in axes.patches if p.get_label() == label)
         values, edges, _ = patch.get_data()
@@ -337,7 +327,9 @@ def states(*penetrations: float) -> Campaign:
     return parse_campaign(text.replace("field_nodes = 256", listed))
 
 
-def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp_path, undrawn):
+def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
+    tmp_path, undrawn, quick_figures
+):
     """The paper's captions: Fig. 3 γ = 0.01, Fig. 4 Δ~ = 0.4, Fig. 8 H = 0.7 and Δ~ = 0.7."""
     for kept, drawn_at, said in (
         ((0.3, 0.4, 0.7, 0.9), 9 * 0.045, ("", "")),  # the nearest of 20 load steps
@@ -345,12 +337,11 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp
     ):
         plan = states(*kept)
         path = write(tmp_path / f"{len(kept)}.h5", plan, rows(plan))
+        undrawn += ["fig3_shapes", "fig4_spectra_of_branches"]
         data = write_report(path, tmp_path / str(len(kept)), io.StringIO())
         page = (tmp_path / str(len(kept)) / "report.md").read_text(encoding="utf-8")
         caption = dict(re.findall(r"\*\*.*\(paper's (.*)\)\.\*\* (.*) \(\[PDF", page))
-        with style():
-            shapes = shapes_and_spectra.shapes(data)
-            both = shapes_and_spectra.spectra_of_branches(data)
+        shapes, both = (quick_figures[name] for name in undrawn[-2:])
         assert "H = 0.8, $\\gamma$ = 0.01 J/m²" in shapes.axes[0].get_title(loc="left")
         assert "is at H = 0.8, γ = 0.01 J/m². Its separations" in caption["Fig. 3"]
         for axes, gamma in zip(both.axes, (0.01, 0.04), strict=True):
@@ -383,55 +374,51 @@ def test_a_campaign_without_the_papers_values_draws_what_it_has(tmp_path):
     assert said.endswith("; the nearest to it here is H = 0.5, γ = 0.02 and 0.05 J/m².")
 
 
-def test_shapes_show_the_surface_above_the_profile(data):
+def test_shapes_show_the_surface_above_the_profile(data, drawn):
     """In the frame of the profile, so that branches of different separation can be compared."""
-    with style():
-        figure = shapes_and_spectra.shapes(data)
+    figure = drawn["fig3_shapes"]
     assert len(figure.axes) == 6
     cell = data.cell(0.8, 0.01)
     shape = cell.fields.shape
-    drawn = lines_of(figure.axes[0])
-    assert len(drawn["rigid"]) == 4 * 255 + 1  # 256 nodes would be seen as a polygon
-    nodes = drawn["rigid"][::4, 1], drawn["unloading"][::4, 1]
+    lines = lines_of(figure.axes[0])
+    assert len(lines["rigid"]) == 4 * 255 + 1  # 256 nodes would be seen as a polygon
+    nodes = lines["rigid"][::4, 1], lines["unloading"][::4, 1]
     np.testing.assert_allclose(nodes[0], 1e6 * shape.height, atol=1e-9)
     above = shape.displacement[1, -1] - shape.height
     np.testing.assert_allclose(nodes[1] - nodes[0], 1e6 * (above - above.min()), atol=1e-9)
     assert (nodes[1] - nodes[0]).min() == pytest.approx(0, abs=1e-9)  # they touch
     detail = lines_of(figure.axes[1])["rigid"]
-    assert detail[:, 1].max() == pytest.approx(drawn["rigid"][:, 1].max())
-    assert len(detail) < len(drawn["rigid"]) / 3
+    assert detail[:, 1].max() == pytest.approx(lines["rigid"][:, 1].max())
+    assert len(detail) < len(lines["rigid"]) / 3
 
 
-def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, undrawn):
+def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, undrawn, quick_figures):
+    undrawn.append("fig7_loop_against_penetration")
     for count, said in ((5, ""), (8, "6 of 8 γ")):
         plan = campaign(hurst=(0.7,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
         path = write(tmp_path / f"{count}.h5", plan, rows(plan))
-        data = write_report(path, tmp_path / str(count), io.StringIO())
-        with style():
-            axes = loops.loop_against_penetration(data).axes[0]
+        write_report(path, tmp_path / str(count), io.StringIO())
+        axes = quick_figures["fig7_loop_against_penetration"].axes[0]
         assert len([k for k in lines_of(axes) if "unloading" in k]) == min(count, 6)
         page = (tmp_path / str(count) / "report.md").read_text(encoding="utf-8")
         assert ("Figures with a panel" in page) is bool(said)
         assert said in page
 
 
-def test_spectra_carry_both_reference_slopes(data):
-    with style():
-        axes = shapes_and_spectra.spectra_on_loading(data).axes[1]
-    drawn = lines_of(axes)
+def test_spectra_carry_both_reference_slopes(data, drawn):
+    lines = lines_of(drawn["fig5a_spectra_loading"].axes[1])
     for label, slope in (("slope -2.6", -2.6), ("slope -2.8", -2.8), ("rigid", -2.6)):
-        x, y = np.log(drawn[label]).T
+        x, y = np.log(lines[label]).T
         assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(slope, abs=1e-5)
-    x, y = np.log(drawn["0.90"]).T
+    x, y = np.log(lines["0.90"]).T
     assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(-2.8, abs=1e-3)
     rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in mechanism_tables.slopes(data).rows}
     assert rows_of[0.7, 0.01, "unloading", 0.9] == pytest.approx(-2.7, abs=1e-3)
 
 
-def test_densities_are_drawn_as_they_are(data):
-    with style():
-        heights = lines_of(shapes_and_spectra.height_density(data).axes[0])
-        loading, unloading, *_ = map(lines_of, shapes_and_spectra.gap_density(data).axes)
+def test_densities_are_drawn_as_they_are(drawn):
+    heights = lines_of(drawn["fig9_height_density"].axes[0])
+    loading, unloading, *_ = map(lines_of, drawn["fig8_gap_density"].axes)
     near_zero = heights["H = 0.8"][np.abs(heights["H = 0.8"][:, 0]).argmin()]
     assert near_zero[1] == pytest.approx(heights["Gaussian"][:, 1].max(), rel=0.02)
     assert len(loading) == len(unloading) == 3
@@ -441,10 +428,9 @@ def test_densities_are_drawn_as_they_are(data):
         np.testing.assert_array_equal(gaps[:, 0], GAP_BINS[1:-1])
 
 
-@pytest.mark.usefixtures("report")
-def test_every_figure_is_legible_at_column_width_in_colour_and_grey(monkeypatch, tmp_path):
+def test_every_figure_is_legible_at_column_width_in_colour_and_grey(drawn, monkeypatch, tmp_path):
     monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)  # laid out, but not drawn
-    for name, figure in FIGURES.items():
+    for name, figure in drawn.items():
         save(figure, tmp_path / name)
         width = figure.get_size_inches()[0] * 25.4
         assert width == pytest.approx(85) or width == pytest.approx(175)
@@ -461,16 +447,6 @@ def test_every_figure_is_legible_at_column_width_in_colour_and_grey(monkeypatch,
                     continue
                 looks = (line.get_color(), str(line.get_linestyle()), str(line.get_marker()))
                 assert solid.setdefault(looks, line.get_label()) == line.get_label(), name
-
-
-def test_drawing_leaves_the_style_of_the_caller_alone(data):
-    before = dict(mpl.rcParams)
-    with style():
-        LOOPS[0].draw(data)
-    assert dict(mpl.rcParams) == before
-
-
-# ---------------------------------------------------------------------- page and command
 
 
 def test_the_page_embeds_every_figure_that_exists(report):
@@ -545,32 +521,18 @@ def test_one_finished_task_of_one_cell_is_enough(tmp_path, quick_figures):
     assert parts == ["averages", "tables", *figures, "pages"]
 
 
-# ---------------------------------------------------------------------- findings
-
-
 @pytest.mark.parametrize(
     ("losses", "verb"),
-    [
-        ((1.0, 2.0, 3.0), "grows with m2"),
-        ((3.0, 2.0, 1.0), "falls with m2"),
-        ((1.0, 3.0, 2.0), "is not monotone in m2"),
-    ],
+    [((1, 2, 3), "grows with"), ((3, 2, 1), "falls with"), ((1, 3, 2), "is not monotone in")],
 )
 def test_the_order_of_the_losses_in_m2_is_reported_as_one_through_hurst(losses, verb):
-    cells = [
-        SimpleNamespace(
-            work_of_adhesion=0.04,
-            done=9,
-            estimates={
-                "m2": SimpleNamespace(mean=1e-3 * (k + 1)),
-                "loss": SimpleNamespace(mean=loss),
-            },
-        )
-        for k, loss in enumerate(losses)
-    ]
+    cells = []
+    for k, loss in enumerate(losses):
+        means = {"m2": SimpleNamespace(mean=1e-3 * (k + 1)), "loss": SimpleNamespace(mean=loss)}
+        cells.append(SimpleNamespace(work_of_adhesion=0.04, done=9, estimates=means))
     data = SimpleNamespace(works_of_adhesion=(0.04,), cells=cells)
     (sentence,) = findings._order_in_slope(data, of_paper=False)
-    assert sentence == f"Through H, the mean loss in J/m² {verb} at γ = 0.04 J/m²."
+    assert sentence == f"Through H, the mean loss in J/m² {verb} m2 at γ = 0.04 J/m²."
 
 
 def test_findings_compare_with_the_paper(data):
@@ -598,31 +560,18 @@ def test_findings_compare_with_the_paper(data):
 
 def test_contact_is_compared_at_equal_load():
     """Unloading has twice the contact of loading at each stress, by construction."""
-
-    class Fake:
-        done = 3
-
-    class Curve:
-        def __init__(self, mean):
-            self.mean = np.asarray(mean, dtype=float)
-
     stress = np.linspace(-1, 3, 41)
-    fake = Fake()
-    fake.curves = {
-        "loading_mean_stress_dimensionless": Curve(stress),
-        "loading_contact_fraction": Curve(0.1 * (stress + 1.5)),
-        "unloading_mean_stress_dimensionless": Curve(np.concatenate([stress[::-1], [-0.5, 0.0]])),
-        "unloading_contact_fraction": Curve(
-            np.concatenate([0.2 * (stress[::-1] + 1.5), [0.01, 0.0]])
-        ),
+    curves = {
+        "loading_mean_stress_dimensionless": stress,
+        "loading_contact_fraction": 0.1 * (stress + 1.5),
+        "unloading_mean_stress_dimensionless": np.append(stress[::-1], [-0.5, 0.0]),
+        "unloading_contact_fraction": np.append(0.2 * (stress[::-1] + 1.5), [0.01, 0.0]),
     }
+    curves = {name: SimpleNamespace(mean=mean) for name, mean in curves.items()}
+    fake = SimpleNamespace(done=3, curves=curves)
     assert findings.area_ratio(fake) == pytest.approx(2)
-    name = "unloading_mean_stress_dimensionless"
-    fake.curves[name] = Curve(fake.curves[name].mean - 10)
+    curves["unloading_mean_stress_dimensionless"].mean -= 10
     assert findings.area_ratio(fake) is None
-
-
-# ---------------------------------------------------------------------- beside other campaigns
 
 
 def companion(tmp_path, name: str, factor: float, **replaced: str) -> Path:
@@ -686,9 +635,6 @@ def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
         if h < 0.9
     ]
     assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(found))):.1f} %" in sentence
-
-
-# ---------------------------------------------------------------------- how well it is known
 
 
 def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):
@@ -765,7 +711,7 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
 
 
 def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
-    """By their tension over the strength, or by a range that is long beside edge_range."""
+    """By their tension over the strength, or a range that is long beside edge_range; with zones."""
     text = text_of(hurst=(0.7,), gamma=(0.02,), realisations=4)
     plan = parse_campaign(text.replace("poisson = 0.5", "poisson = 0.5\nstrength = 1e9"))
     values = rows(plan)
@@ -777,25 +723,17 @@ def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
     values["valid_range"][1] /= 1.02
     values["barrier"][3], values["edge_range"][3] = 1e-9, 9 * 0.02 / 1e9
     values["touch_range"][2] = 0.99 * 0.02 / 1e9
+    values["zone_error"][:] = [1e-6, 2e-6, 3e-6, 4e-6]
     path = write(tmp_path / "r.h5", plan, values)
+    table = loss_tables.losses(aggregate(path))
+    (place,) = (k for k, column in enumerate(table.columns) if column.heading == "± zones")
+    assert table.columns[place].name == "zone_error_mean [J/m^2]"
+    assert table.rows[0][place] == pytest.approx(2.5e-6)
     status = read_status(path)
     assert [row["row"] for row in status["beyond_limit"]] == [1, 2, 3]
     assert "3 losses are doubtful: the tension inside patches exceeds" in as_text(status)
     (warning,) = (text for text in findings.quality(aggregate(path)) if "patches open" in text)
     assert warning.startswith("WARNING: 3 of 4 losses")
-
-
-def test_the_table_of_losses_says_what_zones_at_edges_change(tmp_path):
-    text = text_of(hurst=(0.7,), gamma=(0.02,), realisations=4)
-    plan = parse_campaign(text.replace("poisson = 0.5", "poisson = 0.5\nstrength = 1e9"))
-    values = rows(plan)
-    values["opening_strength"][:] = 1e9
-    values["zone_error"][:] = [1e-6, 2e-6, 3e-6, 4e-6]
-    table = loss_tables.losses(aggregate(write(tmp_path / "r.h5", plan, values)))
-    names = [column.name for column in table.columns]
-    place = names.index("zone_error_mean [J/m^2]")
-    assert table.rows[0][place] == pytest.approx(2.5e-6)
-    assert table.columns[place].heading == "± zones"
 
 
 def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, undrawn):

@@ -1,7 +1,5 @@
 """Averages, tables, curves and figures of a campaign on further axes than H and γ."""
 
-from __future__ import annotations
-
 import csv
 import io
 import pickle

@@ -1,7 +1,5 @@
 """No silence while something takes long: a line every so often, and none of what is over."""
 
-from __future__ import annotations
-
 import io
 import sys
 import time

@@ -1,7 +1,5 @@
 """Saved loops and paths: what was saved is loaded, and nothing else, from whatever a file holds."""
 
-from __future__ import annotations
-
 import os
 import random
 from collections.abc import Callable
@@ -30,14 +28,12 @@ def loop() -> adhesis.LoopResult:
 
 @pytest.fixture(scope="module")
 def content(loop: adhesis.LoopResult, tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """Return the bytes of the saved loop."""
     path = tmp_path_factory.mktemp("saved") / "loop.nc"
     loop.save(path)
     return path.read_bytes()
 
 
 def refusal(path: Path) -> str:
-    """Return the sentence with which a file is refused."""
     with pytest.raises(InputError) as error:
         adhesis.load(path)
     sentence = str(error.value)
@@ -87,9 +83,6 @@ def test_another_program_that_writes_leaves_no_checksum(content: bytes, tmp_path
     assert "checksum" in refusal(path)
 
 
-# ------------------------------------------------------- crafted files with a right checksum
-
-
 STRESS = "mean_stress"
 
 
@@ -125,9 +118,7 @@ CRAFTED: dict[str, Callable[[h5py.File, Path], object]] = {
 
 
 @pytest.mark.parametrize("name", CRAFTED)
-def test_what_would_be_read_from_elsewhere_or_fill_the_memory_is_refused(
-    name: str, content: bytes, tmp_path: Path
-) -> None:
+def test_what_would_be_read_from_elsewhere_or_fill_the_memory_is_refused(name, content, tmp_path):
     path, pipe = tmp_path / "loop.nc", tmp_path / "pipe"
     os.mkfifo(pipe)
     path.write_bytes(content[:-SEAL])

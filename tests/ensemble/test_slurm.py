@@ -57,7 +57,6 @@ class Cluster:
     env: dict[str, str]
 
     def call(self, *command: str | Path, cwd: Path | None = None) -> str:
-        """Run a command of Slurm's; its output."""
         done = subprocess.run(
             command, env=self.env, cwd=cwd, capture_output=True, text=True, timeout=150, check=False
         )
@@ -65,13 +64,11 @@ class Cluster:
         return done.stdout
 
     def job(self, number: str) -> dict[str, str]:
-        """Return the output of scontrol on a job."""
         text = self.call("scontrol", "--oneliner", "show", "job", number)
         pairs = [word.partition("=") for word in text.split()]
         return {key: value for key, _, value in pairs}
 
     def logs(self) -> str:
-        """How the daemons' logs end."""
         texts = []
         for path in sorted(self.folder.glob("*.log")):
             texts.append(f"--- {path.name}\n" + "\n".join(path.read_text().splitlines()[-15:]))
@@ -209,7 +206,6 @@ class Job:
     env: dict[str, str]
 
     def again(self, *words: str) -> Job:
-        """Submit the same campaign once more, from the same folder."""
         words = ("sbatch", "--parsable", "--ntasks=2", str(SCRIPT), "study.toml", *words)
         done = subprocess.run(words, env=self.env, cwd=self.folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
@@ -217,21 +213,17 @@ class Job:
 
     @property
     def values(self) -> dict[str, str]:
-        """Return the output of scontrol on the job."""
         return self.cluster.job(self.number)
 
     @property
     def log(self) -> str:
-        """Return what all its starts have written."""
         path = self.folder / f"adhesis-{self.number}.log"
         return path.read_text() if path.exists() else ""
 
     def done_tasks(self) -> int:
-        """Return the number of done rows in its results file."""
         return done_rows(self.folder / "study.h5")
 
     def staged_tasks(self) -> int:
-        """Return the number of done rows in its copy of the results file."""
         return done_rows(next(self.folder.glob("disk/*/study.h5"), self.folder / "none"))
 
     def wait(self, what: Callable[[], object], text: str, seconds: float = 90) -> None:
@@ -291,7 +283,6 @@ exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
 
 @pytest.fixture(scope="module")
 def jobs(cluster: Cluster, submit: Callable[..., Job]) -> dict[str, Job]:
-    """Every job of this module."""
     # Slurm looks at its clocks twice a minute and signals up to a minute early: soon, that is.
     limited = ("--ntasks=2", "--time=2", "--signal=B:USR1@85")
     jobs = {"limited": submit(*limited, realisations=10)}

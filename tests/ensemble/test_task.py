@@ -1,7 +1,5 @@
 """A task is a pure function: its row repeats to the bit and follows from the loop."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -145,7 +143,12 @@ def test_a_task_on_further_axes_has_the_bits_of_a_campaign_of_its_values():
     assert small["psd_height"].shape == one["psd_height"].shape
 
 
-TURNS = campaign_text(max_penetration="[0.3, 0.45, 0.6]", load_steps="12")
+def sharp(turns: str):
+    text = campaign_text(max_penetration=turns, load_steps="12", method='"sharp"')
+    return parse_campaign(text.replace("nodes_per_wave = 16\n", ""))
+
+
+TURNS = sharp("[0.3, 0.45, 0.6]")
 
 
 def bits(row):
@@ -156,9 +159,8 @@ def bits(row):
 
 def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_computed():
     """One alone, all in turn, some left out, out of order, after one that was given up."""
-    campaign = parse_campaign(TURNS)
-    first = campaign.tasks()[0]
-    tasks = campaign.sharing(first)
+    campaign = TURNS
+    tasks = campaign.sharing(campaign.tasks()[0])
     assert [campaign.at(task).cycle.max_penetration for task in tasks] == [0.3, 0.45, 0.6]
     alone = [bits(Runner()(campaign, task)) for task in tasks]
     together = Runner()
@@ -182,13 +184,7 @@ def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_compute
 
 def test_loops_that_share_a_loading_branch_are_those_of_campaigns_of_their_own():
     """Losses to the accuracy of jumps, curves and fields where the axes of a row have them."""
-
-    def sharp(turns):
-        text = campaign_text(max_penetration=turns, load_steps="12", method='"sharp"')
-        return parse_campaign(text.replace("nodes_per_wave = 16\n", ""))
-
-    campaign = sharp("[0.3, 0.45, 0.6]")
-    runner = Runner()
+    campaign, runner = TURNS, Runner()
     for task in campaign.sharing(campaign.tasks()[0]):
         turn = campaign.at(task).cycle.max_penetration
         own = sharp(str(turn))
@@ -251,18 +247,17 @@ def test_loads_share_a_loading_branch_and_what_runs_away_is_told():
 
 
 def test_the_time_of_a_shared_loading_branch_counts_once(monkeypatch):
-    """The sum over the loops is what the process took."""
     clock = iter(range(1000))
     process_time = "adhesis.ensemble.task.compute.time.process_time"
     monkeypatch.setattr(process_time, lambda: float(next(clock)))
-    campaign, runner = parse_campaign(TURNS), Runner()
+    campaign, runner = TURNS, Runner()
     rows = [runner(campaign, task) for task in campaign.sharing(campaign.tasks()[0])]
     assert [row["cpu_time"] for row in rows] == [1.0, 1.0, 1.0]
     assert next(clock) == 6
 
 
 def test_a_part_has_whole_loading_branches():
-    campaign = parse_campaign(TURNS)
+    campaign = TURNS
     parts = [Part(k, 3) for k in (1, 2, 3)]
     rows = [campaign.rows(part).tolist() for part in parts]
     assert sorted(row for part in rows for row in part) == list(range(campaign.task_count))
@@ -305,8 +300,6 @@ def test_a_loss_is_doubtful_where_it_misses_the_accuracy_asked_for():
     flags = doubtful(values, 1e-3)
     assert flags.tolist() == [False, True, True, True]
 
-
-# ---------------------------------------------------------------------- fields of chosen states
 
 KEPT_COLUMNS = [column.name for column in DATASETS if column.dims[0] == KEPT]
 

@@ -5,8 +5,6 @@ network only, and a whole node that dies. Needs root, namespaces and Open MPI; n
 machine's own network is touched, and the namespaces are removed afterwards.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
@@ -35,7 +33,6 @@ NAMES, ADDRESSES = ("nodea", "nodeb"), ("10.77.0.1", "10.77.0.2")
 
 
 def missing() -> str:
-    """Why this cannot be tried here; empty if it can."""
     lacking = [name for name in ("ip", "unshare", "mount", MPIRUN) if shutil.which(name) is None]
     if lacking:
         return f"no {', '.join(lacking)} here"
@@ -53,14 +50,12 @@ class Nodes:
     folder: Path
 
     def words(self, words: list[str]) -> list[str]:
-        """Return the command that runs another on the first node."""
         enter = 'mount --bind "$0" /etc/hosts && hostname nodea && exec "$@"'
         unshare = ["unshare", "--uts", "--ipc", "--mount", "bash", "-c", enter]
         inside = ["ip", "netns", "exec", self.spaces[0], *unshare]
         return [*inside, str(self.folder / "hosts"), *words]
 
     def launch(self, *words: object, fake: str) -> subprocess.Popen[str]:
-        """Start a fake campaign on two ranks of each node."""
         options = {
             "plm": "rsh",
             "plm_rsh_agent": str(self.folder / "agent"),
@@ -81,7 +76,6 @@ class Nodes:
         )
 
     def kill(self, node: int) -> None:
-        """Let a node die: every process on it, at once."""
         pids = subprocess.run(
             ["ip", "netns", "pids", self.spaces[node]], capture_output=True, text=True, check=True
         )
@@ -129,7 +123,6 @@ def nodes(tmp_path: Path) -> Iterator[Nodes]:
 
 
 def test_a_campaign_runs_over_two_nodes_and_outlives_one(nodes: Nodes, tmp_path: Path) -> None:
-    """The job ends promptly with a dead node; the next one goes on with what is left."""
     path, out, whole = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "whole.h5"
     assert adhesis_here("run", path, "--out", whole, fake="").returncode == 0
     process = nodes.launch("run", path, "--out", out, fake="hold=1")

@@ -1,7 +1,5 @@
 """Documentation that runs: code, commands, links and images of README and docs/; examples."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import shlex
@@ -13,7 +11,6 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
-from adhesis import prepare_trace, read_trace
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
@@ -48,7 +45,6 @@ class Block:
 
     @property
     def name(self) -> str:
-        """For messages."""
         return f"{self.page.relative_to(ROOT)}: {self.text.splitlines()[0][:60]}"
 
 
@@ -87,7 +83,6 @@ def is_of_commands(block: Block) -> bool:
 
 
 def is_transcript(block: Block) -> bool:
-    """Whether the block shows what it prints."""
     return block.language in ("console", "pycon") or block.text.startswith("$ ")
 
 
@@ -103,9 +98,6 @@ def commands(block: Block) -> list[str]:
 
 
 LINES = [(block, line) for block in BLOCKS if is_of_commands(block) for line in commands(block)]
-
-
-# ---------------------------------------------------------------------- code
 
 
 @pytest.mark.parametrize(
@@ -132,11 +124,7 @@ def test_campaigns_are_valid(block: Block) -> None:
     assert parse_campaign(block.text).tasks()
 
 
-# ---------------------------------------------------------------------- commands
-
-
 def example() -> str:
-    """Return the campaign that docs/campaign-file.md gives as an example."""
     block = next(b for b in BLOCKS if b.language == "toml" and b.page.name == "campaign-file.md")
     return block.text
 
@@ -168,7 +156,6 @@ def adhesis_words(line: str) -> list[str] | None:
 
 
 def is_run(line: str) -> bool:
-    """Whether a command is one that is run here."""
     words = adhesis_words(line)
     return words is not None and (words[0] in RUN or "--plan" in words)
 
@@ -242,12 +229,8 @@ def test_exit_codes_of_the_page_are_those_of_the_commands() -> None:
     assert listed == {int(code) for name, code in vars(exit_codes).items() if name.isupper()}
 
 
-# ---------------------------------------------------------------------- examples
-
-
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_run(path, monkeypatch, capsys):
-    """Each says something and draws something."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -262,23 +245,8 @@ def test_examples_run(path, monkeypatch, capsys):
     assert capsys.readouterr().out
 
 
-def test_the_made_up_measurement_is_read_as_it_was_made(tmp_path):
-    example = runpy.run_path(str(ROOT / "examples" / "measured_profile.py"))
-    example["write_made_up_measurement"](tmp_path / "t.csv")
-    trace = read_trace(tmp_path / "t.csv")
-    assert (trace.points, trace.drop_outs) == (2001, 3)
-    assert trace.length == pytest.approx(2e-3)
-    prepared = prepare_trace(trace)
-    assert prepared.spectrum.noise == pytest.approx(5e-9, rel=0.1)
-    assert 5e-6 <= prepared.cut_off < 10e-6
-
-
-# ---------------------------------------------------------------------- links and images
-
-
 @cache
 def is_picture(path: Path) -> bool:
-    """Whether an image can be read, and is none of a few pixels."""
     return bool(imread(path).shape[0] > 100)
 
 

@@ -1,7 +1,5 @@
 """The package: what it says of itself, its wheel, its public names, what a process loads."""
 
-from __future__ import annotations
-
 import ast
 import builtins
 import inspect
@@ -55,8 +53,6 @@ def test_the_wheel_works_in_a_bare_environment() -> None:
     assert "package: good" in done.stdout
 
 
-# ---------------------------------------------------------------------- public names
-
 REFERENCE = (ROOT / "docs" / "reference.rst").read_text()
 PUBLIC = sorted({*re.findall(r"auto\w+:: adhesis\.(\w+)$", REFERENCE, re.MULTILINE)} - {"open"})
 BESIDE = ["open"]
@@ -94,7 +90,6 @@ def test_a_star_import_leaves_the_built_in_names_alone() -> None:
     assert names["Profile"] is adhesis.Profile
 
 
-# ---------------------------------------------------------------------- modules that are loaded
 # (The rules of imports are contracts of import-linter, in pyproject.toml.)
 
 COMMANDS = """

@@ -1,7 +1,5 @@
 """No process that adhesis starts imports anything from the user's working directory."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -55,8 +53,6 @@ def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
     (answer,) = Loops([IMPOSSIBLE], 1).run().values()
     assert str(answer).startswith("ValueError")  # from the solver, so that was found
 
-
-# --------------------------------------------------------------------- the end of the parent
 
 PARENT = """
 import json, subprocess, sys, time

@@ -1,7 +1,5 @@
 """Set-up, launch scripts and packaging: what can be checked without installing anything."""
 
-from __future__ import annotations
-
 import ast
 import fcntl
 import importlib.metadata
@@ -91,17 +89,21 @@ def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
     assert stamp.stat().st_mtime_ns == before
 
 
+def copied(folder: Path) -> Path:
+    """Copy what set-up needs; returns its script."""
+    shutil.copytree(ROOT / "tools", folder / "tools")
+    for name in ("pyproject.toml", "requirements.lock", "requirements-test.lock"):
+        shutil.copy(ROOT / name, folder)
+    return folder / "tools" / "setup.sh"
+
+
 def test_an_older_python_is_named_before_anything_is_installed(tmp_path: Path) -> None:
     """By set-up; pip refuses it by requires-python."""
     old = tmp_path / "python3.10"
     old.write_text('#!/bin/sh\n[ "$1" = -V ] && echo Python 3.10.13 && exit 0\nexit 1\n')
     old.chmod(0o755)
-    shutil.copytree(ROOT / "tools", tmp_path / "tools")
-    for name in ("pyproject.toml", "requirements.lock", "requirements-test.lock"):
-        shutil.copy(ROOT / name, tmp_path)
     env = os.environ | {"PYTHON": str(old)}
-    words = [tmp_path / "tools" / "setup.sh"]
-    done = subprocess.run(words, env=env, capture_output=True, text=True, check=False)
+    done = subprocess.run([copied(tmp_path)], env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stdout == ""
     assert done.stderr == (
@@ -114,19 +116,13 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
     """Both would install into one .venv."""
     if shutil.which("flock") is None:
         pytest.skip("flock is missing here, without which set-up does not wait")
-    shutil.copytree(ROOT / "tools", tmp_path / "tools")
-    for name in ("pyproject.toml", "requirements.lock", "requirements-test.lock"):
-        shutil.copy(ROOT / name, tmp_path)
+    setup = copied(tmp_path)
     (tmp_path / ".setup").mkdir()
     env = os.environ | {"PYTHON": "/bin/false"}  # where it would end at once
     with (tmp_path / ".setup" / "lock").open("w") as first:
         fcntl.flock(first, fcntl.LOCK_EX)
         second = subprocess.Popen(
-            [tmp_path / "tools" / "setup.sh"],
-            env=env,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
+            [setup], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         assert second.stdout is not None
         line = second.stdout.readline()
@@ -138,7 +134,6 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
 
 
 def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
-    """Run a script with tools/parts.sh; its exit code and what it says."""
     (tmp_path / ".setup").mkdir(exist_ok=True)
     head = f"""
         set -eu

@@ -1,7 +1,5 @@
 """Bad input of every public function and class: one sentence with name, value and rule."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import re
@@ -311,8 +309,22 @@ Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, strength=1000000.0) ->
     ValueError: beside a strength of 1e+06 Pa: give
 make_method('grid', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0)) ->
     ValueError: method is 'grid' beside a work_of_adhesion_open
+make_method('grid', Problem(WAVE, SOLID, 0.004, adhesion_range=1e-9)) ->
+    ValueError: method is 'grid' beside a range or strength
+make_method('auto', Problem(WAVE, SOLID, 0.004, adhesion_range=1e-9), nodes_per_wave=64) ->
+    ValueError: nodes_per_wave is 64 beside a range or strength
 make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), nodes_per_wave=32) ->
     ValueError: nodes_per_wave is 32 beside a work_of_adhesion_open
+stripes(3, 1.0) -> ValueError: amplitude is 1.0: it must be
+stripes(0, 0.5) -> ValueError: count is 0: it must be
+AdhesionPattern([0.1]) -> ValueError: it must be 0
+AdhesionPattern([0, np.nan]) -> ValueError: coefficients of a pattern hold
+AdhesionPattern([0, 0.4, 0, 0.2]) -> ValueError: the work of adhesion to -0.2 of its mean
+Problem(WAVE, SOLID, 0.004, strength=1e7, pattern=stripes(2, 0.1)) ->
+    ValueError: is given beside a strength of 1e+07 Pa: give one of them
+Problem(WAVE, SOLID, 0.0, pattern=stripes(2, 0.1)) ->
+    ValueError: is given beside γ = 0: give one of them
+Problem(WAVE, SOLID, 0.004, pattern=0.3) -> TypeError: pattern is 0.3
 # units
 Problem(WAVE.scaled(1000000.0), SOLID, 0.04) ->
     ValueError: rms slope is 4,443: it must be a positive number from 1e-12 to 100; are heights
@@ -460,9 +472,6 @@ def test_a_generator_of_turning_points_is_followed_and_the_order_is_kept() -> No
     assert path(iter([0.5, 0.4]), load_steps=1, out=False).turning_points == (0.5, 0.4)
 
 
-# ---------------------------------------------------------------------- values
-
-
 def test_equal_values_are_equal_and_have_equal_hashes() -> None:
     other = Problem(single_wave(AMPLITUDE, PERIOD), HalfSpace(1e6, 0.5), 0.04)
     pairs: list[tuple[Any, Any]] = [
@@ -516,9 +525,6 @@ def test_an_array_that_was_given_stays_the_callers() -> None:
     profile = Profile(PERIOD, given)
     given[1] = 5.0
     assert profile.coefficients[1] == 1e-6
-
-
-# ---------------------------------------------------------------------- what is printed
 
 
 def test_warnings_are_printed_with_the_loop() -> None:

@@ -3,8 +3,6 @@
 The branch is one gap whose half-width is a = a0 + sqrt(d - d_fold); no elastic field is solved.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, ClassVar, cast
@@ -12,12 +10,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.branch import (
-    Fold,
-    Resolution,
-    StableBranch,
-    Target,
-)
+from adhesis.solver.sharp.continuation.branch import Fold, Resolution, StableBranch, Target
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 
 WAVE, FOLD = 1.0, 0.2
@@ -36,7 +29,6 @@ class Curve:
     source: ClassVar[Any] = SimpleNamespace(is_patterned=False)
 
     def point(self, at: float) -> Point:
-        """Point of the curve."""
         a = 0.5 + float(np.sqrt(at - FOLD))
         gaps = np.array([[3 - a, 3 + a]])
         field = SimpleNamespace(gaps=gaps, nearly=(-at * at, at), separation=at)
@@ -47,7 +39,6 @@ class Curve:
     def equilibrium(
         self, gaps: Any, at: float, reach: float, memory: Array | None = None
     ) -> Point | None:
-        """Point of the curve, if it is within reach."""
         self.asked += 1
         if at <= FOLD:
             return None

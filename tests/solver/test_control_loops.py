@@ -1,7 +1,5 @@
 """Loops under every control: the single wave against its closed form, rough profiles by audit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

@@ -23,12 +23,7 @@ from tests.support.dense import DenseSolution, dense_tangent, solve_densely
 SOLID = HalfSpace(1e6, 0.5)
 
 
-# ------------------------------------------------------------------ model of the openings
-
-
 class Solved(NamedTuple):
-    """Edges with their field."""
-
     gaps: np.ndarray
     separation: float
     edges: EdgeMechanics
@@ -36,27 +31,22 @@ class Solved(NamedTuple):
 
     @property
     def residual(self) -> np.ndarray:
-        """C - C_c."""
         return imbalance(self.solution.opening, self.gaps, self.edges.law)
 
     def openings(self, motion: np.ndarray) -> np.ndarray:
-        """Openings of the field after outward motions."""
         gaps = self.gaps + (motion * np.tile([1.0, -1.0], len(self.gaps))).reshape(-1, 2)
         return self.with_gaps(gaps).solution.opening
 
     def with_gaps(self, gaps: np.ndarray) -> Solved:
-        """Other edges, solved."""
         solution = solve_densely(gaps, self.separation, self.edges.model)
         return self._replace(gaps=gaps, solution=solution)
 
     def model(self) -> EdgeModel:
-        """Make the model about the edges."""
         law, panels, every = self.edges.law, self.edges.model.panels, np.arange(self.gaps.size)
         tangent = dense_tangent(self.gaps, self.separation, self.edges)
         return EdgeModel(every, self.gaps, self.residual, tangent, law, panels)
 
     def model_openings(self, motion: np.ndarray, steps: int = 400) -> np.ndarray:
-        """Openings of the model after outward motions in many equal steps."""
         model = self.model()
         for _ in range(steps):
             model.advance(motion / steps)
@@ -110,9 +100,6 @@ def test_openings_beside_a_narrow_patch_or_gap(rough, narrow, motion):
     assert error < 0.2 * np.abs(exact - before).max()
 
 
-# ------------------------------------------------------------------ steps
-
-
 @pytest.mark.parametrize("equal_speeds", [False, True])
 @pytest.mark.parametrize("count", [1, 3, 7, 8, 9, 41])  # kernels take blocks of eight rows
 def test_an_implicit_step_is_downhill_and_within_its_length(count, equal_speeds):
@@ -136,9 +123,6 @@ def test_a_model_without_a_minimum_has_none_at_any_distance():
     assert size < 1e-2 * distance_to_minimum(matrix, force)
     assert distance_to_minimum(matrix, force) == pytest.approx(0.1)
     assert distance_to_minimum(-matrix, force) == np.inf
-
-
-# ------------------------------------------------------------------ events
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Adhesion, turning points and controls at either end of what can be followed, and sharing."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import sys
@@ -41,16 +39,13 @@ def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) ->
     return Problem(WAVE, HalfSpace(young, 0.5), share * FULL, Control(stiffness * unit))
 
 
-# ---------------------------------------------------------------------- turning points
-
-
 @pytest.mark.parametrize("name", ["sharp", "grid"])
 def test_shallow_and_deep_loops_tend_to_limits(name):
     """At first touch alone, and next to full contact, where only the last gap closes further."""
-    problem = Problem(ROUGH, HALF_SPACE, 0.02)
+    problem, accuracy = Problem(ROUGH, HALF_SPACE, 0.02), 1e-2 if name == "grid" else 1e-3
 
     def loss(max_penetration: float) -> tuple[float, float]:
-        method = make_method(name, problem)
+        method = make_method(name, problem, accuracy=accuracy)
         loop = run_loop(method, max_penetration=max_penetration, load_steps=6)
         assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
         return loop.loss, loop.loss_error
@@ -66,9 +61,6 @@ def test_a_load_that_is_next_to_none_ends():
     loop = run_loop(make_method("sharp", problem), max_stress=1e-30, load_steps=6)
     deep = run_loop(make_method("sharp", problem), max_stress=1e-3, load_steps=6)
     assert loop.loss == pytest.approx(deep.loss, rel=1e-3)
-
-
-# ---------------------------------------------------------------------- adhesion
 
 
 @pytest.mark.parametrize("name", ["sharp", "grid", "auto"])
@@ -104,19 +96,14 @@ def test_no_adhesion_at_all_is_accepted_whatever_the_modulus():
         assert abs(loop.loss_dimensionless) < 1e-9
 
 
-# ---------------------------------------------------------------------- one rule of unloading
-
-
 @pytest.mark.parametrize(
     ("share", "stiffness", "turn", "load_steps"),
     [
-        (0.9, np.inf, 1e-4, 1),  # shallow: thousands of strokes to pull-off
-        (0.9, np.inf, 1e-6, 1),
+        (0.9, np.inf, 1e-6, 1),  # shallow: thousands of strokes to pull-off
         (1e-5, np.inf, 1e-6, 3),
         (50.0, np.inf, 0.999999, 1),
         (0.9, np.inf, 0.8, 6),  # 0.8 * 6 / 6 is not 0.8
         (0.2, 1.0, 1e-3, 1),
-        (0.2, 0.01, 0.1, 2),
         (0.2, 0.0, 1e-6, 1),
         (0.2, 0.0, 0.1, 4),
     ],
@@ -146,9 +133,6 @@ def test_turning_points_far_below_first_touch_are_marks_of_the_way_out():
     assert (minor.start, minor.turn) == (-0.3, -0.1)
     assert minor.closes
     assert path.work == pytest.approx(path.loss_from_drops, rel=1e-4)
-
-
-# ---------------------------------------------------------------------- what went wrong, in words
 
 
 def test_a_state_that_is_not_found_is_reported_in_the_units_of_the_turning_point(monkeypatch):
@@ -183,9 +167,6 @@ def test_full_contact_is_reported_with_where_it_happens(share, max_stress, where
     method = SharpMethod(wave_problem(share, 0.0))
     with pytest.raises(PathError, match=f"drawn into full contact {where}"):
         run_loop(method, max_stress=max_stress, load_steps=2)
-
-
-# ---------------------------------------------------------------------- threads and copies
 
 
 def methods(problem: Problem) -> list[Method]:

@@ -1,7 +1,5 @@
 """Density of the gap, against closed forms and brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -21,7 +19,6 @@ BINS = np.logspace(-4, 2, 97)
 
 
 def loaded(method: Method, penetration: float) -> ContactState:
-    """State on loading at a penetration."""
     found: list[ContactState] = []
     s = method.problem.separation(penetration)
     run_loop(

@@ -1,6 +1,4 @@
-"""Adhesion of a finite range: loops of ``sharp``, and the judge of benchmarks/finite_range.py."""
-
-from __future__ import annotations
+"""Adhesion of a finite range: loops of ``sharp`` against closed forms and other solutions."""
 
 import re
 from functools import cache
@@ -25,29 +23,8 @@ from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.nucleation.nucleation import Touch
-from benchmarks.finite_range import GridLoop
 from tests.support.dugdale_wave import DugdaleWave
 from tests.support.explicit_solution import explicit_openings
-
-WAVE = SingleWave(1.0, 2 * np.pi, 1.0, 0.09 * np.pi / 4)  # α = 0.3; lengths in 1/q0, E* = 1
-
-
-def loss_on_grid(delta: float, nodes_of_zone: float, places: float = 0.1) -> float:
-    zone = np.pi / 4 * delta**2 / WAVE.work_of_adhesion
-    nodes = 2 * round(np.pi * nodes_of_zone / zone)
-    height = np.cos(2 * np.pi * np.arange(nodes) / nodes + places)
-    grid = GridLoop(height, WAVE.work_of_adhesion, delta)
-    return float(grid.loss(0.5, delta, 0.01 * WAVE.loop.loss))
-
-
-def test_the_loss_of_a_wave_is_that_of_dugdales_law():
-    """Zero range is 6 % off."""
-    exact = DugdaleWave(WAVE, 0.03).loss
-    assert loss_on_grid(0.03, 4.0) == pytest.approx(exact, rel=0.015)
-    assert WAVE.loop.loss > 1.05 * exact
-
-
-# ---------------------------------------------------------------------- loops of sharp at a range
 
 A, PERIOD, SOLID = 1e-6, 1e-3, HalfSpace(1e6, 0.0)
 GAMMA = 0.04
@@ -58,6 +35,7 @@ def wave_of(alpha: float) -> SingleWave:
     return SingleWave(A, PERIOD, SOLID.modulus, gamma)
 
 
+@cache
 def loop_at(
     alpha: float, share: float, control: Control | None = None, turn: float = 0.7
 ) -> LoopResult:
@@ -85,8 +63,8 @@ def rough_loop(range_: float | None, change: str = "none") -> LoopResult:
 def touching_at(wave: SingleWave, range_: float, stiffness: float = np.inf) -> float:
     """Loss if surfaces jump together at a gap of ``range_``, edges being those of zero range."""
 
-    def prescribed(a: float) -> float:
-        return float(wave.separation(a)) - float(wave.mean_stress(a)) / stiffness
+    def prescribed(a: float | Array) -> Array:
+        return wave.separation(a) - wave.mean_stress(a) / stiffness
 
     most = 0.49 * wave.period if np.isinf(stiffness) else wave.stable_range(stiffness)[1]
     fold = minimize_scalar(
@@ -95,7 +73,7 @@ def touching_at(wave: SingleWave, range_: float, stiffness: float = np.inf) -> f
     )  # fmt: skip
     touched = brentq(lambda a: prescribed(a) - wave.amplitude - range_, fold.x, most)
     widths = np.linspace(fold.x, touched, 4001)
-    return float(np.trapezoid(wave.mean_stress(widths), [prescribed(a) for a in widths]))
+    return float(np.trapezoid(wave.mean_stress(widths), prescribed(widths)))
 
 
 def minima(theta: Array, opening: Array) -> list[float]:
@@ -116,12 +94,9 @@ def minima(theta: Array, opening: Array) -> list[float]:
     [
         (0.1, 0.01, 3e-4),
         (0.1, 0.02, 5e-3),
-        (0.3, 0.01, 1e-5),
         (0.3, 0.05, 6e-4),
         (0.3, 0.1, 8e-3),
-        (0.5, 0.01, 1e-5),
         (0.5, 0.05, 1e-4),
-        (0.5, 0.1, 7e-4),
         (0.5, 0.2, 1e-2),
     ],
 )
@@ -242,11 +217,3 @@ def test_a_minor_loop_inside_the_range_closes():
     path = run_path(make_method("sharp", problem), [0.7, 0.1, 0.5], load_steps=10)
     assert [loop.closes for loop in path.minor_loops] == [True]
     assert path.work == pytest.approx(loop_at(0.3, 0.05).loss, rel=1e-4)
-
-
-def test_the_method_grid_refuses_a_range():
-    problem = loop_at(0.3, 0.05).problem
-    with pytest.raises(ValueError, match="method is 'grid' beside a range or strength"):
-        make_method("grid", problem)
-    with pytest.raises(ValueError, match="nodes_per_wave is 64 beside a range or strength"):
-        make_method("auto", problem, nodes_per_wave=64)

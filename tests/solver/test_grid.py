@@ -1,7 +1,5 @@
 """Method ``grid`` against closed forms, invariances, the energy audit and hard cases."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -40,9 +38,6 @@ def rough_profile() -> Profile:
 def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6, **options) -> LoopResult:
     method = grid_of(Problem(profile, HalfSpace(young, 0.5), gamma), **{"nodes": 512, **options})
     return run_loop(method, max_penetration=0.8, load_steps=12)
-
-
-# ------------------------------------------------------------------ rough profiles
 
 
 @pytest.fixture(scope="module")
@@ -119,16 +114,6 @@ def test_no_state_overlaps_not_even_before_a_touch_is_followed():
     assert least > -1.1e-6 * profile.h_max
 
 
-# ------------------------------------------------------------------ hard cases
-
-
-def test_nothing_touches_above_the_highest_crest():
-    method = wave_method(0.2, nodes=512)
-    path = method.follow(method.detached(3 * AMPLITUDE), 1.01 * AMPLITUDE)
-    assert [s.patches for s in path.states] == [0]
-    assert path.jumps == ()
-
-
 def test_first_touch_is_a_jump_at_the_highest_crest():
     profile = single_wave(AMPLITUDE, PERIOD).shifted(0.43 * PERIOD / 512)
     gamma = wave(0.2).work_of_adhesion
@@ -187,28 +172,12 @@ def test_without_adhesion_a_rough_loop_is_reversible():
     assert result.patches.max() > 3
 
 
-@pytest.mark.parametrize("hurst", [0.05, 0.5, 0.97])
+@pytest.mark.parametrize("hurst", [0.05, 0.97])
 def test_any_hurst_exponent_gives_an_audited_loop(hurst):
     profile = self_affine_profile(hurst, period=1e-3, n0=1, ratio=6, seed=1, h_rms=1e-7)
     result = rough_loop(profile, nodes=256)
     assert result.loss > 0
     assert abs(result.audit_residual) < 5e-3
-
-
-def test_more_than_two_hundred_patches():
-    crests = 256
-    a = np.zeros(crests + 1, dtype=complex)
-    a[crests] = AMPLITUDE / 2
-    a[1] = AMPLITUDE / 50
-    gamma = 0.01 * wave(0.2).work_of_adhesion / crests
-    method = GridMethod(Problem(Profile(PERIOD, a), HALF_SPACE, gamma), nodes_per_wave=8)
-    h_max = method.problem.profile.h_max
-    state = method.follow(method.detached(h_max), 0.7 * h_max).states[-1]
-    assert state.patches > 200
-    assert np.all(np.diff(state.edges.ravel()) > 0)
-
-
-# ------------------------------------------------------------------ input
 
 
 def test_number_of_nodes():

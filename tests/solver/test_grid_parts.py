@@ -1,7 +1,5 @@
 """Parts of the method ``grid``: conjugate gradients, edge compliance, relaxation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -47,9 +45,6 @@ def exact_energy(method: GridMethod, mask: np.ndarray, separation: float) -> flo
     return float(method.lattice.elastic.dx * (0.5 * stress @ target - gamma))
 
 
-# ------------------------------------------------------------------ conjugate gradients
-
-
 def test_energy_error_is_of_second_order_in_the_residual():
     method = rough()
     mask = random_contact(np.random.default_rng(0), method.nodes, 4)
@@ -75,9 +70,6 @@ def test_stalled_iteration_is_reported():
     # Full contact at a mean gap: no solution exists.
     with pytest.raises(RuntimeError, match="full contact has no solution"):
         solver.solve(contact, 1e-12)
-
-
-# ------------------------------------------------------------------ local compliance
 
 
 def schur(kernel: np.ndarray, nodes: np.ndarray, j: int) -> float:
@@ -131,9 +123,6 @@ def test_compliance_of_a_pair_of_edges_where_patches_fill_the_period(gap):
         exact = own - across @ np.linalg.solve(dense(kernel, nodes, nodes), across.T)
         found = compliance.across_gap(near, gap, n - gap - near)
         assert np.abs(found - exact).max() < 0.05 * exact[0, 0]
-
-
-# ------------------------------------------------------------------ relaxation
 
 
 def settle(method: GridMethod, separation: float) -> tuple[Contact, list[float]]:

@@ -1,7 +1,5 @@
 """Scenes far from the ordinary, as `make fuzz` draws them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -13,14 +11,13 @@ from tools.hostile import draw, judge
 
 @pytest.mark.parametrize("number", [2, 3, 4, 7])
 def test_a_hostile_loop_keeps_every_promise(number):
-    """Ends, no overlap, in order, audited; every fourth beside a far more accurate run."""
     scene = draw(5, number)
     found = judge(scene, number)
     assert found["wrong"] == []
     assert found["kind"] == ("tight" if number % 4 == 0 else "loop")
 
 
-@pytest.mark.parametrize(("number", "flagged"), [(21, True), (30, False)])
+@pytest.mark.parametrize(("number", "flagged"), [(21, True), (9, False)])
 def test_tension_above_the_strength_is_stated(number, flagged):
     """No state has more inside a patch unless the loss is doubtful for it."""
     found = judge(draw(41270, number, "range"), number)

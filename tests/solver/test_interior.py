@@ -1,7 +1,5 @@
 """The range of adhesion below which the zero-range limit holds: largest tension inside patches."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache
@@ -116,7 +114,7 @@ def test_valid_range_of_two_scenes_measured_apart(young, valid_range):
     assert loop_of(young, 25).valid_range == pytest.approx(valid_range, rel=0.1)
 
 
-@pytest.mark.parametrize(("young", "seed"), [(1e6, 1), (1e7, 1), (1e8, 0), (1e9, 2)])
+@pytest.mark.parametrize(("young", "seed"), [(1e6, 1), (1e9, 2)])
 def test_no_state_that_is_left_out_has_more_tension(young, seed):
     method, states = method_of(rough(seed=seed), young), []
     loop = run_loop(
@@ -128,17 +126,6 @@ def test_no_state_that_is_left_out_has_more_tension(young, seed):
     everywhere = method.largest_tension([state for state in states if state.patches])
     assert everywhere is not None
     assert loop.largest_interior_tension == pytest.approx(everywhere.tension, rel=0.02)
-
-
-def test_where_and_when_are_those_of_a_state_of_the_loop():
-    loop = loop_of(1e8)
-    found = loop.interior
-    assert found is not None
-    here = (loop.branch == found.branch) & (loop.penetration == found.penetration)
-    assert here.any()
-    assert found.branch == "unloading"
-    assert 0 <= found.position < PERIOD
-    assert loop.valid_range == loop.problem.work_of_adhesion / found.tension
 
 
 def test_grid_and_sharp_agree():
@@ -162,7 +149,6 @@ def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
 
 
 def test_strains_that_are_not_small_are_doubtful():
-    """By a tension of a third of E, or necks of a third of the period."""
     problem = loop_of(1e7).problem
     young, period = problem.half_space.young, problem.profile.period
     patches, stress = np.array([1, 0]), np.array([-0.4 * young, 0.0])
@@ -185,16 +171,21 @@ def test_without_adhesion_nothing_bounds_the_range():
     assert loop.warnings == ()
 
 
-def test_a_path_and_loops_with_one_loading_branch_know_it_too():
+def test_where_and_when_are_those_of_a_state_also_of_a_path_and_of_one_loading_branch():
     method, loop = method_of(rough(), 1e8), loop_of(1e8)
     path = run_path(method, [0.9], load_steps=20)
     assert path.interior == loop.interior
     assert path.narrowest_length == loop.narrowest_length
     assert path.warnings == ()
-    assert loop.interior is not None
+    found = loop.interior
+    assert found is not None
+    assert ((loop.branch == found.branch) & (loop.penetration == found.penetration)).any()
+    assert found.branch == "unloading"
+    assert 0 <= found.position < PERIOD
+    assert loop.valid_range == loop.problem.work_of_adhesion / found.tension
     (shared,) = run_loops(method, max_penetration=[0.9], load_steps=20)
     assert shared == loop
-    assert replace(path, interior=replace(loop.interior, tension=1e9)).warnings
+    assert replace(path, interior=replace(found, tension=1e9)).warnings
 
 
 def test_the_cohesive_zone_of_the_edge_range_is_as_long_as_the_narrowest_length():
@@ -221,9 +212,6 @@ def test_the_cohesive_zone_of_the_edge_range_is_as_long_as_the_narrowest_length(
 )
 def test_the_narrowest_length_is_beside_an_edge_that_moves(before, after, narrowest):
     assert _narrowest_moved(np.array(before), np.array(after), 1.0) == pytest.approx(narrowest)
-
-
-# ---------------------------------------------------------------------- ranges at edges and touches
 
 
 def dugdale_scene(alpha: float) -> tuple[LoopResult, SingleWave]:
@@ -302,9 +290,6 @@ def test_a_soft_control_moves_the_touches_by_what_it_gives():
     assert touch_stress([jump], [1], *states, Control(0.0)) == pytest.approx(0.5 * 0.1)
     free = np.array([1.0, 1.0]), np.array([0.0, 0.0]), np.array([0, 1])
     assert touch_stress([jump], [0], *free, Control(0.0)) == 0
-
-
-# ---------------------------------------------------------------------- range beyond the turn
 
 
 def next_touch() -> float:
@@ -388,7 +373,6 @@ def test_the_way_beyond_a_turn_is_one_of_the_separation(control):
 
 
 def test_nothing_is_known_beyond_a_path_that_cannot_be_followed(monkeypatch):
-    """The way up to there counts."""
     method, jump = method_of(rough(), 1e7), next_touch()
     loop = run_loop(method, max_penetration=jump - 0.03, load_steps=20)
     assert loop.turn_range == math.inf

@@ -1,7 +1,5 @@
 """What the handler of a signal raises arrives as it is, wherever the signal comes."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time
@@ -53,9 +51,6 @@ def loss(chosen: Method) -> tuple[str, str]:
     return loop.loss.hex(), loop.mean_stress.tobytes().hex()
 
 
-# ------------------------------------------------------------------------------ one kernel
-
-
 def test_a_signal_that_comes_in_a_long_kernel_ends_it(alarm):
     """A descent of many gaps takes seconds; its handler is called between two steps."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, seed=1, h_rms=1e-6)
@@ -75,9 +70,6 @@ def test_a_signal_that_comes_in_a_long_kernel_ends_it(alarm):
     assert time.perf_counter() - started < 60
 
 
-# ------------------------------------------------------------------------------ whole loops
-
-
 def test_a_loop_that_is_interrupted_anywhere_ends_in_what_was_raised(chosen):
     """Or it is done; and the same method gives the same bits afterwards."""
     expected = loss(chosen)
@@ -88,9 +80,6 @@ def test_a_loop_that_is_interrupted_anywhere_ends_in_what_was_raised(chosen):
     ended = [interrupted(lambda: loss(chosen), t) for t in rng.uniform(0, taken, INTERRUPTS)]
     assert set(ended) <= {"raised", "done"}
     assert loss(chosen) == expected
-
-
-# ------------------------------------------------------------------- what is not interrupted
 
 
 def test_an_interrupt_that_meets_the_start_of_a_thread_arrives_as_itself(monkeypatch):

@@ -1,7 +1,5 @@
 """The kinds of jumps, on the circle."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE, Jump, classify

@@ -1,7 +1,5 @@
 """Rule of descent: linear kinetics of the edges, in both methods, and the way off a saddle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -32,9 +30,6 @@ def race() -> Problem:
     return Problem(profile.scaled(1e-6 / profile.h_rms), SOLID, 0.07)
 
 
-# ------------------------------------------------------------------ one step
-
-
 @pytest.mark.parametrize("turn", range(4))
 def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     """Four equal edges on a ring: the way out is the same but for the place of its leader."""
@@ -48,11 +43,8 @@ def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     assert step[lead] == pytest.approx(0.1)
 
 
-# ------------------------------------------------------------------ a race
-
-
 @pytest.mark.parametrize("share", [1.0, 0.2])
-def test_a_race_ends_where_gradient_flow_does(share):
+def test_a_race_ends_where_gradient_flow_does_and_is_flagged_with_what_is_at_stake(share):
     """Explicit gradient flow with short steps: contact 0.3202 after the snap-in.
 
     It gave a loss of 5.178224 with jumps located to 5e-5 h_max. The loss is that at accuracy 1e-6.
@@ -60,16 +52,12 @@ def test_a_race_ends_where_gradient_flow_does(share):
     method = SharpMethod(race())
     method.edges.law.longest_step *= share
     result = run_loop(method, max_penetration=0.8, load_steps=20)
-    assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=1e-4)
-    assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
-
-
-def test_a_race_is_flagged_with_what_is_at_stake():
-    """Equal speeds end elsewhere at the first snap-in, and the loop says so."""
-    result = run_loop(SharpMethod(race()), max_penetration=0.8, load_steps=20)
     first = result.jumps[0]
+    assert first.contact_after == pytest.approx(0.3202, abs=1e-4)
+    assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
+    # equal speeds end elsewhere: the losses, 5.178 and 5.70, differ by about a tenth, and so do the
+    # energies of one jump
     assert first.raced
-    # the two losses, 5.178 and 5.70, differ by about a tenth; so do the energies of one jump
     assert 0.01 * result.loss < first.at_stake < result.loss
     assert result.races >= 1
     assert result.energy_at_stake == pytest.approx(sum(j.at_stake for j in result.jumps))
@@ -116,7 +104,6 @@ def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
     ids=["a patch goes or stays", "contact is lost or stays on a crest", "a shallow minimum"],
 )
 def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ratio, gamma, seed):
-    """Loops in which edges run past saddles and shallow minima, and could end elsewhere."""
     profile = self_affine_profile(hurst, period=1e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
 
     def loss_with(share: float) -> float:
@@ -197,11 +184,7 @@ def test_grid_sees_no_race_where_the_rules_agree():
     assert (result.races, result.energy_at_stake) == (0, 0)
 
 
-# ------------------------------------------------------------------ symmetry
-
-
 def equal_waves(n0: int, seed: int, g: float, shift: float = 0.0) -> Problem:
-    """Single harmonic: n0 equal crests."""
     profile = self_affine_profile(0.8, period=2e-3, n0=n0, ratio=1, seed=seed, h_rms=1e-6)
     gamma = g * SOLID.modulus * 1e-12 * profile.q0 * n0
     return Problem(profile.shifted(shift * 2e-3), SOLID, gamma)
@@ -222,15 +205,14 @@ def test_grid_leaves_equal_crests_as_sharp_does_and_a_coarse_one_tells_what_it_m
     """128 nodes: 4 in the first equilibrium width, and the loss is a quarter off."""
     problem = equal_waves(4, 499277, 0.00879)
     exact = loss(problem)
-    grids = {
-        nodes: run_loop(grid_of(problem, nodes=nodes), max_penetration=0.8, load_steps=10)
-        for nodes in (128, 512, 2048)
-    }
-    assert grids.pop(2048).loss_dimensionless == pytest.approx(exact, rel=5e-3)
-    for grid in grids.values():
-        reported = grid.loss_error / grid.loss
-        assert abs(grid.loss_dimensionless / exact - 1) < reported < 0.5
-        assert any("numerical error of the loss" in text for text in grid.warnings)
+    coarse, fine = (
+        run_loop(grid_of(problem, nodes=nodes), max_penetration=0.8, load_steps=10)
+        for nodes in (128, 2048)
+    )
+    assert fine.loss_dimensionless == pytest.approx(exact, rel=5e-3)
+    reported = coarse.loss_error / coarse.loss
+    assert abs(coarse.loss_dimensionless / exact - 1) < reported < 0.5
+    assert any("numerical error of the loss" in text for text in coarse.warnings)
 
 
 def test_two_folds_within_one_step_are_taken_in_their_order_or_flagged():

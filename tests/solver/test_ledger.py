@@ -1,7 +1,5 @@
 """The ledger of a path: every interval balances, and all losses are sums over it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

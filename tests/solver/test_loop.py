@@ -1,7 +1,5 @@
 """The loading path and the energy audit, with a method that is exact (Johnson's single wave)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 
 from adhesis import ContactState, Control, Path, Problem, run_loop, single_wave
 from adhesis.solver.loading.ledger import estimated_error
-from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
+from adhesis.solver.method import PathError
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
@@ -93,23 +91,12 @@ class _Untrue(ExactWave):
         )
 
 
-class _Sticking(Method):
+class _Sticking(ExactWave):
     """One patch that never comes off."""
-
-    name = "sticking"
 
     def follow(self, state: ContactState, separation: float) -> Path:
         patch = np.array([[0.0, 1e-4]])
         return Path((ContactState(separation, patch, -1.0, 0.0, 0.0, 0.1),), ())
-
-    def fields(self, state: ContactState, n: int) -> Fields:
-        raise NotImplementedError
-
-    def openings(self, state: ContactState) -> list[Opening]:
-        raise NotImplementedError
-
-    def report(self) -> MethodReport:
-        return MethodReport(self.name, self.chosen)
 
 
 def test_audit_catches_energy_drops_that_are_not_the_loss():
@@ -183,15 +170,3 @@ def test_a_drop_is_the_difference_of_the_energies_whatever_its_sign():
 def test_a_contact_that_never_detaches_is_reported():
     with pytest.raises(PathError, match="still in contact"):
         run_loop(_Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)
-
-
-def test_a_loop_prints_itself_in_a_few_lines():
-    result = run_loop(exact(0.3), max_penetration=0.5, load_steps=10)
-    lines = str(result).splitlines()
-    words = [line.split()[0] for line in lines]
-    names = ["profile", "contact", "cycle", "loss", "range", "audit", "error", "jumps"]
-    names += ["pull-off", "method"]
-    assert words == names + ["WARNING"] * len(result.warnings)
-    assert f"{result.loss:.6g} J/m², " in lines[3]
-    assert "(no tension inside patches; at edges: " in lines[4]
-    assert lines[7] == "jumps       1 snap-in, 1 pull-off"

@@ -1,7 +1,5 @@
 """A law of edges that is written here alone: what the contract in ``edge_law.hpp`` promises."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -23,12 +21,10 @@ class TwoWorks:
         self.law = PythonAdhesion(ratio > 1, 1.0, ratio, self.work, self.work_up_to)
 
     def work(self, theta: float, recedes: bool) -> tuple[float, float]:
-        """Return w and its slope."""
         self.asked += 1
         return (self.ratio if recedes else 1.0), 0.0
 
     def work_up_to(self, theta: float, recedes: bool) -> float:
-        """Integrate w."""
         return self.work(theta, recedes)[0] * theta
 
 

@@ -1,7 +1,5 @@
 """Paths of several legs: shared loading branches, minor loops, memory, and their audits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -17,9 +15,7 @@ from adhesis import (
     run_path,
     self_affine_profile,
 )
-from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.path_record import Axis
-from adhesis.solver.sharp.method import SharpMethod
 from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
 from tests.support.exact_wave import ExactWave
 
@@ -67,18 +63,6 @@ def test_unloading_from_between_two_load_steps_ends_at_each_load_step_below():
         np.testing.assert_allclose(on_axis[: len(way)], way, atol=1e-12)
 
 
-def test_a_loop_has_the_same_bits_whichever_others_were_followed_before_it():
-    profile = self_affine_profile(0.5, period=PERIOD, n0=3, ratio=16, seed=5, h_rms=1e-6)
-
-    def branch() -> LoadingBranch:
-        method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.005))
-        return LoadingBranch(method, [0.3, 0.7], load_steps=4)
-
-    after_another = branch()
-    after_another.loop(0.3)
-    assert np.array_equal(after_another.loop(0.7).energy, branch().loop(0.7).energy)
-
-
 @pytest.mark.parametrize("stiffness", [np.inf, 2e8])
 def test_minor_loops_are_found_and_audited(stiffness):
     """0.8 → 0.3 → 0.6 → out closes 0.3-0.6-0.3; a whole turn is work = energy change + drops."""
@@ -108,14 +92,6 @@ def test_the_single_wave_closes_every_minor_loop_without_loss():
     assert minor.closes
     assert abs(minor.loss) < 1e-6 * path.work
     assert path.work == pytest.approx(wave.loop.loss, rel=1e-4)
-
-
-def test_a_path_may_end_in_contact():
-    path = run_path(make_method("sharp", problem_of()), [0.8, 0.3], load_steps=8, out=False)
-    assert not path.ends_out
-    assert path.penetration[-1] == pytest.approx(0.3)
-    assert path.energy_change < 0
-    assert abs(path.audit_residual) < 1e-4
 
 
 def test_doubt_of_a_path_is_said_as_that_of_a_loop():

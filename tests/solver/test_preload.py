@@ -1,7 +1,5 @@
 """Loops that turn where the mean stress reaches a preload, and states by their mean stress."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Profiles: the spectral method, given heights, statistics and transformations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

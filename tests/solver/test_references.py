@@ -1,7 +1,5 @@
 """Full contact, Koiter's punch and the parabola, each checked independently."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -14,9 +12,6 @@ from adhesis.solver.references.single_wave import SingleWave
 from tests.support.dugdale_wave import DugdaleWave
 
 MODULUS = 1.3
-
-
-# ---------------------------------------------------------------------- full contact
 
 
 def rough():
@@ -63,9 +58,6 @@ def test_full_contact_is_the_limit_of_johnsons_wave():
     )
 
 
-# ---------------------------------------------------------------------- periodic punch
-
-
 def punch_separation(a: float, period: float, mean_stress: float) -> float:
     """Mean gap s of Koiter's strips of half-width a under the mean stress p̄."""
     return mean_stress * period / (np.pi * MODULUS) * np.log(np.sin(np.pi * a / period) ** 2)
@@ -99,9 +91,6 @@ def test_punch_limits_are_kendall_and_griffith():
     )
 
 
-# ---------------------------------------------------------------------- parabola
-
-
 def test_parabola_pull_off_is_the_least_load():
     radius, gamma = 2.5, 0.4
     a, load = parabola_pull_off(radius, MODULUS, gamma)
@@ -131,9 +120,6 @@ def test_parabola_load_solves_the_integral_equation(a):
     radius, gamma = 2.5, 0.05
     solved = solved_load(lambda x: x / radius, a, gamma)
     assert float(parabola_load(a, radius, MODULUS, gamma)) == pytest.approx(solved, rel=1e-10)
-
-
-# ---------------------------------------------------------------------- Dugdale's wave
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """What the mechanics ask of the process: one thread of linear algebra, and memory that is kept."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,17 +1,9 @@
 """Method sharp, whole loops: exact losses, the grid's limit, invariances and hard cases."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from adhesis import (
-    Problem,
-    Profile,
-    make_method,
-    run_loop,
-    self_affine_profile,
-)
+from adhesis import Problem, Profile, make_method, run_loop, self_affine_profile
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE
 
@@ -27,9 +19,6 @@ def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, s
     return run_loop(method, max_penetration=max_penetration, load_steps=load_steps)
 
 
-# ------------------------------------------------------------------ limit of the grid
-
-
 def test_grid_converges_to_sharp():
     """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
     problem = Problem(rough(n0=2, ratio=6), HALF_SPACE, 0.01)
@@ -42,30 +31,7 @@ def test_grid_converges_to_sharp():
     assert errors[1] < 2e-3
 
 
-@pytest.mark.parametrize("gamma", [1e-3, 1e-2, 1.0])
-def test_loop_integral_equals_the_sum_of_drops(gamma):
-    result = loop(rough(), gamma, accuracy=1e-4)
-    # For weak adhesion the loss is a small difference of two works: jumps located to 2e-6 h_max,
-    # some forty of them, bound the audit by a few 1e-5 of the work.
-    work = np.sum(np.abs(np.diff(result.separation)) * np.abs(result.mean_stress[1:]))
-    assert abs(result.loss - result.loss_from_drops) < 1e-4 * result.loss + 2e-5 * work
-
-
-def test_audit_at_paper_scale():
-    """Wave numbers 10 … 1000, H = 0.8, γ = 0.04: the audit closes to 1e-4 of the loss."""
-    result = loop(rough(1, n0=10, ratio=100), 0.04, load_steps=40)
-    assert abs(result.audit_residual) < 1e-4
-    assert result.patches[-1] == 0
-
-
-def test_loss_does_not_depend_on_the_load_steps():
-    """Jumps are located, so load steps only sample the curve."""
-    losses = [loop(rough(), 0.01, load_steps=n).loss for n in (5, 40)]
-    assert losses[0] == pytest.approx(losses[1], rel=1e-3)
-
-
-@pytest.mark.parametrize("gamma", [0.02, 0.1])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("seed", "gamma"), [(1, 0.02), (2, 0.1)])
 def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     """Edges that race make a path sensitive; steps that are minima in their box decide it."""
     profile = rough(seed)
@@ -81,9 +47,6 @@ def test_touching_is_looked_for_before_a_branch_ends():
     """Surfaces touch at s = 0.10517 h_max, just before a branch that is followed finely ends."""
     losses = [loop(rough(5, n0=10, ratio=100), 0.04, accuracy=a).loss for a in (1e-3, 1e-5)]
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
-
-
-# ------------------------------------------------------------------ hard cases
 
 
 def test_no_loss_without_adhesion():
@@ -104,9 +67,8 @@ def test_first_touch_may_run_to_almost_full_contact():
     assert abs(result.audit_residual) < 1e-3
 
 
-@pytest.mark.parametrize("hurst", [0.501, 0.999])
-def test_extreme_hurst_exponents(hurst):
-    result = loop(rough(hurst=hurst), 0.01)
+def test_a_hurst_exponent_next_to_1():
+    result = loop(rough(hurst=0.999), 0.01)
     assert abs(result.audit_residual) < 1e-3
     assert result.loss > 0
 
@@ -140,17 +102,16 @@ def test_partial_loops_close():
     """Unload half-way from a state that a jump reached, reload: the same state returns."""
     profile = rough(4)
     method = make_method("sharp", Problem(profile, HALF_SPACE, 0.005))
-    state = method.detached(profile.h_max)
-    for penetration in np.linspace(0, 0.6, 13):
-        state = method.follow(state, profile.h_max * (1 - penetration)).states[-1]
-    turned = state
-    for penetration in [*np.linspace(0.55, 0.2, 8), *np.linspace(0.25, 0.6, 8)]:
-        state = method.follow(state, profile.h_max * (1 - penetration)).states[-1]
-    assert state.energy <= turned.energy + 1e-9 * abs(turned.energy)
-    again = state
-    for penetration in [*np.linspace(0.55, 0.2, 8), *np.linspace(0.25, 0.6, 8)]:
-        state = method.follow(state, profile.h_max * (1 - penetration)).states[-1]
-    assert state.mean_stress == pytest.approx(again.mean_stress, rel=1e-5)
+
+    def go(state, *penetrations):
+        for penetration in penetrations:
+            state = method.follow(state, profile.h_max * (1 - penetration)).states[-1]
+        return state
+
+    turned = go(method.detached(profile.h_max), 0.0, 0.3, 0.6)
+    once = go(turned, 0.2, 0.6)
+    assert once.energy <= turned.energy + 1e-9 * abs(turned.energy)
+    assert go(once, 0.2, 0.6).mean_stress == pytest.approx(once.mean_stress, rel=1e-5)
 
 
 def test_settling_at_the_same_separation_returns_the_state():

@@ -1,7 +1,5 @@
 """Method sharp, many gaps: the tree of gaps against the dense solution, and what it costs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -127,14 +125,12 @@ def loaded(profile):
 
 @pytest.fixture
 def many_gaps(loaded):
-    """Edges of many gaps, and a point of theirs."""
     method, state = loaded
     edges = method.edges
     return edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)
 
 
 def relaxed(edges, gaps, at):
-    """Return the minimum that a descent from these gaps leads to."""
     while not isinstance(gaps, Point):
         gaps, _ = edges.relax(gaps, at, edges.wave)
     return gaps

@@ -1,7 +1,5 @@
 """Johnson's single wave against quadrature, identities and limits that it was not written from."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -209,9 +207,6 @@ def test_no_state_beyond_full_contact_or_pull_off():
             w.half_width(s)
     for s in (1e-3 * A, 0.5 * A, A, 1.25 * A):
         assert float(w.separation(w.half_width(s))) == pytest.approx(s, rel=1e-12)
-
-
-# ------------------------------------------------------------------ other controls
 
 
 STIFFNESSES = (0.0, 0.1, 1.0, 10.0)  # in p*/A

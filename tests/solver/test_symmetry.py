@@ -1,9 +1,5 @@
 """Invariances of every kind of loop, mirror-symmetric profiles, and both measures of adhesion."""
 
-from __future__ import annotations
-
-from functools import cache
-
 import numpy as np
 import pytest
 
@@ -25,9 +21,6 @@ from tests.support.grids import grid_of
 
 SOFT = HalfSpace(1e6, 0.5)
 SHIFT = np.exp(1e-7j)
-
-
-# ---------------------------------------------------------------------- mirror, shift and scale
 
 
 def rough(n0: int, ratio: int, seed: int) -> Profile:
@@ -53,15 +46,10 @@ def loop_of(problem: Problem, turn: dict[str, float]) -> LoopResult:
     return run_loop(make_method("sharp", problem, accuracy=1e-4), **turn, load_steps=10)
 
 
-@cache
-def reference(name: str) -> LoopResult:
-    return loop_of(*SCENES[name][:2])
-
-
-@pytest.mark.parametrize(("lengths", "stresses"), [(1.0, 1.0), (2.0, 3.0)])
 @pytest.mark.parametrize("name", SCENES)
-def test_mirror_shift_and_scale_change_nothing(name, lengths, stresses):
+def test_mirror_shift_and_scale_change_nothing(name):
     """Of profile, material, interface and control; a loop of its own units, from the other side."""
+    lengths, stresses = 2.0, 3.0
     problem, turn, near = SCENES[name]
     profile, pattern, opened = problem.profile, problem.pattern, problem.work_of_adhesion_open
     other = Problem(
@@ -74,7 +62,8 @@ def test_mirror_shift_and_scale_change_nothing(name, lengths, stresses):
         pattern=pattern and pattern.mirrored().shifted(0.3),
     )
     scale = 1.0 if turn is DEEP else stresses
-    here, there = reference(name), loop_of(other, {k: scale * v for k, v in turn.items()})
+    here = loop_of(problem, turn)
+    there = loop_of(other, {k: scale * v for k, v in turn.items()})
     assert [jump.kind for jump in there.jumps] == [jump.kind for jump in here.jumps]
     assert len(here.jumps) > 2
     scale = stresses if "max_stress" in turn else 1.0
@@ -84,9 +73,6 @@ def test_mirror_shift_and_scale_change_nothing(name, lengths, stresses):
         assert getattr(there, value) == pytest.approx(expected, rel=near, abs=0)
     for value in ("valid_range", "edge_range", "touch_range"):
         assert getattr(there, value) == pytest.approx(lengths * getattr(here, value), rel=1e-3)
-
-
-# ---------------------------------------------------------------------- symmetric profiles
 
 
 def bumpy(wave: int, amplitude: float, shift: complex = 1.0) -> Profile:
@@ -130,8 +116,9 @@ def even_profile(seed: int) -> tuple[Profile, Profile, float, float]:
     return Profile(2e-3, amplitude.astype(complex)), Profile(2e-3, shifted), gamma, depth
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("seed", "accuracy"), [(0, 1e-2), (1, 1e-3), (2, 1e-4), (3, 1e-3), (0, 1e-4), (1, 1e-2)]
+)
 def test_a_random_symmetric_profile_loses_what_one_hardly_asymmetric_does(seed, accuracy):
     """Of touches and folds that are mirror images one comes first, in both."""
     even, shifted, gamma, depth = even_profile(seed)
@@ -173,8 +160,6 @@ def test_axes_and_equal_parts_of_a_profile():
         2,
     )
 
-
-# ---------------------------------------------------------------------- arc and flat measure
 
 PERIOD = 1e-3
 STEEP = Profile(PERIOD, 1e-5 * np.array([0, 1, 0.5j, -0.4, 0.3j, 0.2]))  # rms slope 0.12

@@ -1,7 +1,5 @@
 """Where surfaces touch: which of several places gets a patch, and how wide its seed is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -81,9 +79,7 @@ def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None
         (0.8, 8788061040437920, 0.01, 0.9),
     ],
 )
-def test_every_touch_of_paper_scale_is_located(
-    hurst: float, seed: int, gamma: float, depth: float
-) -> None:
+def test_every_touch_of_paper_scale_is_located(hurst, seed, gamma, depth):
     profile = self_affine_profile(
         hurst, period=2e-3 * np.pi, n0=10, ratio=100, seed=seed, h_rms=1e-6
     )

@@ -1,7 +1,5 @@
 """From heights to a period: what each step promises, on heights that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

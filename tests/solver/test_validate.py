@@ -1,7 +1,5 @@
 """The validation itself: an exact method passes, a slightly wrong one fails; then the real ones."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -86,13 +84,11 @@ class _Tense(ExactWave):
 
 
 def stickier(problem: Problem) -> ExactWave:
-    """Return the exact method for a work of adhesion that is 0.1 % too high."""
     gamma = 1.001 * problem.work_of_adhesion
     return exact(replace(problem, work_of_adhesion=gamma))
 
 
 def stiffer(problem: Problem) -> ExactWave:
-    """Return the exact method for a half-space that is 0.1 % too stiff."""
     half_space = HalfSpace(1.001 * problem.half_space.young, problem.half_space.poisson)
     return exact(replace(problem, half_space=half_space))
 
@@ -203,8 +199,8 @@ def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, 
 def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     """The whole of ``adhesis validate``; without --slow a part of the long claims.
 
-    Other α are in test_sharp_path.py, a trough that opens in test_opening.py, a stiffness and a
-    load in test_control_loops.py, audits of rough loops in test_grid.py and test_sharp.py.
+    Other α are in test_sharp_path.py, an opening trough in test_opening.py, controls in
+    test_control_loops.py, audits of rough loops in test_grid.py and test_touch.py.
     """
     alphas = validation.ALPHAS
     if not request.config.getoption("--slow"):

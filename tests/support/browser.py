@@ -1,7 +1,5 @@
 """Pages opened in a browser, which runs their scripts."""
 
-from __future__ import annotations
-
 import html
 import json
 import os

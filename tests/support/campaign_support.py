@@ -1,7 +1,5 @@
 """What the tests of campaigns share: campaigns, fake tasks, commands under mpirun."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
@@ -64,7 +62,6 @@ jumps = 8
 
 
 def campaign_text(**changes: str) -> str:
-    """Return the campaign with some values replaced, by key."""
     lines = CAMPAIGN.splitlines()
     for key, value in changes.items():
         place = next(i for i, line in enumerate(lines) if line.startswith(f"{key} = "))
@@ -73,7 +70,6 @@ def campaign_text(**changes: str) -> str:
 
 
 def write_campaign(folder: Path, name: str = "c.toml", **changes: str) -> Path:
-    """Write the campaign with some values replaced."""
     path = folder / name
     path.write_text(campaign_text(**changes))
     return path
@@ -143,7 +139,6 @@ def start(
 
 
 def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]:
-    """Run this interpreter to its end, in an environment in which it can start ranks."""
     return subprocess.run(
         [sys.executable, *map(str, words)],
         env=environment(**extra),
@@ -168,7 +163,6 @@ def ranks_of(launcher: int) -> list[int]:
 
 
 def has_ended(pid: int) -> bool:
-    """Return whether a process, of whichever parent, runs no more."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text()
     except OSError:
@@ -188,7 +182,6 @@ def hung_launchers() -> list[int]:
 
 
 def wait_until(condition: Callable[[], bool], seconds: float = 150.0, every: float = 0.02) -> None:
-    """Wait for a condition; AssertionError if it does not come true."""
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited too long"

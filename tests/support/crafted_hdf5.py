@@ -1,7 +1,5 @@
 """HDF5 files in which a dataset is not what its name promises."""
 
-from __future__ import annotations
-
 import h5py
 
 

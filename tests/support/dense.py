@@ -1,7 +1,5 @@
 """The field of given gaps by one dense matrix, and tangents by differences of it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

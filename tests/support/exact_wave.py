@@ -5,8 +5,6 @@ be measured alone, and other methods compared state by state. The adhesive area 
 the profile, as ``problem.Problem`` defines it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -30,26 +28,14 @@ from adhesis.solver.references.single_wave import SingleWave, WaveLoop
 
 @dataclass(frozen=True)
 class ExactWaveReport(MethodReport):
-    """Report with the only setting."""
-
     states_per_step: int
 
 
 class ExactWave(Method):
     """Johnson's single wave as a ``method.Method``.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its profile must be one wave over the whole period (harmonic 1 only).
-    states_per_step : int
-        Number of states that ``follow`` returns along the branch, evenly spaced in the contact
-        half-width, of which p̄ and s are smooth functions even at the fold.
-
-    Raises
-    ------
-    ValueError
-        If the profile is not a single wave.
+    ``follow`` returns ``states_per_step`` states along the branch, evenly spaced in the contact
+    half-width, of which p̄ and s are smooth functions even at the fold.
     """
 
     name: ClassVar[str] = "exact wave"
@@ -69,7 +55,6 @@ class ExactWave(Method):
         )
 
     def follow(self, state: ContactState, prescribed: float) -> Path:
-        """Follow the stable branch; see ``method.Method``."""
         control, amplitude = self.problem.control, self.wave.amplitude
         branch = self.problem.branch_to(state, prescribed)
         states: list[ContactState] = []
@@ -126,23 +111,15 @@ class ExactWave(Method):
         return [Opening(self.crest + x, self.wave.gap(x, a))]
 
     def report(self) -> ExactWaveReport:
-        """Return the only setting."""
         return ExactWaveReport(self.name, self.chosen, self.states_per_step)
 
     @cached_property
     def _loop(self) -> WaveLoop:
-        """The exact loop under the control."""
         control = self.problem.control
         return self.wave.loop if control.is_fixed else self.wave.loop_under(control.stiffness)
 
     def _contact_width(self, prescribed: float) -> float:
-        """Compute the half-width at x = ``prescribed``; beyond the branch, that at its end.
-
-        Raises
-        ------
-        PathError
-            If the wave has run to full contact.
-        """
+        """Compute the half-width at x = ``prescribed``; beyond the branch, that at its end."""
         control, loop = self.problem.control, self._loop
         end = control.prescribed(loop.fold_separation, loop.fold_mean_stress)
         if control.is_fixed:

@@ -7,8 +7,6 @@ the closure of every gap and by the mean gap. Gauss-Chebyshev nodes in each gap;
 in units of E*/2, lengths of 1/q0.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import dct
 

@@ -11,8 +11,6 @@ there is the file of ``free=FILE``,
 reach, ``full=BYTES`` no file may be written beyond so many bytes.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import signal
@@ -67,7 +65,6 @@ class FakeTask:
         self.begun = 0
 
     def __call__(self, campaign, task, progress=None):
-        """Compute as the words of the behaviour have it."""
         settings = self.settings
         self.begun += 1
         if "log" in settings:

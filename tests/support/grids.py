@@ -1,7 +1,5 @@
 """Grids with a given number of nodes."""
 
-from __future__ import annotations
-
 from adhesis import Problem
 from adhesis.solver.grid.method import GridMethod
 

@@ -5,8 +5,6 @@ makes of the length is the format's own convention: Dektak's extent is n - 1 ste
 tell the step, Igor the step, Mitutoyo positions from one step on, Mahr every position.
 """
 
-from __future__ import annotations
-
 import struct
 import zipfile
 from pathlib import Path

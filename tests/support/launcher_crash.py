@@ -6,8 +6,6 @@ libraries. Or two of its threads wait for each other at the same place, for ever
 can prevent that. A rank that crashes has another stack, and one that hangs is still there.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 

@@ -1,7 +1,5 @@
 """What starts ranks and jobs here, and why it cannot where it cannot."""
 
-from __future__ import annotations
-
 import os
 import shutil
 

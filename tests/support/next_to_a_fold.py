@@ -4,8 +4,6 @@ H = 0.7, γ = 0.01 J/m², the seed below: edges of its 33 gaps in units of 1/q0,
 on an edge is above the field's error.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 HURST, SEED, WORK_OF_ADHESION = 0.7, 3437691806060119, 0.01

@@ -1,7 +1,5 @@
 """Words of a command whose options are replaced by others."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 

@@ -1,7 +1,5 @@
 """Lines that name the tests under way while none ends, so that a long wait is never silent."""
 
-from __future__ import annotations
-
 import threading
 import time
 from typing import TextIO
@@ -13,11 +11,7 @@ class Waiting:
     """Write which tests are under way, whenever none has ended for some seconds.
 
     Of several processes, the one that hands the tests out is notified when each begins and ends.
-
-    Parameters
-    ----------
-    terminal : TextIO
-        Where the lines go: a stream of its own, which no test captures.
+    ``terminal`` is a stream of its own, which no test captures.
     """
 
     def __init__(self, terminal: TextIO) -> None:
@@ -28,7 +22,6 @@ class Waiting:
         threading.Thread(target=self._watch, daemon=True).start()
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
-        """Note the beginning of a test."""
         self._begun[nodeid] = time.monotonic()
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
@@ -37,7 +30,6 @@ class Waiting:
         self._last = time.monotonic()
 
     def pytest_sessionfinish(self) -> None:
-        """Write no more."""
         self._ended.set()
 
     def _watch(self) -> None:

@@ -1,7 +1,5 @@
 """The solid that several tests use."""
 
-from __future__ import annotations
-
 from adhesis import HalfSpace
 
 HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)

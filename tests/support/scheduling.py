@@ -5,23 +5,20 @@ on what another process does. Modules that start ranks or jobs stay together, to
 crowd each other out. What takes longest begins first.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py")
 LONG = (
-    *("ranks", "test_docs.py", "test_report.py", "test_staging.py", "test_kinetics.py"),
-    *("test_grid.py", "test_sharp_path.py", "test_notebook.py", "test_damage.py"),
-    *("test_precision.py", "test_sharp.py", "test_trace_answer.py", "test_run.py"),
-    *("test_preload.py", "test_finite_range.py", "test_every_claim", "test_extremes.py"),
-    *("test_hostile.py", "test_symmetry.py", "test_report_axes.py", "test_interior.py"),
-    *("test_merge.py", "test_store.py", "test_opened.py", "test_limits.py", "test_bench.py"),
+    *("ranks", "test_docs.py", "test_report.py", "test_kinetics.py", "test_trace_answer.py"),
+    *("test_notebook.py", "test_grid.py", "test_preload.py", "test_staging.py"),
+    *("test_sharp_path.py", "test_run.py", "test_merge.py", "test_precision.py", "test_damage.py"),
+    *("test_report_axes.py", "test_finite_range.py", "test_limits.py", "test_interior.py"),
+    *("test_extremes.py", "test_loop_command.py", "test_opened.py", "test_hostile.py"),
+    *("test_bench.py", "test_symmetry.py", "test_paths.py", "test_every_claim"),
 )
 
 
 def group_of(nodeid: str) -> str:
-    """Return what a test is run together with."""
     path, _, name = nodeid.partition("::")
     module = path.rpartition("/")[2]
     if module in RANKS:
@@ -37,7 +34,6 @@ def rank_of(nodeid: str) -> int:
 
 
 def scheduler(config: Any, log: Any) -> Any:
-    """Return what hands the groups out."""
     from xdist.scheduler import LoadScopeScheduling
 
     class Groups(LoadScopeScheduling):

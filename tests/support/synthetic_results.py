@@ -1,7 +1,5 @@
 """Results files with numbers whose averages are known, for the tests of aggregator and report."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py
@@ -56,7 +54,6 @@ def text_of(
 
 
 def campaign(*args, **changes) -> Campaign:
-    """Return the campaign of :func:`text_of`, by its arguments."""
     return parse_campaign(text_of(*args, **changes))
 
 
@@ -180,7 +177,6 @@ def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
 
 
 def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
-    """Write a results file with these rows."""
     create(path, campaign, attributes={"adhesis_version": "0.1.0"})
     with h5py.File(path, "r+") as file:
         for name, value in rows.items():

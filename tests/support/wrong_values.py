@@ -1,7 +1,5 @@
 """Numbers that break a rule, made from its bounds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -7,8 +7,6 @@ short at random places. Cases are judged in another process, so that a crash of 
 4 GB of memory. A case is repeated by its seed, kind and number.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import resource

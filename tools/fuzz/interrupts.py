@@ -15,8 +15,6 @@ that a crash is counted too.
     python tools/fuzz/interrupts.py --seed N [--seconds 60]
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import os
@@ -155,16 +153,10 @@ def without_children(ended: str) -> str:
 
 def children() -> list[int]:
     """Living processes that this one has started (Linux)."""
+    from tests.support.campaign_support import has_ended
+
     own = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-    states = {int(pid): _state(pid) for pid in own}
-    return [pid for pid, state in states.items() if state not in ("Z", "")]
-
-
-def _state(pid: str) -> str:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except OSError:
-        return ""
+    return [int(pid) for pid in own if not has_ended(int(pid))]
 
 
 CAMPAIGN = """

@@ -18,8 +18,6 @@ and none may have a tension inside a patch that exceeds the strength by more tha
 unless the loop's warnings state it.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
