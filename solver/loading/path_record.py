@@ -229,7 +229,7 @@ class Record:
                 raise PathError(
                     f"unloading does not end: surfaces are still in contact at {where}, "
                     f"{_FARTHEST:g} times the natural range of the profile; check the units of "
-                    f"work_of_adhesion, young and the heights, and try another accuracy"
+                    "work_of_adhesion, young and the heights, and try another accuracy"
                     f"{problem.or_other_method}"
                 )
             if first - i >= _STROKES_AT_STEP * axis.load_steps:

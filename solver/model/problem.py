@@ -163,7 +163,7 @@ class Problem(ByValue):
 
     @property
     def or_other_method(self) -> str:
-        """Return what an advice may end with, empty where ``sharp`` alone knows the law."""
+        """Return an alternative that ends an advice; empty where ``sharp`` alone knows the law."""
         sharp_alone = self.pinning > 0 or math.isfinite(self.strength)
         return "" if sharp_alone else " or the other method"
 

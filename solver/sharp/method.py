@@ -229,8 +229,8 @@ class SharpMethod(Method):
             at = failed.at if isinstance(failed, NoState) else target.at
             where = self.problem.describe_prescribed(self.states.to_si(at))
             raise PathError(
-                f"method 'sharp' finds no state at {where}: {failed}; another accuracy, other load "
-                f"steps{self.problem.or_other_method} may get past it"
+                f"method 'sharp' finds no state at {where}: {failed}; another accuracy or other "
+                f"load steps{self.problem.or_other_method} may get past it"
             ) from failed
         states = history.states
         if self.edges.pins:

@@ -16,6 +16,8 @@ from adhesis.solver.model.profile import Profile, self_affine_profile, single_wa
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
 from adhesis.solver.sharp.continuation.branch import StableBranch
+from adhesis.solver.sharp.continuation.follower import Follower
+from adhesis.solver.sharp.errors import NoState
 from tools.hostile import draw
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
@@ -222,3 +224,15 @@ def test_an_edge_that_turns_back_within_a_step_is_pinned_where_it_was_furthest()
     assert coarse.loss == pytest.approx(fine.loss, rel=1e-5)
     assert coarse.loss_from_drops == pytest.approx(fine.loss_from_drops, rel=1e-5)
     assert coarse.loss_error < 2e-5 * coarse.loss
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.0])
+def test_a_refusal_names_another_method_only_where_it_takes_the_problem(ratio, monkeypatch):
+    def refuse(*_):
+        raise NoState("no state", 1.0)
+
+    monkeypatch.setattr(Follower, "run", refuse)
+    with pytest.raises(adhesis.PathError, match="another accuracy") as refused:
+        run_loop(make_method("sharp", wave(ratio)), max_penetration=0.5, load_steps=2)
+    assert ("or the other method" in str(refused.value)) is (ratio == 1)
+    assert "grid" not in str(refused.value)

@@ -317,8 +317,8 @@ class StableBranch:
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed.
 
-        Over stripes of the work of adhesion, and where edges begin to move and are pinned, slopes
-        at both ends are equal by chance: there their difference from the mean slope counts, too.
+        Over stripes of the work of adhesion, and where edges are pinned on the way, slopes at both
+        ends are equal by chance: there their difference from the mean slope counts, too.
         """
         way = point.at - output.at
         # p = q0 h_max is σ~ = 1

@@ -16,6 +16,7 @@ from adhesis.solver._kernels import (
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
+    BY_FIELD,
     DESCENT_HANDS_OVER,
     FIELD_ERROR,
     LONGEST_STEP,
@@ -80,7 +81,7 @@ class EdgeProblem:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.adhesion = adhesion or ProfileAdhesion(source.panels)
         self.wave = 2 * np.pi / source.top
-        self.newton_tolerance = NEWTON_TOLERANCE * self.wave
+        self.newton_tolerance = min(NEWTON_TOLERANCE, BY_FIELD * tolerance) * self.wave
         self.field_error = max(self.newton_tolerance, FIELD_ERROR * tolerance * self.wave)
         self.longest_step = LONGEST_STEP * self.wave
         # far below the width at which a patch on the sharpest crest first comes to rest,
