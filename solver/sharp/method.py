@@ -54,7 +54,9 @@ from adhesis.solver.sharp.tolerances import (
     LATE_DROP,
     LEAST_DROP,
     LONGEST_STEP,
+    OVERLAP,
     PLACED_BY_PROFILE,
+    RANGE_RESOLVED,
     ROUNDING,
     TRAPEZOID,
     WEAKNESS_POWER,
@@ -149,6 +151,10 @@ class SharpMethod(Method):
         # The profile alone fixes the position of a last gap, by openings so much smaller than C_c.
         if ratio > 0:
             tolerance = max(min(tolerance, PLACED_BY_PROFILE / ratio), ROUNDING)
+        # Openings are compared with the range, up to the overlap that is allowed.
+        if math.isfinite(problem.strength):
+            touch = RANGE_RESOLVED * problem.attraction_range / profile.h_max
+            tolerance = min(tolerance, max(touch, 0.5 * OVERLAP))
         # Steps whose work is compared with the energy need an energy that is as exact.
         work = math.inf
         if problem.opens_by_roughness:

@@ -112,6 +112,9 @@ LARGEST_FIELD_TOLERANCE = 1e-5
 PLACED_BY_PROFILE = 3e-3
 """Largest error of the field in units of the openings that roughness makes, which alone hold the
 last gap in its place."""
+RANGE_RESOLVED = 5e-4
+"""Range of adhesion: largest error of an opening by the field, in units of h_max per relative error
+of the field. With that of zero range touches were up to 3e-3 of the range late."""
 FIELD_SHARE = 0.05
 """Accuracy of the loss: least error of a drop that the error of the field makes; folds that the
 field's error displaces by more count with that."""

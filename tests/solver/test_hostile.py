@@ -17,6 +17,11 @@ def test_a_hostile_loop_keeps_every_promise(number):
     assert found["kind"] == ("tight" if number % 4 == 0 else "loop")
 
 
+def test_touches_are_as_exact_as_a_short_range():
+    """By the field of zero range one of them was 3e-3 of the range late."""
+    assert judge(draw(906000, 174, "range"), 174)["wrong"] == []
+
+
 @pytest.mark.parametrize(("number", "flagged"), [(21, True), (9, False)])
 def test_tension_above_the_strength_is_stated(number, flagged):
     """No state has more inside a patch unless the loss is doubtful for it."""
