@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from adhesis import PathError
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import run_path
@@ -232,7 +233,7 @@ def test_a_refusal_names_another_method_only_where_it_takes_the_problem(ratio, m
         raise NoState("no state", 1.0)
 
     monkeypatch.setattr(Follower, "run", refuse)
-    with pytest.raises(adhesis.PathError, match="another accuracy") as refused:
+    with pytest.raises(PathError, match="another accuracy") as refused:
         run_loop(make_method("sharp", wave(ratio)), max_penetration=0.5, load_steps=2)
     assert ("or the other method" in str(refused.value)) is (ratio == 1)
     assert "grid" not in str(refused.value)
