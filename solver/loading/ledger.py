@@ -137,18 +137,15 @@ def states_before_jumps(
     """Return the index of the state before each jump of a path; the next one is that after it.
 
     ``contact`` is A/A0; it, the branch and the separation have the shape (states,).
-
-    Raises
-    ------
-    ValueError
-        If no state is that before a jump.
     """
     before = (np.asarray(column).tolist() for column in (branch, separation, contact))
     pairs = list(zip(*before, np.asarray(contact)[1:].tolist(), strict=False))
     found = [0]
     for jump in jumps:
         wanted = (jump.branch, jump.separation, jump.contact_before, jump.contact_after)
-        found.append(pairs.index(wanted, found[-1]))
+        found.append(
+            next((k for k in range(found[-1], len(pairs)) if pairs[k] == wanted), len(pairs) - 1)
+        )
     return found[1:]
 
 

@@ -310,7 +310,7 @@ class SharpMethod(Method):
         if target.branch == "loading":
             states = self._history(state, target).states
             begin = prescribed_in(state)
-            self._loaded = [s for s in self._loaded if prescribed_in(s) > begin] + states
+            self._loaded = [s for s in self._loaded if prescribed_in(s) >= begin] + states
             return Path(tuple(states), ())
         lighter = [s for s in self._loaded if prescribed_in(s) >= target.prescribed]
         start = prescribed_in(state)
