@@ -1,6 +1,8 @@
 #include "descent.hpp"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 namespace adhesis {
 
@@ -165,29 +167,25 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
   Descent out;
   double reach = FIRST_REACH;  // of the next long step, in longest steps
   EdgeStates states = held_edges(runs, ends, law);
-  Integers edges = indices(states.held), modelled, orders;
+  Integers edges = indices(states.held), modelled;
   Vector before = ends;
   ModelFlow flow;
   Matrix tangent;
   double pressure = response.pressure_at(prescribed, device), strongest = 0;
   bool moved = true, judges = false;
-  // Set the response up anew where the edges are, with these least orders; false without a field.
-  const auto set_up = [&](const Integers& least) {
-    auto anew = set_up_response(ends, prescribed, least, law, model);
-    if (!anew) return false;
-    ++out.set_ups;
-    response = std::move(*anew);
-    hold_edges(response, ends, states);
-    condense_gaps(response, Flags(response.gap_count(), true));
-    return true;
-  };
+  std::optional<LinearResponse> outgrown;  // by the last step
   while (out.steps < most_steps) {
     check_signals();
     if (moved && !move_references(response, ends, states, pressure, prescribed, law, model)) {
-      if (!set_up(response.nodes.orders)) {
+      auto anew = set_up_response(ends, prescribed, response.nodes.orders, law, model);
+      if (!anew) {
         out.event = DescentEvent::no_field;
         break;
       }
+      ++out.set_ups;
+      outgrown = std::exchange(response, std::move(*anew));
+      hold_edges(response, ends, states);
+      condense_gaps(response, Flags(response.gap_count(), true));
     }
     if (run_unbalanced(runs, response, law)) {
       states = held_edges(runs, ends, law);
@@ -215,8 +213,13 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       reach = std::max(next_reach(reach, length, error), MODEL_SHORT_STEP);
       if (error > 1 && length > 1.5 * MODEL_SHORT_STEP) {
         ends = before;
-        // back to the same field: another's error may show a minimum here
-        moved = response.nodes.orders == orders || !set_up(orders);
+        moved = true;
+        // back to the same field: the error of a finer one may show a minimum here
+        if (outgrown && in_order(outgrown->nodes.gaps)) {
+          response = std::move(*outgrown);
+          moved = false;
+        }
+        outgrown.reset();
         continue;
       }
     }
@@ -248,7 +251,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
     judges = !edges.empty();
     moved = true;
     before = ends;
-    orders = response.nodes.orders;
+    outgrown.reset();
     ends = move_edges(ends, way);
     if (shortest_length(ends) < law.smallest) {
       out.event = DescentEvent::vanished;
