@@ -174,6 +174,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
   double pressure = response.pressure_at(prescribed, device), strongest = 0;
   bool moved = true, judges = false;
   std::optional<LinearResponse> outgrown;  // by the last step
+  bool is_first = true;                    // whether no step has been judged yet
   while (out.steps < most_steps) {
     check_signals();
     if (moved && !move_references(response, ends, states, pressure, prescribed, law, model)) {
@@ -184,6 +185,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       }
       ++out.set_ups;
       outgrown = std::exchange(response, std::move(*anew));
+      judges = judges && is_first;  // minima next to a fold are shallow; later forces are large
       hold_edges(response, ends, states);
       condense_gaps(response, Flags(response.gap_count(), true));
     }
@@ -204,7 +206,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
     HeldEdges condensed(response, edges, now, device);
     const Vector residual = condensed.residual();
     if (judges) {
-      judges = false;
+      judges = is_first = false;
       Vector at_end;
       for (int e : modelled)
         at_end.push_back(residual[std::lower_bound(edges.begin(), edges.end(), e) - edges.begin()]);
