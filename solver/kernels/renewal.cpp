@@ -92,14 +92,11 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
   Nodes& nodes = response.nodes;
   const int count = nodes.gap_count();
   Flags changed(count), far(count);
-  int most_far = 0;
   for (int k = 0; k < count; ++k) {
     Outdated outdated = is_outdated(response, k, gaps[k], law);
     changed[k] = outdated.changed;
     far[k] = outdated.far;
-    most_far += outdated.far;
   }
-  if (most_far > REFERENCE_MOST_FAR * std::max(count, FEW_REFERENCES)) return false;
   for (int k = 0; k < count; ++k) {
     const int order = nodes.orders[k];
     const double wanted = model.digits / convergence_rate(gaps[k]);

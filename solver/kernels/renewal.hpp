@@ -26,8 +26,8 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 // Move the references of gaps to these edges where they have departed from them.
 //
 // `states` are those of the edges from now on. `pressure` is p, with which the last solution
-// gives the potentials. Returns false where a gap or run needs more nodes than it has, or many gaps
-// are far from their references: then another response is to be set up.
+// gives the potentials. Returns false where a gap or run needs more nodes than it has: then
+// another response is to be set up.
 bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
                      double pressure, double prescribed, const EdgeLaw& law, const Model& model);
 

@@ -76,13 +76,6 @@ inline constexpr double REFERENCE_FAR = 0.1;
 // it rates after some gaps had been moved by 0.1 λ_min and back were wrong by 1.2e-3.
 inline constexpr double REFERENCE_PATCH = 0.2;
 
-// Share of all gaps that may move so far before all are solved anew.
-inline constexpr double REFERENCE_MOST_FAR = 0.25;
-
-// Gaps: fewer count as so many for that. Without it loops of up to ten patches solve 3 to 6 % more
-// fields.
-inline constexpr int FEW_REFERENCES = 8;
-
 // ---------------------------------------------------------------- sizes of steps
 
 // Largest growth from one step to the next, along a branch and of the reach of a descent.
