@@ -10,8 +10,8 @@ class FullContact(Exception):
 
 
 class NoState(PathError):
-    """Error raised when the path has no state at d = ``at``; the text is the reason."""
+    """Error raised when the path has no state at ``d``; the text is the reason."""
 
-    def __init__(self, reason: str, at: float) -> None:
+    def __init__(self, reason: str, d: float) -> None:
         super().__init__(reason)
-        self.at = at
+        self.d = d

@@ -94,7 +94,7 @@ class EdgeMechanics(EdgeProblem):
     def _solve_finer(self, point: Point) -> Field:
         """Solve the field of a point more accurately than that of the path."""
         if self._finer is None or self._finer[0] is not point:
-            self._finer = point, self.solution(point.gaps, point.at, FIELD_ACCURACY)
+            self._finer = point, self.solution(point.gaps, point.d, FIELD_ACCURACY)
         return self._finer[1]
 
     def equilibrium(

@@ -232,8 +232,8 @@ class SharpMethod(Method):
         except FullContact:
             raise PathError(self.problem.full_contact(prescribed)) from None
         except (NoState, FloatingPointError) as failed:
-            at = failed.at if isinstance(failed, NoState) else target.at
-            where = self.problem.describe_prescribed(self.states.to_si(at))
+            d = failed.d if isinstance(failed, NoState) else target.d
+            where = self.problem.describe_prescribed(self.states.to_si(d))
             raise PathError(
                 f"method 'sharp' finds no state at {where}: {failed}; another accuracy or other "
                 f"load steps{self.problem.or_other_method} may get past it"
@@ -253,36 +253,36 @@ class SharpMethod(Method):
         history = History()
         self.edges.forget()
         control = self.problem.control
-        at = self.states.prescribed_of(state)
+        d = self.states.prescribed_of(state)
         point = self.follower.recall_point(state.internal)
         if not state.patches:
             touch, highest = self.jumps.first_touch()
             first = 0.0 if control.is_load else touch
-            if target.branch == "unloading" or target.at > first:
+            if target.branch == "unloading" or target.d > first:
                 apart = self.problem.detached_separation(state, target.prescribed)
                 history.states.append(self.detached(apart))
                 return history
-            at = first
+            d = first
             before = self.states.detached(touch)
             history.states.append(before)
-            point = self._jump(history, before, np.empty((0, 2)), at, target, highest)
+            point = self._jump(history, before, np.empty((0, 2)), d, target, highest)
         else:
             gaps = state.internal.gaps
             if point is None:
-                point = self.edges.equilibrium(gaps, at, LONGEST_STEP * self.edges.wave)
+                point = self.edges.equilibrium(gaps, d, LONGEST_STEP * self.edges.wave)
             else:
-                at = point.at  # that of the state but for rounding
+                d = point.d  # that of the state but for rounding
             if point is None:
-                before = self.states.of_field(self.edges.field(gaps, at))
+                before = self.states.of_field(self.edges.field(gaps, d))
                 history.states.append(before)
-                point = self._jump(history, before, gaps, at, target)
-            elif at == target.at:
+                point = self._jump(history, before, gaps, d, target)
+            elif d == target.d:
                 history.states.append(state)
-        while point is not None and at != target.at:
-            at, point = self.follower.run(history, point, target)
-        if point is None and at != target.at and not control.is_load:
-            if self.edges.critical > 0 and self.states.attracts_when_detached(min(at, target.at)):
-                raise NoState("contact is lost where surfaces overlap", at)
+        while point is not None and d != target.d:
+            d, point = self.follower.run(history, point, target)
+        if point is None and d != target.d and not control.is_load:
+            if self.edges.critical > 0 and self.states.attracts_when_detached(min(d, target.d)):
+                raise NoState("contact is lost where surfaces overlap", d)
             history.states.append(self.detached(target.prescribed))
         return history
 
@@ -291,12 +291,12 @@ class SharpMethod(Method):
         history: History,
         before: ContactState,
         gaps: Array,
-        at: float,
+        d: float,
         target: Target,
         touches: list[Touch] | None = None,
     ) -> Point | None:
         """Compute the jump from a state that no branch led to, and return the point after it."""
-        jump = self.jumps.compute(before, gaps, at, target.branch, touches)
+        jump = self.jumps.compute(before, gaps, d, target.branch, touches)
         history.commit(jump)
         return jump.point
 

@@ -28,21 +28,21 @@ class Curve:
     pins: bool = False
     source: ClassVar[Any] = SimpleNamespace(is_patterned=False)
 
-    def point(self, at: float) -> Point:
-        a = 0.5 + float(np.sqrt(at - FOLD))
+    def point(self, d: float) -> Point:
+        a = 0.5 + float(np.sqrt(d - FOLD))
         gaps = np.array([[3 - a, 3 + a]])
-        field = SimpleNamespace(gaps=gaps, nearly=(-at * at, at), separation=at)
+        field = SimpleNamespace(gaps=gaps, nearly=(-d * d, d), separation=d)
         # n is the outward motion of the contact: the gap opens with d
-        rate = np.full(2, -0.5 / float(np.sqrt(at - FOLD)))
-        return Point(at, cast(Any, field), rate, -2 * at)
+        rate = np.full(2, -0.5 / float(np.sqrt(d - FOLD)))
+        return Point(d, cast(Any, field), rate, -2 * d)
 
     def equilibrium(
-        self, gaps: Any, at: float, reach: float, memory: Array | None = None
+        self, gaps: Any, d: float, reach: float, memory: Array | None = None
     ) -> Point | None:
         self.asked += 1
-        if at <= FOLD:
+        if d <= FOLD:
             return None
-        point = self.point(at)
+        point = self.point(d)
         return point if np.abs(point.gaps - gaps).max() < reach else None
 
 
@@ -58,8 +58,8 @@ def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked():
         curve = Curve()
         followed, places = branch(curve, 0.9, jump), []
         while not isinstance(event := followed.advance(), Fold):
-            places.append(event.point.at)
-        assert event.at < FOLD < event.point.at
-        assert event.point.at - event.at < 2 * jump
+            places.append(event.point.d)
+        assert event.d < FOLD < event.point.d
+        assert event.point.d - event.d < 2 * jump
         assert curve.asked < 45  # 34 to 64 where no fold is seen ahead
         assert places == sorted(places, reverse=True)

@@ -141,11 +141,11 @@ def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
         _work_before=(0.0, math.inf),
         _work_of_fields=0.0,
     )
-    start = SimpleNamespace(at=0.0)
-    for at in (1.0, 0.5):
-        StableBranch._work_error(branch, start, SimpleNamespace(at=at))
+    start = SimpleNamespace(d=0.0)
+    for d in (1.0, 0.5):
+        StableBranch._work_error(branch, start, SimpleNamespace(d=d))
     branch._work_before = (0.0, math.inf)  # the step was accepted
-    assert StableBranch._work_error(branch, start, SimpleNamespace(at=2.0)) == TRAPEZOID_FAR
+    assert StableBranch._work_error(branch, start, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
 
 
 def test_work_and_energy_agree_between_openings():

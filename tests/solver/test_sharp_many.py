@@ -130,9 +130,9 @@ def many_gaps(loaded):
     return edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)
 
 
-def relaxed(edges, gaps, at):
+def relaxed(edges, gaps, d):
     while not isinstance(gaps, Point):
-        gaps, _ = edges.relax(gaps, at, edges.wave)
+        gaps, _ = edges.relax(gaps, d, edges.wave)
     return gaps
 
 
@@ -141,9 +141,9 @@ def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, many_gaps):
     method, _ = loaded
     edges, point = many_gaps
     exact = SharpMethod(method.problem, accuracy=1e-6).edges
-    dense = exact.equilibrium(point.gaps, point.at, exact.wave)
+    dense = exact.equilibrium(point.gaps, point.d, exact.wave)
     assert len(point.gaps) >= 10
-    assert np.abs(dense_residual(dense.gaps, dense.at, exact)).max() < 1e-3 * exact.critical
+    assert np.abs(dense_residual(dense.gaps, dense.d, exact)).max() < 1e-3 * exact.critical
     # the error of the field moves an equilibrium by up to edges.field_error
     assert np.abs(point.gaps - dense.gaps).max() < 0.5 * edges.field_error
     assert np.abs(point.rate - dense.rate).max() < 1e-4 * np.abs(dense.rate).max()
@@ -157,14 +157,14 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     Openings, rates and pressure are those of a response set up there from nothing.
     """
     edges, point = many_gaps
-    at = point.at
+    d = point.d
     edges.forget()
-    anew = edges.equilibrium(point.gaps, at, edges.wave)
+    anew = edges.equilibrium(point.gaps, d, edges.wave)
     moved = point.gaps.copy()
     moved[2::5] += motion * edges.wave * np.array([-0.5, 1.0])
-    edges.kept.at(moved, at)
+    edges.kept.at(moved, d)
     assert edges.kept.settled is moved
-    back = edges.equilibrium(point.gaps, at, edges.wave)
+    back = edges.equilibrium(point.gaps, d, edges.wave)
     assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.field_error
     assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
     assert back.pressure == pytest.approx(anew.pressure, rel=1e-6)
@@ -175,16 +175,16 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
 def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):
     """A patch less, and one more: with the same result as without any response."""
     edges, point = many_gaps
-    gaps, at = point.gaps, point.at
+    gaps, d = point.gaps, point.d
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
-    end = relaxed(edges, fewer, at)
+    end = relaxed(edges, fewer, d)
     assert len(end.gaps) < len(gaps)
     for known, wanted in ((gaps, end.gaps), (end.gaps, gaps)):
         edges.forget()
-        anew = edges.equilibrium(wanted, at, edges.wave)
+        anew = edges.equilibrium(wanted, d, edges.wave)
         edges.forget()
-        edges.kept.at(known, at)
-        again = edges.equilibrium(wanted, at, edges.wave)
+        edges.kept.at(known, d)
+        again = edges.equilibrium(wanted, d, edges.wave)
         assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.field_error
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
 

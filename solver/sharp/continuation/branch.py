@@ -32,7 +32,7 @@ EnergyResidual = Callable[[Point, Point], float]
 class Target:
     """End of a load step: d, the same value in m or Pa without rounding, and the branch."""
 
-    at: float
+    d: float
     prescribed: float
     branch: Branch
 
@@ -127,14 +127,14 @@ class Fold:
     ----------
     point : Point
         The last point of the branch.
-    at : float
+    d : float
         d a step beyond it: a smallest one, one across the fold, or to the target.
     with_another : TwoFolds, optional
         If a second one is near.
     """
 
     point: Point
-    at: float
+    d: float
     with_another: TwoFolds | None = None
 
 
@@ -173,7 +173,7 @@ class StableBranch:
         self._edges, self._resolution = edges, resolution
         self._target = target
         before = point.previous
-        if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
+        if before is not None and (point.d - before.d) * (target.d - point.d) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
         self.trail = [point]
@@ -190,9 +190,9 @@ class StableBranch:
         """Take steps until one is accepted, or the smallest one finds no equilibrium."""
         while True:
             step = self._next_step()
-            left = self._target.at - self.point.at
-            at = self._target.at if step == left else self.point.at + step
-            reached = correct(self._edges, self._predictor, at)
+            left = self._target.d - self.point.d
+            d = self._target.d if step == left else self.point.d + step
+            reached = correct(self._edges, self._predictor, d)
             if reached is not None:
                 error = self._error(self._output, reached)
                 share = 0.5 if error > TRAPEZOID_FAR else self._share_to_turn(reached, step)
@@ -202,7 +202,7 @@ class StableBranch:
                 self._longest = share * abs(step)
                 self.finest = min(self.finest, self._longest)
             elif abs(step) <= self.finest:
-                return Fold(self.point, at, self._two_folds)
+                return Fold(self.point, d, self._two_folds)
             else:
                 self._longest = max(STEP_REDUCTION * abs(step), self.finest)
 
@@ -210,9 +210,9 @@ class StableBranch:
     def fold_ahead(self) -> tuple[float, float]:
         """Return d of the fold that is predicted, or infinity, and of a place beyond it."""
         predictor = self._predictor
-        way = self._target.at - predictor.point.at
+        way = self._target.d - predictor.point.d
         distances = predictor.fold_distance, predictor.across(self._resolution.jump)
-        fold, beyond = (predictor.point.at + math.copysign(x, way) for x in distances)
+        fold, beyond = (predictor.point.d + math.copysign(x, way) for x in distances)
         return fold, beyond
 
     def refine(self, finest: float) -> None:
@@ -234,7 +234,7 @@ class StableBranch:
         size = min(self._longest, predictor.reach(motion * self._edges.wave, self.finest))
         if not predictor.fold_distance < self.finest:
             size = max(size, self.finest)
-        left = self._target.at - self.point.at
+        left = self._target.d - self.point.d
         step = left if size >= abs(left) else math.copysign(size, left)
         self._free_step, self._begins_to_move = step, False
         return step if self.point.pinned is None else self._step_to_kink(step, self.point.pinned)
@@ -274,16 +274,14 @@ class StableBranch:
     def _accept(self, reached: Point, step: float, error: float) -> Accepted:
         gaps, smallest = reached.gaps, self._edges.smallest
         remaining = without_small(gaps, smallest) if shortest_length(gaps) < smallest else None
-        is_output = error > 1 or reached.at == self._target.at or self._begins_to_move
-        point = reached.with_previous(
-            PreviousPoint(self.point.at, self.point.rate, self.point.gaps)
-        )
+        is_output = error > 1 or reached.d == self._target.d or self._begins_to_move
+        point = reached.with_previous(PreviousPoint(self.point.d, self.point.rate, self.point.gaps))
         self.trail.append(point)
         self.point = point
         self._work_before = (0.0, math.inf)
         if is_output:
             self._output = point
-        if point.at != self._target.at:
+        if point.d != self._target.d:
             # what lies before a kink predicts nothing beyond it
             kink = self._begins_to_move
             self._predictor = Predictor(point.with_previous(None) if kink else point)
@@ -308,7 +306,7 @@ class StableBranch:
             way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
             edges = predictor.leading_edge, other.edge
             ways = tuple(float(np.sign(predictor.point.rate[e] * way)) for e in edges)
-            self._two_folds = TwoFolds(edges, ways, predictor.point.at + way, apart)
+            self._two_folds = TwoFolds(edges, ways, predictor.point.d + way, apart)
 
     def _error(self, output: Point, point: Point) -> float:
         """Error of the integral since the last output, in units of what is allowed."""
@@ -320,7 +318,7 @@ class StableBranch:
         Over stripes of the work of adhesion, and where edges are pinned on the way, slopes at both
         ends are equal by chance: there their difference from the mean slope counts, too.
         """
-        way = point.at - output.at
+        way = point.d - output.d
         # p = q0 h_max is σ~ = 1
         h_max = self._resolution.h_max
         load = self._edges.is_load
@@ -339,7 +337,7 @@ class StableBranch:
         does not reduce is no error of the step: energies differ by it where the number of modes of
         a gap changes. No smaller one halves a further step of the branch.
         """
-        span = abs(point.at - output.at)
+        span = abs(point.d - output.d)
         short = span < WORK_RESOLVED * self._resolution.jump
         if self._energy_residual is None or short:
             return 0.0
@@ -353,13 +351,13 @@ class StableBranch:
         return min(error, TRAPEZOID_FAR) if error <= self._work_of_fields else error
 
 
-def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | None:
-    """Return the stable equilibrium of all edges at d = ``at`` near the predicted one, or None.
+def correct(edges: EdgeMechanics, predictor: Predictor, d: float) -> Point | None:
+    """Return the stable equilibrium of all edges at ``d`` near the predicted one, or None.
 
     None, too, where an edge is predicted to move far: what is found there may be another branch.
     """
-    gaps = predictor.gaps(at)
+    gaps = predictor.gaps(d)
     # not written as > : a prediction that is no number is none
     if not np.abs(gaps - predictor.point.gaps).max() <= COMPARABLE * edges.wave:
         return None
-    return edges.equilibrium(gaps, at, LONGEST_STEP * edges.wave, memory=predictor.point.gaps)
+    return edges.equilibrium(gaps, d, LONGEST_STEP * edges.wave, memory=predictor.point.gaps)

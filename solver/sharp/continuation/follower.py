@@ -73,17 +73,17 @@ class Follower:
         self.nucleation.searched, self._came_on = SearchedGaps(), None
         if data is None or data.stopped is None:
             return None
-        at, nearly, rate, slope, previous, pinned, searched, name = data.stopped
+        d, nearly, rate, slope, previous, pinned, searched, name = data.stopped
         self.nucleation.searched, self._came_on = searched, name
-        field = self.edges.field(data.gaps, at, nearly)
-        return Point(at, field, rate, slope, previous, pinned)
+        field = self.edges.field(data.gaps, d, nearly)
+        return Point(d, field, rate, slope, previous, pinned)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
         """Follow a stable branch to the target or through its next jump.
 
         Returns
         -------
-        at, point
+        d, point
             d reached and the stable point there, None if no contact is left.
         """
         if self.edges.pins and self._came_on not in (None, target.branch):
@@ -93,10 +93,10 @@ class Follower:
         jump = self._opening_at(history, point, target)
         if jump is not None:
             history.commit(jump)
-            return jump.at, jump.point
+            return jump.d, jump.point
         energy_residual = self._energy_residual if math.isfinite(self.resolution.work) else None
         branch = StableBranch(self.edges, self.resolution, point, target, energy_residual)
-        while branch.point.at != target.at:
+        while branch.point.d != target.d:
             event = branch.advance()
             if isinstance(event, Fold):
                 jump = self._handle_fold(history, branch, event, target)
@@ -104,13 +104,13 @@ class Follower:
                 jump = self._handle_accepted(history, branch, event, target)
             if jump is not None:
                 history.commit(jump)
-                return jump.at, jump.point
+                return jump.d, jump.point
         self._remember(history, branch, target.branch)
-        return target.at, branch.point
+        return target.d, branch.point
 
     def _turned_back(self, point: Point) -> Point:
         """Return the point at which a path turns back: all its edges are pinned there at first."""
-        pinned = self.edges.equilibrium(point.gaps, point.at, self.edges.newton_tolerance)
+        pinned = self.edges.equilibrium(point.gaps, point.d, self.edges.newton_tolerance)
         return point.with_previous(None) if pinned is None else pinned
 
     def _energy_residual(self, output: Point, point: Point) -> float:
@@ -123,7 +123,7 @@ class Follower:
         """Let the last state remember its point."""
         point = branch.point
         stopped = BranchData(
-            point.at, point.field.nearly, point.rate, point.slope, point.previous, point.pinned,
+            point.d, point.field.nearly, point.rate, point.slope, point.previous, point.pinned,
             self.nucleation.searched, name,
         )  # fmt: skip
         data = ContinuationData(point.gaps, stopped)
@@ -136,7 +136,7 @@ class Follower:
         point = event.point
         output = None
         if event.is_output:
-            fixed = self.edges.is_fixed and point.at == target.at
+            fixed = self.edges.is_fixed and point.d == target.d
             output = self.states.of_point(point, target.prescribed if fixed else None)
         jump = None
         if event.is_output or event.remaining is not None:
@@ -149,7 +149,7 @@ class Follower:
             return None
         states = () if event.is_output else (self.states.of_point(point),)
         before = states[-1] if states else history.states[-1]
-        jump = self.jumps.compute(before, event.remaining, point.at, target.branch, known=point)
+        jump = self.jumps.compute(before, event.remaining, point.d, target.branch, known=point)
         return replace(jump, states=states + jump.states)
 
     def _handle_fold(
@@ -161,8 +161,8 @@ class Follower:
             return jump
         if self._may_touch_before(fold):
             point = fold.point
-            held = self.edges.field(point.gaps, fold.at)
-            branch.trail.append(Point(fold.at, held, point.rate, math.nan))
+            held = self.edges.field(point.gaps, fold.d)
+            branch.trail.append(Point(fold.d, held, point.rate, math.nan))
             jump = self._nucleation_jump(branch, target)
             if jump is not None:
                 return replace(jump, states=(self.states.of_point(point), *jump.states))
@@ -172,7 +172,7 @@ class Follower:
             branch.refine(self.resolution.finest)
             return None
         after = jump.point
-        goes_on = fold.at != target.at and self._is_near(fold.point, after)
+        goes_on = fold.d != target.d and self._is_near(fold.point, after)
         if goes_on and after is not None:
             # Newton's iteration failed where there was no fold: the branch goes on.
             branch.continue_from(after)
@@ -182,7 +182,7 @@ class Follower:
     def _may_touch_before(self, fold: Fold) -> bool:
         """Return whether surfaces may touch on the last step to a fold, the edges being held."""
         point = fold.point
-        way = abs(fold.at - point.at)
+        way = abs(fold.d - point.d)
         if not self.edges.is_fixed:
             way *= max(1.0, abs(self.edges.response_before_fold(point).separation))
         # the mean gap closes by the gaps alone, the faster the less of the period they take
@@ -194,7 +194,7 @@ class Follower:
 
         The trail is searched for both; without a touch it begins anew.
         """
-        trail, start = branch.trail, branch.trail[0].at
+        trail, start = branch.trail, branch.trail[0].d
         if len(trail) == 1:
             return None
         branch.trail = [branch.point]
@@ -206,23 +206,23 @@ class Follower:
             if self.cracks.is_possible:
                 opened = locate(self.cracks, self._between, trail, self.resolution.finest)
             if opened is not None and (
-                touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
+                touched is None or abs(opened.point.d - start) < abs(touched.point.d - start)
             ):
                 return self._opening_jump(opened, target)
             if touched is None:
                 return None
-            apart = math.copysign(1.0, target.at - start) * (fold - touched.point.at)
+            apart = math.copysign(1.0, target.d - start) * (fold - touched.point.d)
             if apart < -self.resolution.order:
                 return None  # the fold comes first
             may_fold = apart < self.resolution.order
             jump = self._touch_jump(touched, beyond if may_fold else None, target)
             if jump is not None:
                 return jump
-        raise NoState("contact nucleates, and goes back in turn", trail[-1].at)
+        raise NoState("contact nucleates, and goes back in turn", trail[-1].d)
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
-        return direction * (self.states.prescribed_of(state) - jump.at) < 0
+        return direction * (self.states.prescribed_of(state) - jump.d) < 0
 
     def _opening_at(self, history: History, point: Point, target: Target) -> ComputedJump | None:
         """Compute the jump at the start of a branch where patches open at once; else None."""
@@ -242,13 +242,13 @@ class Follower:
         jump = self.jumps.compute(
             before,
             self.cracks.insert_seeds(gaps, opened.seeds),
-            point.at,
+            point.d,
             target.branch,
             known=point,
             barrier=sum(crack.barrier for crack in opened.seeds),
         )
         if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
-            raise NoState("a crack that grows at both tips closes again", point.at)
+            raise NoState("a crack that grows at both tips closes again", point.d)
         late = self.states.work(before, jump.states[-1], opened.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 
@@ -257,7 +257,7 @@ class Follower:
         last = history.jumps[-MOST_OPENINGS:]
         here = jump.jump.separation
         if len(last) == MOST_OPENINGS and all(one.separation == here for one in last):
-            raise NoState("patches open and close in turn", jump.at)
+            raise NoState("patches open and close in turn", jump.d)
 
     def _touch_jump(
         self, touched: Located[Touch], beyond: float | None, target: Target
@@ -269,15 +269,15 @@ class Follower:
         """
         point = touched.point
         if self.edges.critical > 0 and touched.seeds[0].opening < -self.nucleation.tolerance:
-            raise NoState("surfaces overlap, and no first touch is found", point.at)
+            raise NoState("surfaces overlap, and no first touch is found", point.d)
         before = self.states.of_point(point)
-        since = self.nucleation.way_since_healed(touched.seeds, point.at)
+        since = self.nucleation.way_since_healed(touched.seeds, point.d)
         jump = self.jumps.compute(
-            before, point.field.gaps, point.at, target.branch, touched.seeds, point,
+            before, point.field.gaps, point.d, target.branch, touched.seeds, point,
             event_orders=None if beyond is None else EventOrders(beyond, (point.field.gaps,)),
         )  # fmt: skip
         gained = self.jumps.has_gained(point, jump.point, touched.seeds)
-        if not gained and self.nucleation.heal(touched.seeds, point.at):
+        if not gained and self.nucleation.heal(touched.seeds, point.d):
             return None
         # they hold from somewhere since they last did not, where no energy is lost
         late, since = (self.states.work(before, jump.states[-1], x) for x in (touched.late, since))
@@ -289,16 +289,16 @@ class Follower:
     ) -> ComputedJump | None:
         """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
-        way = abs(fold.at - point.at)
+        way = abs(fold.d - point.d)
         states: tuple[ContactState, ...] = ()
         if last is None or last.internal.gaps is not point.field.gaps:
             last = self.states.of_point(point)
             states = (last,)
         response = self.edges.response_before_fold(point)
-        before = self.states.at_fixed_edges(last, point.field, response, fold.at)
+        before = self.states.at_fixed_edges(last, point.field, response, fold.d)
         start, event_orders = self._start_at_fold(fold)
         jump = self.jumps.compute(
-            before, start, fold.at, target.branch, known=point, event_orders=event_orders
+            before, start, fold.d, target.branch, known=point, event_orders=event_orders
         )
         after = jump.states[-1]
         late = self.states.work(before, after, way)
@@ -320,7 +320,7 @@ class Follower:
         displaced = abs(self.edges.fold_displacement(point))
         if two.apart > max(self.resolution.order, SECOND_FOLD_DISPLACED * displaced):
             return None
-        furthest = max(fold.at, two.beyond) if fold.at > point.at else min(fold.at, two.beyond)
+        furthest = max(fold.d, two.beyond) if fold.d > point.d else min(fold.d, two.beyond)
         longest = self.edges.longest_step
         ahead = zip(two.edges, two.ways, strict=True)
         starts = tuple(self._moved_on(point.gaps, edge, way * longest) for edge, way in ahead)
@@ -338,17 +338,17 @@ class Follower:
         point = fold.point
         if not self.jumps.mirror.is_symmetric(point.gaps):
             return point.gaps, self._orders_of_folds(fold)
-        start, reach = point.extrapolate(fold.at), self.edges.longest_step
-        saddle = self.edges.equilibrium(start, fold.at, reach, strict=False)
+        start, reach = point.extrapolate(fold.d), self.edges.longest_step
+        saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
-            ways = self.edges.ways_off_saddle(saddle.gaps, fold.at, self.edges.law_at(point.gaps))
+            ways = self.edges.ways_off_saddle(saddle.gaps, fold.d, self.edges.law_at(point.gaps))
             if ways:
-                return ways[0], EventOrders(fold.at, tuple(ways))
+                return ways[0], EventOrders(fold.d, tuple(ways))
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= (1 - EQUAL) * rate.max())
         away = positions(point.gaps, self.edges.source.highest)[fastest]
         edge = int(fastest[np.argmin(away)])
-        way = np.sign(point.rate[edge] * (fold.at - point.at))
+        way = np.sign(point.rate[edge] * (fold.d - point.d))
         moved = self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
         return moved, self._orders_of_folds(fold)
 

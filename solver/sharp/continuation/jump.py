@@ -25,8 +25,8 @@ class ComputedJump:
 
     Attributes
     ----------
-    at : float
-        d of the jump.
+    d : float
+        Of the jump.
     states : tuple of ContactState
         States before it that the path does not hold yet, and the one after it.
     jump : Jump
@@ -36,7 +36,7 @@ class ComputedJump:
         Work in J/m² of nominal area by which it may be wrong, not being at its exact place.
     """
 
-    at: float
+    d: float
     states: tuple[ContactState, ...]
     jump: Jump
     point: Point | None
@@ -129,9 +129,9 @@ class Jumps:
         """Return whether the patches at first touches come to rest with less energy than none."""
         if not touches:
             return False
-        at = 0.0 if self.edges.is_load else separation
+        d = 0.0 if self.edges.is_load else separation
         try:
-            point, _ = self._relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), at)
+            point, _ = self._relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), d)
         except FullContact:
             return True
         return point is not None and self.states.of_point(point).potential < 0
@@ -140,14 +140,14 @@ class Jumps:
         self,
         before: ContactState,
         start: Array,
-        at: float,
+        d: float,
         branch: Branch,
         touches: list[Touch] | None = None,
         known: Point | None = None,
         barrier: float = 0.0,
         event_orders: EventOrders | None = None,
     ) -> ComputedJump:
-        """Descend at d = ``at`` from the gaps ``start`` to the next state in which nothing touches.
+        """Descend at ``d`` from the gaps ``start`` to the next state in which nothing touches.
 
         The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
@@ -156,20 +156,20 @@ class Jumps:
         on one of two sides that are mirror images. Under a load no other order is sought.
         """
         rivals: list[Rival] = []
-        point = self._descend(start, at, touches or [], rivals)
+        point = self._descend(start, d, touches or [], rivals)
         point = self._nucleate_until_clear(
             point,
-            at,
-            lambda gaps, touching: self._descend(gaps, at, touching, rivals),
+            d,
+            lambda gaps, touching: self._descend(gaps, d, touching, rivals),
         )
-        after = self._after(before, point, at)
+        after = self._after(before, point, d)
         at_stake = None
         try:
             if rivals:
                 if isinstance(rivals[0], Exception):
                     raise rivals[0]
-                rival = self._end_of(rivals[0], at, equal_speeds=True)
-                at_stake = self._at_stake(before, point, rival, at)
+                rival = self._end_of(rivals[0], d, equal_speeds=True)
+                at_stake = self._at_stake(before, point, rival, d)
             elif event_orders is not None and self._may_race:
                 at_stake = self._at_stake_beyond(before, point, event_orders)
         except (FullContact, NoState):  # elsewhere, or unknown where: no energy to be compared
@@ -178,53 +178,51 @@ class Jumps:
         if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
             at_stake = 0.0
         jump = self.states.jump(before, after, branch, at_stake, barrier)
-        return ComputedJump(at, (after,), jump, point)
+        return ComputedJump(d, (after,), jump, point)
 
     def _at_stake_beyond(
         self, before: ContactState, point: Point | None, event_orders: EventOrders
     ) -> float | None:
         """Difference in J/m² of the energies to which two events lead in either order, or None."""
-        at = event_orders.beyond
+        d = event_orders.beyond
 
         def end(start: Array) -> Point | None:
-            return self._end_of(self._relax(start, at)[0], at)
+            return self._end_of(self._relax(start, d)[0], d)
 
         both = None if point is None else end(point.gaps)
-        differences = [
-            self._at_stake(before, both, end(start), at) for start in event_orders.starts
-        ]
+        differences = [self._at_stake(before, both, end(start), d) for start in event_orders.starts]
         return max((one for one in differences if one is not None), default=None)
 
     def _at_stake(
-        self, before: ContactState, point: Point | None, rival: Point | None, at: float
+        self, before: ContactState, point: Point | None, rival: Point | None, d: float
     ) -> float | None:
         """Difference of the energies of two ends in J/m²; None if they are one."""
         if self._is_same_minimum(rival, point):
             return None
         if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
             return 0.0
-        ends = [self._after(before, end, at).potential for end in (point, rival)]
+        ends = [self._after(before, end, d).potential for end in (point, rival)]
         return abs(ends[1] - ends[0]) / self.states.period
 
-    def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
+    def _after(self, before: ContactState, point: Point | None, d: float) -> ContactState:
         """State that a descent led to."""
         if point is None:
-            return self.states.detached_after(before, at)
+            return self.states.detached_after(before, d)
         return self.states.of_point(point)
 
-    def _end_of(self, point: Point | None, at: float, equal_speeds: bool = False) -> Point | None:
-        """Go on from a minimum at d = ``at`` until nothing touches."""
+    def _end_of(self, point: Point | None, d: float, equal_speeds: bool = False) -> Point | None:
+        """Go on from a minimum at ``d`` until nothing touches."""
 
         def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
             gaps = self.nucleation.insert_seeds(gaps, touching)
-            return self._relax(gaps, at, equal_speeds=equal_speeds)[0]
+            return self._relax(gaps, d, equal_speeds=equal_speeds)[0]
 
-        return self._nucleate_until_clear(point, at, relaxed)
+        return self._nucleate_until_clear(point, d, relaxed)
 
     def _nucleate_until_clear(
         self,
         point: Point | None,
-        at: float,
+        d: float,
         descend: Callable[[Array, list[Touch]], Point | None],
     ) -> Point | None:
         """Let contact nucleate wherever surfaces overlap in a minimum, the deepest place first.
@@ -239,10 +237,10 @@ class Jumps:
         for _ in range(ENDLESS):
             if point is None:
                 touch, touches = self.first_touch()
-                if not (adhesive and self.states.attracts_when_detached(at, touch)):
+                if not (adhesive and self.states.attracts_when_detached(d, touch)):
                     return None
                 point = descend(np.empty((0, 2)), touches)
-                if point is None and not self.states.attracts_when_detached(at):
+                if point is None and not self.states.attracts_when_detached(d):
                     return None
                 continue
             least, minima = self.nucleation.minimum(point.field)
@@ -252,11 +250,11 @@ class Jumps:
             grown = descend(point.field.gaps, seeds)
             if self.has_gained(point, grown, seeds):
                 point = grown
-            elif not self.nucleation.heal(seeds, at):
+            elif not self.nucleation.heal(seeds, d):
                 if adhesive and least < -self.nucleation.tolerance:
                     break
                 return point
-        raise NoState("surfaces overlap, and no patch comes to rest there", at)
+        raise NoState("surfaces overlap, and no patch comes to rest there", d)
 
     def has_gained(self, before: Point, after: Point | None, touches: list[Touch]) -> bool:
         """Return whether touches led to another state, with less energy where that is needed.
@@ -282,7 +280,7 @@ class Jumps:
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
     def _descend(
-        self, gaps: Array, at: float, touches: list[Touch], rivals: list[Rival]
+        self, gaps: Array, d: float, touches: list[Touch], rivals: list[Rival]
     ) -> Point | None:
         """Descend to the next minimum of the energy; None when no contact is left.
 
@@ -292,16 +290,16 @@ class Jumps:
         """
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
-        point, raced = self._relax(gaps, at)
+        point, raced = self._relax(gaps, d)
         if not (raced and self._may_race):
             return point
         others: list[Rival] = []
         try:
-            others.append(self._relax(gaps, at, equal_speeds=True)[0])
+            others.append(self._relax(gaps, d, equal_speeds=True)[0])
         except (FullContact, NoState) as unknown:
             others.append(unknown)
         with suppress(NoState, FullContact):
-            finer, _ = self._relax(gaps, at, share=FINER_STEPS)
+            finer, _ = self._relax(gaps, d, share=FINER_STEPS)
             if point and finer and not self._is_same_minimum(point, finer):
                 end, other = (self.states.of_point(one).potential for one in (finer, point))
                 if end < other:
@@ -322,12 +320,12 @@ class Jumps:
         return not self._is_same_minimum(other, point)
 
     def _relax(
-        self, gaps: Array, at: float, *, equal_speeds: bool = False, share: float = 1.0
+        self, gaps: Array, d: float, *, equal_speeds: bool = False, share: float = 1.0
     ) -> tuple[Point | None, bool]:
         """Descend until nothing vanishes; returns also whether edges may have raced."""
         reach, races = self.edges.longest_step, False
         while len(gaps):
-            found, raced = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds, share=share)
+            found, raced = self.edges.relax(gaps, d, reach, equal_speeds=equal_speeds, share=share)
             races = races or raced
             if isinstance(found, Point):
                 return found, races

@@ -42,10 +42,10 @@ class Predictor:
         self.point = point
         self.way, self.fold_distance = 0.0, math.inf
         rate, earlier = point.rate, point.previous
-        if earlier is None or earlier.rate.shape != rate.shape or earlier.at == point.at:
+        if earlier is None or earlier.rate.shape != rate.shape or earlier.d == point.d:
             self.fastest = float(np.abs(rate).max())
             return
-        self.way = point.at - earlier.at
+        self.way = point.d - earlier.d
         self._points = TwoPoints(point.gaps, rate, earlier.gaps, earlier.rate, self.way)
         self._leading = leading = self._points.leading_edge()
         self.fastest, self.fold_distance = leading.fastest, leading.fold_distance
@@ -61,12 +61,12 @@ class Predictor:
             return OtherFold()
         return self._points.other_fold(self._leading.edge)
 
-    def gaps(self, at: float) -> Array:
-        """Gaps that are expected at d = ``at``."""
+    def gaps(self, d: float) -> Array:
+        """Gaps that are expected at ``d``."""
         point = self.point
-        on = at - point.at
+        on = d - point.d
         if not (on * self.way > 0 and abs(on) < PREDICTION_TRUSTED * abs(self.way)):
-            return point.extrapolate(at)
+            return point.extrapolate(d)
         return self._points.predict_gaps(on, self._leading)
 
     def reach(self, most: float, finest: float) -> float:

@@ -16,7 +16,7 @@ from adhesis.solver.values import with_values
 class PreviousPoint(NamedTuple):
     """d, and rate and place of every edge, at the point before one; see :class:`Point`."""
 
-    at: float
+    d: float
     rate: Array
     gaps: Array
 
@@ -44,8 +44,8 @@ class Point:
 
     Attributes
     ----------
-    at : float
-        d, what is prescribed: q0 s at fixed separation.
+    d : float
+        What is prescribed: q0 s at fixed separation.
     field : GapField
     rate : array, shape (2L,)
         dn/dd of every edge along the branch, n the outward motion of the contact.
@@ -57,7 +57,7 @@ class Point:
         With two works of adhesion.
     """
 
-    at: float
+    d: float
     field: GapField
     rate: Array
     slope: float
@@ -100,6 +100,6 @@ class Point:
             return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))
 
-    def extrapolate(self, at: float) -> Array:
-        """Extrapolate the gaps to d = ``at``, along the tangent."""
-        return move_edges(self.gaps, self.rate * (at - self.at))
+    def extrapolate(self, d: float) -> Array:
+        """Extrapolate the gaps to ``d``, along the tangent."""
+        return move_edges(self.gaps, self.rate * (d - self.d))

@@ -65,16 +65,16 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
     """
     reach = edges.longest_step
 
-    def solve(clear: Point, hit: Point, at: float) -> Point | None:
+    def solve(clear: Point, hit: Point, d: float) -> Point | None:
         if clear.gaps is hit.gaps:
-            return Point(at, edges.field(clear.gaps, at), clear.rate, math.nan)
-        share = (at - clear.at) / (hit.at - clear.at)
+            return Point(d, edges.field(clear.gaps, d), clear.rate, math.nan)
+        share = (d - clear.d) / (hit.d - clear.d)
         gaps = clear.gaps + share * (hit.gaps - clear.gaps)
-        point = edges.equilibrium(gaps, at, reach, memory=clear.gaps)
-        near = abs(at - clear.at) < abs(hit.at - at)
+        point = edges.equilibrium(gaps, d, reach, memory=clear.gaps)
+        near = abs(d - clear.d) < abs(hit.d - d)
         for start in (clear, hit) if near else (hit, clear):
             if point is None:
-                point = edges.equilibrium(start.extrapolate(at), at, reach, memory=clear.gaps)
+                point = edges.equilibrium(start.extrapolate(d), d, reach, memory=clear.gaps)
         return point
 
     return solve
@@ -104,7 +104,7 @@ def locate(
         hit_value, hit_candidates = criterion.minimum(hit.field)
     cleared = 0  # trials one after the other that were clear
     for _ in range(sys.float_info.mant_dig):
-        if criterion.is_located(hit_value, abs(clear.at - hit.at) <= resolution):
+        if criterion.is_located(hit_value, abs(clear.d - hit.d) <= resolution):
             break
         share = 0.5
         # The least value may be that of another candidate than the hit: then a secant creeps.
@@ -112,8 +112,8 @@ def locate(
             # to a fifth of the tolerance below zero, and off both ends
             share = (clear_value + 0.2 * criterion.tolerance) / (clear_value - hit_value)
             share = min(max(share, 0.02), 0.98)
-        trial = clear.at + (hit.at - clear.at) * share
-        if trial in (clear.at, hit.at):  # there its value differs by the error of the field
+        trial = clear.d + (hit.d - clear.d) * share
+        if trial in (clear.d, hit.d):  # there its value differs by the error of the field
             return Located(clear, criterion.choose_seeds(hit_candidates), 0.0)
         between = solve(clear, hit, trial)
         if between is None:
@@ -125,7 +125,7 @@ def locate(
         else:
             hit, hit_candidates, hit_value = between, candidates, value
     # estimate the distance from the exact location by a secant
-    late = abs(clear.at - hit.at)
+    late = abs(clear.d - hit.d)
     if clear_value > hit_value:
         late *= -hit_value / (clear_value - hit_value)
     return Located(hit, criterion.choose_seeds(hit_candidates), late)

@@ -122,8 +122,8 @@ class Nucleation:
         clearance = self._lengths.clearances(np.full(len(theta), self.range), curvature)
         separation = profile.h_max * profile.q0 - float(clearance.max()) + opening
         if opening > 0:
-            at = 0.0 if self.edges.is_load else separation
-            left, width = self._judge(np.empty((0, 2)), at, theta, opening, float(widths[0]))
+            d = 0.0 if self.edges.is_load else separation
+            left, width = self._judge(np.empty((0, 2)), d, theta, opening, float(widths[0]))
             if left > 0:
                 return separation, []
             widths = np.full(len(theta), width)
@@ -167,8 +167,8 @@ class Nucleation:
             if self._has_healed(theta[i], opening[i]):
                 clearance[i] = opening[i]
                 continue
-            at = field.gaps, field.prescribed, theta[i : i + 1]
-            clearance[i], widths[i] = self._judge(*at, float(opening[i]), float(widths[i]))
+            where = field.gaps, field.prescribed, theta[i : i + 1]
+            clearance[i], widths[i] = self._judge(*where, float(opening[i]), float(widths[i]))
         least = min(least, float(clearance.min(initial=np.inf)))
         return least, Minima(theta, opening, widths, clearance)
 
@@ -213,10 +213,10 @@ class Nucleation:
             np.array([t.width for t in touches]),
         )
 
-    def way_since_healed(self, touches: list[Touch], at: float) -> float:
+    def way_since_healed(self, touches: list[Touch], d: float) -> float:
         """Return the way in d since patches at these places last did not hold; 0 if they did."""
         healed = any(self._has_healed(touch.theta, math.inf) for touch in touches)
-        return abs(at - self.healed_at) if healed else 0.0
+        return abs(d - self.healed_at) if healed else 0.0
 
     def _has_healed(self, theta: float, opening: float) -> bool:
         near = HEALED_PLACE * self.edges.wave
@@ -226,14 +226,14 @@ class Nucleation:
             for place, before in self.healed
         )
 
-    def heal(self, touches: list[Touch], at: float) -> bool:
-        """Record touches whose patches did not hold at d = ``at``; returns whether there are any.
+    def heal(self, touches: list[Touch], d: float) -> bool:
+        """Record touches whose patches did not hold at ``d``; returns whether there are any.
 
         Surfaces that overlap touch in any case.
         """
         if self.range > 0:
             healed = [(touch.theta, touch.opening) for touch in touches if touch.opening > 0]
             self.healed += healed
-            self.heals, self.healed_at = self.heals + len(healed), at
+            self.heals, self.healed_at = self.heals + len(healed), d
             return bool(healed)
         return False

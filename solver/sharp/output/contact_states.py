@@ -71,9 +71,9 @@ class States:
             return prescribed / self._half
         return prescribed * self.q0
 
-    def to_si(self, at: float) -> float:
-        """Convert d = ``at`` to the prescribed value in m, under a load in Pa."""
-        return at * self._half if self.problem.control.is_load else at / self.q0
+    def to_si(self, d: float) -> float:
+        """Convert ``d`` to the prescribed value in m, under a load in Pa."""
+        return d * self._half if self.problem.control.is_load else d / self.q0
 
     def prescribed_of(self, state: ContactState) -> float:
         """Return the prescribed value of a state in field units, d."""
@@ -83,22 +83,22 @@ class States:
         """Make the state without contact at q0 s = ``separation``."""
         return ContactState.detached(separation / self.q0)
 
-    def attracts_when_detached(self, at: float, touch: float | None = None) -> bool:
-        """Return whether a state without contact at d = ``at`` would lie below q0 s = ``touch``.
+    def attracts_when_detached(self, d: float, touch: float | None = None) -> bool:
+        """Return whether a state without contact at ``d`` would lie below q0 s = ``touch``.
 
         That is by default q0 h_max, below which surfaces would overlap.
         """
         touch = self.problem.profile.h_max * self.q0 if touch is None else touch
-        return not self.problem.control.is_load and at < touch * (1 - 1e-12)
+        return not self.problem.control.is_load and d < touch * (1 - 1e-12)
 
-    def detached_after(self, before: ContactState, at: float) -> ContactState:
-        """Make the state after ``before`` has lost contact at d = ``at``.
+    def detached_after(self, before: ContactState, d: float) -> ContactState:
+        """Make the state after ``before`` has lost contact at ``d``.
 
         Under a load the loop is closed at the separation of the loss (``model.control``).
         """
         if self.problem.control.is_load:
             return self.detached(before.separation * self.q0)
-        return self.detached(at)
+        return self.detached(d)
 
     def _hold_energy(self, separation: float, mean_stress: float) -> float:
         """Compute the contribution of the control to the potential, in J/m."""
@@ -118,12 +118,12 @@ class States:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
         half, gaps, solution = self._half, gap_field.gaps, gap_field.solution
-        at, pressure = solution.separation, solution.pressure
+        d, pressure = solution.separation, solution.pressure
         if separation is None:
-            separation = at / self.q0
+            separation = d / self.q0
         mean_stress = pressure * half
         patches, closed = patches_between(gaps), self.adhesion.contact_work(gaps)
-        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * at * pressure
+        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * d * pressure
         return ContactState(
             separation=separation,
             edges=patches / self.q0,
@@ -137,12 +137,12 @@ class States:
         )
 
     def at_fixed_edges(
-        self, state: ContactState, gap_field: GapField, response: FixedEdgeResponse, at: float
+        self, state: ContactState, gap_field: GapField, response: FixedEdgeResponse, d: float
     ) -> ContactState:
-        """Move a state to d = ``at`` at fixed edges: p is linear in s, U quadratic."""
-        way = at - gap_field.prescribed
+        """Move a state to ``d`` at fixed edges: p is linear in s, U quadratic."""
+        way = d - gap_field.prescribed
         pressure = gap_field.pressure + response.pressure * way
-        q0_s = at
+        q0_s = d
         if not self.problem.control.is_fixed:
             q0_s = gap_field.separation + response.separation * way
         work = -np.pi * (q0_s - gap_field.separation) * (gap_field.pressure + pressure)
