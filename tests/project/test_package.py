@@ -3,6 +3,7 @@
 import ast
 import builtins
 import inspect
+import pkgutil
 import re
 import subprocess
 import sys
@@ -68,6 +69,11 @@ def test_the_public_names_are_those_of_the_reference() -> None:
     assert (ROOT / "adhesis" / "py.typed").exists()
     with pytest.raises(AttributeError, match="no attribute 'run_lop'"):
         adhesis.run_lop  # noqa: B018
+
+
+def test_the_reference_names_what_there_is() -> None:
+    names = re.findall(r"auto\w+:: (.+)$", REFERENCE, re.MULTILINE)
+    assert len([pkgutil.resolve_name(name) for name in names]) > len(PUBLIC)
 
 
 def test_type_checkers_see_the_modules_that_the_running_program_loads() -> None:
