@@ -39,6 +39,7 @@ from adhesis.solver.sharp.tolerances import (
     EQUAL,
     FIELD_ACCURACY,
     RESPONSE_TRIALS,
+    RESTS,
 )
 
 
@@ -180,10 +181,10 @@ class EdgeMechanics(EdgeProblem):
         """
         law = EdgeLaw(self.law_at(gaps))
         law.longest_step *= share
-        left, pushes, raced = ENDLESS, 0, False
+        left, rests, raced = ENDLESS, 0, False
         orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
-        while left > 0:
+        while left > 0 and rests <= 2 * RESTS:
             end, orders, left = self._descend(
                 gaps, prescribed, left, orders, law, equal_speeds, start
             )
@@ -199,22 +200,24 @@ class EdgeMechanics(EdgeProblem):
             if end.event == DescentEvent.AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
-                stands = (
+                rests += 1
+                if (
                     gaps.shape == rested.shape
                     and np.abs(gaps - rested).max() < self.newton_tolerance
-                )
+                ):
+                    rests = max(rests, RESTS + 1)  # no patience changes anything
                 rested = gaps
+                strict = rests <= RESTS
                 point = self.equilibrium(
-                    gaps, prescribed, reach, orders, strict=not stands, memory=law.memory
+                    gaps, prescribed, reach, orders, strict=strict, memory=law.memory
                 )
                 if point is not None:
                     return point, raced
                 ways = self.ways_off_saddle(gaps, prescribed, law)
                 if ways:
                     gaps = ways[0]
-                elif stands:
-                    pushes += 1
-                    gaps = self._perturb_most_unbalanced(gaps, prescribed, pushes, law)
+                elif not strict and rests <= 2 * RESTS:
+                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
     def _descend(
