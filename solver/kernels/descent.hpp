@@ -5,7 +5,8 @@
 // stable and follow; of the held ones the tangent is condensed. With it their flow is integrated
 // through a model of their openings, over several shortest waves where they run, and over a
 // fraction of one near equilibria and saddles, where a gap closes or a patch vanishes. The field at
-// the end of each step shows how wrong the model was.
+// the end of each step shows how wrong the model was; where a step has led to gaps that need more
+// nodes, it is asked of the first one only, next to a fold.
 #pragma once
 
 #include "edge_model.hpp"

@@ -536,7 +536,7 @@ def friction_text(
 ) -> str:
     """Return in one line which part of a loss is friction of edges; values in J/m².
 
-    ``varies`` tells whether the works of adhesion vary along the profile.
+    ``varies``: whether the works of adhesion vary along the profile.
     """
     mean = " in the mean" if varies else ""
     return (

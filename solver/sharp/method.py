@@ -53,7 +53,6 @@ from adhesis.solver.sharp.tolerances import (
     LARGEST_WORK_OF_STEP,
     LATE_DROP,
     LEAST_DROP,
-    LONGEST_STEP,
     OVERLAP,
     PLACED_BY_PROFILE,
     RANGE_RESOLVED,
@@ -269,7 +268,7 @@ class SharpMethod(Method):
         else:
             gaps = state.internal.gaps
             if point is None:
-                point = self.edges.equilibrium(gaps, d, LONGEST_STEP * self.edges.wave)
+                point = self.edges.equilibrium(gaps, d, self.edges.longest_step)
             else:
                 d = point.d  # that of the state but for rounding
             if point is None:

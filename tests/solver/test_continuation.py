@@ -23,6 +23,7 @@ class Curve:
     smallest: float = 1e-9
     critical: float = 1.0
     wave: float = WAVE
+    longest_step: float = 0.05 * WAVE
     is_load: bool = False
     asked: int = 0
     pins: bool = False

@@ -162,7 +162,7 @@ def test_under_a_load_the_solid_falls_off_at_the_largest_tension_of_the_larger_w
 
 
 def test_a_loop_under_a_load_does_not_creep() -> None:
-    """Edges that move by less than Newton's iteration tells once held each other to shortest steps.
+    """Edges that move by less than Newton's tolerance once held each other to shortest steps.
 
     A loop then took tens of thousands of them.
     """

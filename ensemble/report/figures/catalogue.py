@@ -50,7 +50,7 @@ class Illustration:
 
 
 def _several(name: str) -> Callable[[Aggregate], bool]:
-    """Return the function that tells whether finished cells have several values of a number."""
+    """Return the function that is true if finished cells have several values of a number."""
     return lambda data: len({getattr(cell, name) for cell in data.cells if cell.done}) > 1
 
 

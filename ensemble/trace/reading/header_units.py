@@ -92,7 +92,7 @@ _STEP = _set(
     "messschrittweite messschritt abtastschritt abtastschrittweite abtastintervall 測定ピッチ "
     "サンプリングピッチ 測定間隔 サンプリング間隔 データ間隔 측정간격 측정피치 采样间隔 采样步长"
 )
-# Words for the pitch of a grating, too: one more word tells that it is the step, or a column that
+# Words for the pitch of a grating, too: one more word makes it the step, or a column that
 # counts the points.
 _PITCH = _set("pitch pas paso passo шаг ピッチ 간격 피치 步长")
 _OF_STEP = _set(

@@ -360,4 +360,4 @@ def correct(edges: EdgeMechanics, predictor: Predictor, d: float) -> Point | Non
     # not written as > : a prediction that is no number is none
     if not np.abs(gaps - predictor.point.gaps).max() <= COMPARABLE * edges.wave:
         return None
-    return edges.equilibrium(gaps, d, LONGEST_STEP * edges.wave, memory=predictor.point.gaps)
+    return edges.equilibrium(gaps, d, edges.longest_step, memory=predictor.point.gaps)

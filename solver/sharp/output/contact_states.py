@@ -118,12 +118,12 @@ class States:
         """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
         half, gaps, solution = self._half, gap_field.gaps, gap_field.solution
-        d, pressure = solution.separation, solution.pressure
+        q0_s, pressure = solution.separation, solution.pressure
         if separation is None:
-            separation = d / self.q0
+            separation = q0_s / self.q0
         mean_stress = pressure * half
         patches, closed = patches_between(gaps), self.adhesion.contact_work(gaps)
-        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * d * pressure
+        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * q0_s * pressure
         return ContactState(
             separation=separation,
             edges=patches / self.q0,
