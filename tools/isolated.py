@@ -25,8 +25,9 @@ def _limited(work: Callable[..., Any], limit: float, given: tuple[Any, ...]) -> 
 class Isolated:
     """A function whose calls run in another process, one after the other.
 
-    A process that dies or takes too long is replaced at the next call. ``work`` is a function of
-    the top level of a module, ``limit`` the CPU time of a call, in s.
+    A process that dies or takes too long is replaced at the next call; leaving a ``with`` block
+    of :func:`contextlib.closing` ends it. ``work`` is a function of the top level of a module,
+    ``limit`` the CPU time of a call, in s.
     """
 
     def __init__(self, work: Callable[..., Any], limit: float) -> None:
@@ -40,10 +41,10 @@ class Isolated:
         try:
             return self._pool.submit(_limited, self._work, self._limit, given).result(), ""
         except BrokenProcessPool:
-            self.end()
+            self.close()
             return None, f"the process died, or took more than {self._limit:g} s of CPU time"
 
-    def end(self) -> None:
+    def close(self) -> None:
         """End the process."""
         if self._pool is not None:
             self._pool.shutdown()

@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import closing
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -64,8 +65,7 @@ def main() -> int:
     args = parser.parse_args()
     end = time.monotonic() + args.seconds
     found: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
-    isolated = Isolated(judged, LIMIT)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, closing(Isolated(judged, LIMIT)) as isolated:
         for number in count():
             for kind in KINDS:
                 answer, ended = isolated(folder, args.seed, kind, number)

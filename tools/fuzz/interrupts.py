@@ -23,6 +23,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -217,15 +218,15 @@ def main() -> int:
     for place, name in enumerate(KINDS):
         started = time.monotonic()
         end = started + (until - started) / (len(KINDS) - place)
-        isolated = Isolated(once, LIMIT)
         count: Counter[str] = Counter()
-        for number in itertools.count():
-            if count and time.monotonic() > end:
-                break
-            how, died = isolated(name, args.seed, number)
-            count[how or f"CRASH: {died}"] += 1
-            if name == "first" and not died:
-                isolated.end()
+        with closing(Isolated(once, LIMIT)) as isolated:
+            for number in itertools.count():
+                if count and time.monotonic() > end:
+                    break
+                how, died = isolated(name, args.seed, number)
+                count[how or f"CRASH: {died}"] += 1
+                if name == "first" and not died:
+                    isolated.close()
         bad = sum(n for how, n in count.items() if how.split()[0] not in ("raised", "done"))
         bad += name == "first" and len({how.split()[-1] for how in count}) > 1
         wrong += bad

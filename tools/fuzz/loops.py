@@ -23,6 +23,7 @@ import os
 import sys
 import time
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -91,27 +92,27 @@ def main() -> int:
         print(one)
         return int(bool(one["wrong"]))
     end, shown = time.monotonic() + args.seconds, time.monotonic()
-    isolated = Isolated(judged, LIMIT)
     everything: list[dict[str, Any]] = []
     kinds: Counter[str] = Counter()
     failures = races = 0
-    for number in range(args.scenes):
-        if time.monotonic() > end and everything:
-            break
-        found, ended = isolated(args.seed, number, args.law, args.control)
-        found = found or {"wrong": [ended], "kind": "ended"}
-        everything.append(found)
-        kinds[found["kind"]] += 1
-        races += bool(found.get("races"))
-        if found["wrong"]:
-            failures += 1
-            again = f"python tools/fuzz/loops.py --seed {args.seed} --number {number}"
-            again += f" --law {args.law} --control {args.control}"
-            print(f"{'; '.join(found['wrong'])}\n    {again}")
-        if time.monotonic() - shown > 14:
-            shown = time.monotonic()
-            count = len(everything)
-            print(f"fuzz: {count} loops, {failures} wrong, {races} with races", flush=True)
+    with closing(Isolated(judged, LIMIT)) as isolated:
+        for number in range(args.scenes):
+            if time.monotonic() > end and everything:
+                break
+            found, ended = isolated(args.seed, number, args.law, args.control)
+            found = found or {"wrong": [ended], "kind": "ended"}
+            everything.append(found)
+            kinds[found["kind"]] += 1
+            races += bool(found.get("races"))
+            if found["wrong"]:
+                failures += 1
+                again = f"python tools/fuzz/loops.py --seed {args.seed} --number {number}"
+                again += f" --law {args.law} --control {args.control}"
+                print(f"{'; '.join(found['wrong'])}\n    {again}")
+            if time.monotonic() - shown > 14:
+                shown = time.monotonic()
+                count = len(everything)
+                print(f"fuzz: {count} loops, {failures} wrong, {races} with races", flush=True)
     if args.law == "range":
         print(f"fuzz: {opening_summary(everything)}")
     seconds = sum(found.get("seconds", 0.0) for found in everything)
