@@ -31,10 +31,10 @@ from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import History, Jumps
-from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -75,7 +75,7 @@ class SharpReport(MethodReport):
     jump_resolution : float
         To which a jump is located: separation over h_max, under a load σ~.
     fields, energies, openings, newton_steps, descent_steps : int
-        See ``system.edge_problem.Counters``.
+        See ``edge_problem.Counters``.
     """
 
     accuracy: float

@@ -11,8 +11,8 @@ import numpy as np
 from adhesis.solver._kernels import COMPARABLE, STEP_GROWTH, STEP_REDUCTION, shortest_length
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.continuation.predictor import Predictor
-from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import signs_of, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (

@@ -12,6 +12,7 @@ from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import (
     Accepted,
     Fold,
@@ -20,10 +21,8 @@ from adhesis.solver.sharp.continuation.branch import (
     Target,
 )
 from adhesis.solver.sharp.continuation.jump import ComputedJump, EventOrders, History, Jumps
-from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import positions, step_limits
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.gap.ends import lengths_of, move_edges
+from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.location import (
     Located,
@@ -159,15 +158,14 @@ class Follower:
         jump = self._nucleation_jump(branch, target)
         if jump is not None:
             return jump
-        if self._may_touch_before(fold):
-            point = fold.point
-            held = self.edges.field(point.gaps, fold.d)
-            branch.trail.append(Point(fold.d, held, point.rate, math.nan))
+        held = self.edges.hold(fold.point, fold.d)
+        if self._may_touch_before(fold.point, held):
+            branch.trail.append(held)
             jump = self._nucleation_jump(branch, target)
             if jump is not None:
-                return replace(jump, states=(self.states.of_point(point), *jump.states))
+                return replace(jump, states=(self.states.of_point(fold.point), *jump.states))
         last = history.states[-1] if history.states else None
-        jump = self._fold_jump(last, fold, target, branch.finest)
+        jump = self._fold_jump(last, fold, held, target, branch.finest)
         if jump is None:
             branch.refine(self.resolution.finest)
             return None
@@ -179,12 +177,11 @@ class Follower:
             return None
         return jump
 
-    def _may_touch_before(self, fold: Fold) -> bool:
+    def _may_touch_before(self, point: Point, held: Point) -> bool:
         """Return whether surfaces may touch on the last step to a fold, the edges being held."""
-        point = fold.point
-        way = abs(fold.d - point.d)
+        way = abs(held.d - point.d)
         if not self.edges.is_fixed:
-            way *= max(1.0, abs(self.edges.response_before_fold(point).separation))
+            way = max(way, abs(held.field.separation - point.field.separation))
         # the mean gap closes by the gaps alone, the faster the less of the period they take
         closing = way * 2 * math.pi / lengths_of(point.gaps)[0].sum()
         return bool(self.nucleation.minimum(point.field)[0] <= closing)
@@ -285,7 +282,7 @@ class Follower:
         return replace(jump, states=(before, *jump.states), misplaced=misplaced)
 
     def _fold_jump(
-        self, last: ContactState | None, fold: Fold, target: Target, finest: float
+        self, last: ContactState | None, fold: Fold, held: Point, target: Target, finest: float
     ) -> ComputedJump | None:
         """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
@@ -294,8 +291,7 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             last = self.states.of_point(point)
             states = (last,)
-        response = self.edges.response_before_fold(point)
-        before = self.states.at_fixed_edges(last, point.field, response, fold.d)
+        before = self.states.of_point(held)
         start, event_orders = self._start_at_fold(fold)
         jump = self.jumps.compute(
             before, start, fold.d, target.branch, known=point, event_orders=event_orders

@@ -11,7 +11,7 @@ import numpy as np
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch

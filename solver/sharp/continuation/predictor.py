@@ -15,7 +15,7 @@ import numpy as np
 
 from adhesis.solver._kernels import PREDICTION_TRUSTED, OtherFold, TwoPoints
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.tolerances import (
     BEYOND_FOLD,
     LEFT_BEFORE_FOLD,

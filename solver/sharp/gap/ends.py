@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver._kernels import CLOSING_SHARE
 from adhesis.solver.model.profile import Array
 
 
@@ -19,6 +20,19 @@ def lengths_of(gaps: Array) -> tuple[Array, Array]:
     patch[:-1] = gaps[1:, 0]
     patch[-1] = gaps[0, 0] + 2 * np.pi
     return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
+
+
+def positions(gaps: Array, origin: float) -> Array:
+    """Measure the distance of every edge to the right of ``origin``, in [0, 2π)."""
+    return np.asarray((gaps.ravel() - origin) % (2 * np.pi))
+
+
+def step_limits(gaps: Array, longest: float) -> Array:
+    """Limit the step of each edge: ``longest``, or a share of the gap or patch it may close."""
+    length, patch = lengths_of(gaps)
+    beside = np.stack([np.roll(patch, 1), patch], axis=1)
+    closing = CLOSING_SHARE * np.minimum(length[:, None], beside)
+    return np.minimum(longest, closing).ravel()
 
 
 @cache

@@ -8,13 +8,12 @@ inside patches.
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import BISECTION_AFTER
@@ -67,7 +66,7 @@ def equilibrium_between(edges: EdgeMechanics) -> Solve:
 
     def solve(clear: Point, hit: Point, d: float) -> Point | None:
         if clear.gaps is hit.gaps:
-            return Point(d, edges.field(clear.gaps, d), clear.rate, math.nan)
+            return edges.hold(clear, d)
         share = (d - clear.d) / (hit.d - clear.d)
         gaps = clear.gaps + share * (hit.gaps - clear.gaps)
         point = edges.equilibrium(gaps, d, reach, memory=clear.gaps)

@@ -11,11 +11,11 @@ from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
+from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
+from adhesis.solver.sharp.edge_problem import EdgeProblem
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import patches_between
-from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.values import with_values
 
 
@@ -100,11 +100,6 @@ class States:
             return self.detached(before.separation * self.q0)
         return self.detached(d)
 
-    def _hold_energy(self, separation: float, mean_stress: float) -> float:
-        """Compute the contribution of the control to the potential, in J/m."""
-        profile, control = self.problem.profile, self.problem.control
-        return control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
-
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
         return self.of_field(point.field, point.slope, separation)
@@ -124,6 +119,8 @@ class States:
         mean_stress = pressure * half
         patches, closed = patches_between(gaps), self.adhesion.contact_work(gaps)
         elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * q0_s * pressure
+        control, profile = self.problem.control, self.problem.profile
+        hold = control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
         return ContactState(
             separation=separation,
             edges=patches / self.q0,
@@ -132,29 +129,8 @@ class States:
             adhesion_energy=-self.problem.work_of_adhesion * closed / self.q0,
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             tangent=slope * self._tangent_unit,
-            hold_energy=self._hold_energy(separation, mean_stress),
+            hold_energy=hold,
             internal=ContinuationData(gaps),
-        )
-
-    def at_fixed_edges(
-        self, state: ContactState, gap_field: GapField, response: FixedEdgeResponse, d: float
-    ) -> ContactState:
-        """Move a state to ``d`` at fixed edges: p is linear in s, U quadratic."""
-        way = d - gap_field.prescribed
-        pressure = gap_field.pressure + response.pressure * way
-        q0_s = d
-        if not self.problem.control.is_fixed:
-            q0_s = gap_field.separation + response.separation * way
-        work = -np.pi * (q0_s - gap_field.separation) * (gap_field.pressure + pressure)
-        separation, mean_stress = q0_s / self.q0, pressure * self._half
-        return with_values(
-            state,
-            separation=separation,
-            mean_stress=mean_stress,
-            elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
-            tangent=float("nan"),
-            hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gap_field.gaps),
         )
 
     def with_friction(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
