@@ -18,13 +18,14 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
-from adhesis.solver.crack import Crack, griffith_length, judge_maximum, largest_excess
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import beyond_limit, opening_warnings, range_warnings
 from adhesis.solver.model.contact_state import ContactState
+from adhesis.solver.model.problem import griffith_length
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
 from adhesis.solver.sharp.continuation.branch import StableBranch
+from adhesis.solver.sharp.nucleation.opening import Crack, judge_maximum
 from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
 
 PERIOD = 2e-3
@@ -62,9 +63,10 @@ def troughs_problem(strength: float = STRENGTH) -> Problem:
 
 
 def test_the_largest_excess_opens_first_with_what_equals_it():
-    cracks = [Crack(float(i), 1 - value, value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
-    assert [crack.position for crack in largest_excess(cracks)] == [1.0, 3.0]
-    assert largest_excess(cracks[:1]) == []
+    choose = make_method("sharp", troughs_problem()).follower.cracks.choose_seeds
+    cracks = [Crack(float(i), value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
+    assert [crack.position for crack in choose(cracks)] == [1.0, 3.0]
+    assert choose(cracks[:1]) == []
 
 
 def test_the_last_gap_between_flat_surfaces_is_koiters_crack():
@@ -176,7 +178,7 @@ def test_no_crack_is_tried_beyond_the_length_at_which_the_release_rate_falls():
         tried.append(half)
         return half / (1 + half**2)
 
-    crack = judge_maximum(0.0, 1.0, 1.0, 0.5, 1.0, release, 0.5, 10.0)
+    crack = judge_maximum(0.0, 1.0, 0.5, 1.0, release, 0.5, 10.0)
     assert crack.value == pytest.approx(1 - math.sqrt(0.5 / 1.1), rel=1e-3)
     assert 1.0 < tried[-1] < 1.3
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from adhesis.solver._kernels import SearchedGaps
-from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
@@ -30,9 +29,9 @@ from adhesis.solver.sharp.nucleation.location import (
     locate,
 )
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Cracks
+from adhesis.solver.sharp.nucleation.opening import Crack, Cracks
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import EQUAL, SECOND_FOLD_DISPLACED
+from adhesis.solver.sharp.tolerances import EQUAL, MOST_OPENINGS, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 

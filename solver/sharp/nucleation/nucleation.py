@@ -27,19 +27,17 @@ from adhesis.solver._kernels import (
     SearchLengths,
     search,
 )
-from adhesis.solver.crack import (
-    GROWTH,
-    IN_PATCH,
-    LONGEST_TRIAL_HALF_LENGTH,
-)
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
+    GROWTH,
     HEALED_OPENING,
     HEALED_PLACE,
+    IN_PATCH,
+    LONGEST_TRIAL_HALF_LENGTH,
     OVERLAP,
     TRIAL_WIDTHS,
 )
@@ -83,10 +81,8 @@ class Nucleation:
     healed : list of (position, opening)
         Touches whose patches did not hold: none is tried there in the same load step unless the
         opening is smaller.
-    heals : int
-        Number of touches that did not hold, so far.
     healed_at : float
-        d of the last of them.
+        d of the last touch that did not hold.
     """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
@@ -94,7 +90,7 @@ class Nucleation:
         self.searched = SearchedGaps()
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
-        self.heals, self.healed_at = 0, math.nan
+        self.healed_at = math.nan
         self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
@@ -234,6 +230,6 @@ class Nucleation:
         if self.range > 0:
             healed = [(touch.theta, touch.opening) for touch in touches if touch.opening > 0]
             self.healed += healed
-            self.heals, self.healed_at = self.heals + len(healed), d
+            self.healed_at = d
             return bool(healed)
         return False

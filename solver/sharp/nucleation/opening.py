@@ -1,24 +1,32 @@
 """Locate cracks that open inside patches, and insert them.
 
 An interface of finite strength gives way at a local maximum of tension that reaches the strength,
-away from the edges, where tension is singular. The crack is that of ``solver.crack``.
+away from the edges, where tension is singular.
+
+With adhesion of zero range a gap inside a patch grows only beyond a length. On a flat piece under a
+uniform tension σ that is the length of Griffith's crack,
+
+    l = 4 E*γ/(πσ²),
+
+from which on G = K²/(2E*) exceeds γ, K² = πσ²l/2. Up to there the energy rises by γl/2: a barrier,
+which an interface of finite range does not have.
+
+The shortest crack is put into a patch whose G exceeds γ by a tenth at both tips, so that it grows.
+G is that of the field with the crack, all other edges being held: other gaps and the control change
+it, and so does a tension that falls away from its maximum. Both conditions have to hold, strength
+and growth, as in finite fracture mechanics (D. Leguillon, Eur. J. Mech. A 21, 61, 2002). Where no
+crack that fits grows, tension is so peaked that an interface would only yield there, and nothing
+opens.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver.crack import (
-    IN_PATCH,
-    LONGEST_TRIAL_HALF_LENGTH,
-    MOST_MAXIMA,
-    NEAR_STRENGTH,
-    Crack,
-    judge_maximum,
-    largest_excess,
-)
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
@@ -27,18 +35,43 @@ from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tensi
 from adhesis.solver.sharp.gap.ends import with_gaps
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
+    EQUAL_TENSIONS,
+    GROWTH,
+    IN_PATCH,
+    LONGEST_TRIAL_HALF_LENGTH,
+    MOST_MAXIMA,
+    NEAR_STRENGTH,
     SHORTEST_CRACK,
     STRENGTH_EXCEEDED,
 )
 
+_RATIO = 1.1  # of the lengths of cracks that are tried one after the other
+
+
+@dataclass(frozen=True)
+class Crack:
+    """A maximum of tension inside a patch, and the crack that can be put there; in 1/q0.
+
+    Attributes
+    ----------
+    position : float
+    value : float
+        Margin before it opens, in units of the strength; not positive if it opens.
+    length : float
+        Of the crack; 0 if it does not open.
+    barrier : float
+        Energy per unit depth from the closed patch up to the crack at which G = γ, in units of
+        γ/q0.
+    """
+
+    position: float
+    value: float
+    length: float = 0.0
+    barrier: float = 0.0
+
 
 class Cracks:
     """Criterion of openings inside patches for ``location.locate``, which also inserts cracks.
-
-    Parameters
-    ----------
-    problem : Problem
-    edges : EdgeMechanics
 
     Attributes
     ----------
@@ -80,8 +113,9 @@ class Cracks:
         return min((crack.value for crack in found), default=1 - NEAR_STRENGTH), found
 
     def choose_seeds(self, candidates: list[Crack]) -> list[Crack]:
-        """Choose the crack of the largest excess, and those that equal it."""
-        return largest_excess(candidates)
+        """Choose the crack of the largest excess, and those that equal it; none if none opens."""
+        least = min((crack.value for crack in candidates), default=1.0)
+        return [crack for crack in candidates if crack.value <= min(least + EQUAL_TENSIONS, 0.0)]
 
     def insert_seeds(self, gaps: Array, cracks: list[Crack]) -> Array:
         """Return the gaps with these cracks inserted."""
@@ -103,9 +137,9 @@ class Cracks:
         work, _ = self.edges.adhesion.work(theta, False)
         return judge_maximum(
             theta,
-            tension,
-            self.strength,
-            balanced=0.5 * critical**2 * work,  # γ = π E* C_c²/(16 q0), σ = E* S/2
+            tension / self.strength,
+            # γ = π E* C_c²/(16 q0), σ = E* S/2
+            balanced=0.5 * critical**2 * work / tension**2,
             toughness=work,
             release=lambda half: self._release(field, theta, half),
             shortest=0.5 * SHORTEST_CRACK * wave,
@@ -116,3 +150,55 @@ class Cracks:
         """Compute G/γ of a crack that is put into the patches of a field."""
         gaps = with_gaps(field.gaps, np.array([theta]), np.array([2 * half]))
         return float(self.edges.release(gaps, field.prescribed, theta, half).min())
+
+
+def judge_maximum(
+    position: float,
+    share: float,
+    balanced: float,
+    toughness: float,
+    release: Callable[[float], float],
+    shortest: float,
+    longest: float,
+) -> Crack:
+    """Judge whether a patch opens at a maximum of tension, and with which crack.
+
+    Parameters
+    ----------
+    position : float
+    share : float
+        Tension over the strength.
+    balanced : float
+        Half-length at which G = γ there, under a uniform tension.
+    toughness : float
+        γ of a unit of length there, over γ.
+    release : callable
+        Returns G/γ of the crack of a half-length, the smaller of those at its two tips.
+    shortest, longest : float
+        Least and largest half-length of a crack.
+    """
+    first = max(shortest, GROWTH * balanced)
+    if share < 1:
+        return Crack(position, 1 - share)
+    if first > longest:
+        return Crack(position, first / longest - 1)
+    half, rate = [0.0], [0.0]
+    # G rises with the length up to where tension falls, or the crack takes part of the mean gap
+    while first <= longest and rate[-1] == max(rate) < GROWTH * share**2:
+        half.append(first)
+        rate.append(release(first))
+        first *= _RATIO
+    value = max(1 - share, 1 - math.sqrt(max(rate) / GROWTH))
+    if value > 0:
+        return Crack(position, value)
+    grows = int(np.argmax(np.array(rate) >= GROWTH))
+    barrier = toughness * _barrier(half[: grows + 1], rate[: grows + 1])
+    return Crack(position, value, 2 * half[grows], barrier)
+
+
+def _barrier(half: list[float], rate: list[float]) -> float:
+    """Integrate 2(1 - G/γ) over the half-length of a crack, up to that at which G = γ."""
+    last = int(np.argmax(np.array(rate) >= 1))
+    share = (1 - rate[last - 1]) / (rate[last] - rate[last - 1])
+    lengths = [*half[:last], half[last - 1] + share * (half[last] - half[last - 1])]
+    return 2 * float(np.trapezoid([1 - g for g in rate[:last]] + [0.0], lengths))

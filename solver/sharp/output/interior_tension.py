@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from adhesis.solver.crack import MOST_MAXIMA
 from adhesis.solver.method import PatchTension
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
+from adhesis.solver.sharp.tolerances import MOST_MAXIMA
 
 
 def largest_tension(
