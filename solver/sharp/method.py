@@ -27,11 +27,9 @@ from adhesis.solver.method import (
     PathError,
 )
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import History, Jumps
@@ -39,7 +37,7 @@ from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
+from adhesis.solver.sharp.nucleation.nucleation import Nucleation
 from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
@@ -88,11 +86,6 @@ class SharpReport(MethodReport):
     descent_steps: int
 
 
-def _adhesion_ratio(profile: Profile, critical: float) -> float:
-    """Compute the critical opening over the opening caused by roughness, h' sqrt(λ_min)."""
-    return float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
-
-
 class SharpMethod(Method):
     """Contact states with real-valued edges.
 
@@ -136,7 +129,8 @@ class SharpMethod(Method):
         self.q0 = profile.q0
         h_max = profile.h_max * self.q0
         critical = float(4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus)))
-        ratio = _adhesion_ratio(profile, critical)
+        # over the opening that roughness makes, h' sqrt(λ_min)
+        ratio = float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
         # If adhesion is weak, C_c is a small difference of the openings caused by roughness, and
         # the loss, of the order of its square, a small difference of two works: the field, and the
         # integral along a branch (of fourth order), have to be as much finer.
@@ -262,9 +256,9 @@ class SharpMethod(Method):
                 history.states.append(self.detached(apart))
                 return history
             d = first
-            before = self.states.detached(touch)
-            history.states.append(before)
-            point = self._jump(history, before, np.empty((0, 2)), d, target, highest)
+            before, gaps = self.states.detached(touch), np.empty((0, 2))
+            jump = self.jumps.compute(before, gaps, d, target.branch, highest)
+            point = history.commit(jump)
         else:
             gaps = state.internal.gaps
             if point is None:
@@ -273,8 +267,7 @@ class SharpMethod(Method):
                 d = point.d  # that of the state but for rounding
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, d))
-                history.states.append(before)
-                point = self._jump(history, before, gaps, d, target)
+                point = history.commit(self.jumps.compute(before, gaps, d, target.branch))
             elif d == target.d:
                 history.states.append(state)
         while point is not None and d != target.d:
@@ -284,20 +277,6 @@ class SharpMethod(Method):
                 raise NoState("contact is lost where surfaces overlap", d)
             history.states.append(self.detached(target.prescribed))
         return history
-
-    def _jump(
-        self,
-        history: History,
-        before: ContactState,
-        gaps: Array,
-        d: float,
-        target: Target,
-        touches: list[Touch] | None = None,
-    ) -> Point | None:
-        """Compute the jump from a state that no branch led to, and return the point after it."""
-        jump = self.jumps.compute(before, gaps, d, target.branch, touches)
-        history.commit(jump)
-        return jump.point
 
     def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
         """Follow a path without adhesion, whose states are unique and do not jump.

@@ -138,16 +138,19 @@ def test_patches_open_under_every_control(control, turning_point):
 def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
     """It halved each of them once, so that none grew again: such a loop did not end."""
     branch = SimpleNamespace(
-        _energy_residual=lambda output, point: 100.0,
+        _states=SimpleNamespace(
+            of_point=lambda point: point, energy_residual=lambda before, after: 100.0
+        ),
+        _output=SimpleNamespace(d=0.0),
+        _at_output=None,
         _resolution=SimpleNamespace(jump=1e-6, work=1.0),
         _work_before=(0.0, math.inf),
         _work_of_fields=0.0,
     )
-    start = SimpleNamespace(d=0.0)
     for d in (1.0, 0.5):
-        StableBranch._work_error(branch, start, SimpleNamespace(d=d))
+        StableBranch._work_error(branch, SimpleNamespace(d=d))
     branch._work_before = (0.0, math.inf)  # the step was accepted
-    assert StableBranch._work_error(branch, start, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
+    assert StableBranch._work_error(branch, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
 
 
 def test_work_and_energy_agree_between_openings():

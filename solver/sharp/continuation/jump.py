@@ -25,11 +25,8 @@ class ComputedJump:
 
     Attributes
     ----------
-    d : float
-        Of the jump.
     states : tuple of ContactState
-        States before it that the path does not hold yet, and the one after it.
-    jump : Jump
+        The state before it and the one after it; before these states that led there.
     point : Point or None
         The stable point after it; None if no contact is left.
     misplaced : float
@@ -45,26 +42,18 @@ class ComputedJump:
 
 @dataclass
 class History:
-    """States and jumps of a path.
-
-    Attributes
-    ----------
-    states : list of ContactState
-    jumps : list of Jump
-    misplaced : float
-        Work in J/m² of nominal area by which the loss may be wrong because jumps were not found at
-        their exact places.
-    """
+    """States and jumps of a path, and the sum of the works by which these may be wrong."""
 
     states: list[ContactState] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
     misplaced: float = 0.0
 
-    def commit(self, computed: ComputedJump) -> None:
-        """Append a jump and its states."""
+    def commit(self, computed: ComputedJump) -> Point | None:
+        """Append a jump and its states, and return the point after it."""
         self.states += computed.states
         self.jumps.append(computed.jump)
         self.misplaced += computed.misplaced
+        return computed.point
 
 
 @dataclass(frozen=True)
@@ -88,14 +77,7 @@ Rival = Point | None | FullContact | NoState
 
 
 class Jumps:
-    """Jumps of one problem.
-
-    Parameters
-    ----------
-    edges : EdgeMechanics
-    nucleation : Nucleation
-    states : States
-    """
+    """Jumps of one problem."""
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
@@ -178,7 +160,7 @@ class Jumps:
         if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
             at_stake = 0.0
         jump = self.states.jump(before, after, branch, at_stake, barrier)
-        return ComputedJump(d, (after,), jump, point)
+        return ComputedJump(d, (before, after), jump, point)
 
     def _at_stake_beyond(
         self, before: ContactState, point: Point | None, event_orders: EventOrders
@@ -339,11 +321,7 @@ class MirrorCheck:
     The mirror image of their end is another end with the same energy: which of the two is reached
     is a convention (docs/methods.md, rule 7).
 
-    Parameters
-    ----------
-    edges : EdgeMechanics
-    axes : array, shape (axes,)
-        About which the profile is its own mirror image, in θ.
+    ``axes`` are those about which the profile is its own mirror image, in θ.
     """
 
     def __init__(self, edges: EdgeMechanics, axes: Array) -> None:
