@@ -220,13 +220,7 @@ def touch_stress(
     |Δp̄|. Otherwise dx/ds is that between the state before the jump and the one before that; before
     first touch it is 1, and 0 under a load, which then moves nothing but the solid.
 
-    Parameters
-    ----------
-    jumps : sequence of Jump
-    before : sequence of int, shape (jumps,)
-        Index of the state before each jump.
-    separation, mean_stress, patches : array, shape (states,)
-    control : Control
+    ``before`` has the index of the state before each jump; the arrays have the shape (states,).
     """
     x = control.prescribed(separation, mean_stress)
     y = control.conjugate(separation, mean_stress, 0.0)
@@ -249,23 +243,8 @@ def turn_range(method: Method, record: Record, step: float, lost: float, longest
 
     Each leg of loading is followed beyond its end, where the path turns or ends. Where it cannot be
     followed so far, or full contact is near, the way up to there counts: nothing is known beyond.
-
-    Parameters
-    ----------
-    method : Method
-    record : Record
-        Of the path.
-    step : float
-        Load step in the prescribed value, positive.
-    lost : float
-        Loss in J/m².
-    longest : float
-        The way is followed so far, in m.
-
-    Returns
-    -------
-    float
-        The least over the turning points; infinite if it is longer than ``longest``.
+    The least over the turning points is returned; infinite if it is longer than ``longest``, in m.
+    ``step`` is the load step in the prescribed value, positive, ``lost`` the loss in J/m².
     """
     if method.problem.work_of_adhesion == 0:
         return math.inf
