@@ -41,7 +41,6 @@ from adhesis.solver.sharp.nucleation.nucleation import Nucleation
 from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
-from adhesis.solver.sharp.output.interior_tension import largest_tension
 from adhesis.solver.sharp.tolerances import (
     FIELD_ACCURACY,
     FIELD_RESOLVES,
@@ -202,7 +201,15 @@ class SharpMethod(Method):
     @one_at_a_time
     def largest_tension(self, states: Sequence[ContactState]) -> PatchTension | None:
         """Find the largest local maximum of tension inside patches; see the contract."""
-        return largest_tension(self.problem, lambda i: self._field(states[i]), len(states))
+        best: PatchTension | None = None
+        largest, unit = 0.0, self.problem.half_space.modulus / 2
+        for number, state in enumerate(states):
+            for maximum in self.follower.cracks.inner.maxima(self._field(state), largest):
+                if maximum.tension > largest:
+                    largest = maximum.tension
+                    position = maximum.theta / self.q0 % self.problem.profile.period
+                    best = PatchTension(number, position, largest * unit)
+        return best
 
     @one_at_a_time
     def openings(self, state: ContactState) -> list[Opening]:

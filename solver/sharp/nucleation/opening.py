@@ -29,9 +29,8 @@ import numpy as np
 
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.field.gap_field import GapField
-from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
+from adhesis.solver.sharp.field.patch_tension import InnerTension, TensionMaximum
 from adhesis.solver.sharp.gap.ends import with_gaps
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
@@ -39,7 +38,6 @@ from adhesis.solver.sharp.tolerances import (
     GROWTH,
     IN_PATCH,
     LONGEST_TRIAL_HALF_LENGTH,
-    MOST_MAXIMA,
     NEAR_STRENGTH,
     SHORTEST_CRACK,
     STRENGTH_EXCEEDED,
@@ -86,7 +84,7 @@ class Cracks:
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.edges = edges
         self.strength = problem.strength / (problem.half_space.modulus / 2)
-        self._nodal = nodal_tension(problem) if self.is_possible else None
+        self.inner = InnerTension(problem)
 
     @property
     def is_possible(self) -> bool:
@@ -98,18 +96,8 @@ class Cracks:
 
         The value is positive, too, where tension falls from all edges.
         """
-        if self._nodal is None:
-            return 1.0, []
-        tension = self._nodal.of(field)
-        nodes = highest_peaks(tension, MOST_MAXIMA, NEAR_STRENGTH * self.strength)
-        if not nodes:
-            return 1 - NEAR_STRENGTH, []
-        refined = RefinedTension.of(field)
-        found = []
-        for node in nodes:
-            maximum = refined.maximum(node * self._nodal.step, self._nodal.step)
-            if maximum is not None:
-                found.append(self._crack_at(field, refined, *maximum))
+        maxima = self.inner.maxima(field, NEAR_STRENGTH * self.strength)
+        found = [self._crack_at(field, maximum) for maximum in maxima]
         return min((crack.value for crack in found), default=1 - NEAR_STRENGTH), found
 
     def choose_seeds(self, candidates: list[Crack]) -> list[Crack]:
@@ -129,11 +117,10 @@ class Cracks:
         """
         return near or value > -0.5 * self.tolerance
 
-    def _crack_at(
-        self, field: GapField, refined: RefinedTension, theta: float, tension: float
-    ) -> Crack:
+    def _crack_at(self, field: GapField, maximum: TensionMaximum) -> Crack:
         """Judge one maximum of tension."""
         wave, critical = self.edges.wave, self.edges.critical
+        theta, tension, distance = maximum
         work, _ = self.edges.adhesion.work(theta, False)
         return judge_maximum(
             theta,
@@ -143,7 +130,7 @@ class Cracks:
             toughness=work,
             release=lambda half: self._release(field, theta, half),
             shortest=0.5 * SHORTEST_CRACK * wave,
-            longest=min(LONGEST_TRIAL_HALF_LENGTH * wave, IN_PATCH * refined.edge_distance(theta)),
+            longest=min(LONGEST_TRIAL_HALF_LENGTH * wave, IN_PATCH * distance),
         )
 
     def _release(self, field: GapField, theta: float, half: float) -> float:
