@@ -9,7 +9,6 @@ import numpy as np
 
 from adhesis.solver._kernels import (
     CLOSING_SHARE,
-    Descent,
     DescentEvent,
     EdgeLaw,
     Equilibrium,
@@ -167,26 +166,13 @@ class EdgeMechanics(EdgeProblem):
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)
 
     def relax(
-        self,
-        gaps: Array,
-        prescribed: float,
-        reach: float,
-        *,
-        equal_speeds: bool = False,
-        share: float = 1.0,
-    ) -> tuple[Point | Array, bool]:
-        """Descend in energy at a prescribed value to the next minimum.
+        self, gaps: Array, prescribed: float, *, equal_speeds: bool = False, share: float = 1.0
+    ) -> tuple[Point | None, bool]:
+        """Descend in energy at a prescribed value to the next minimum; None if no contact is left.
 
         By linear kinetics, or with ``equal_speeds``, to be compared with that; in steps of at most
-        this share of the longest.
-
-        Returns
-        -------
-        Point or array
-            The minimum, or the gaps without those gaps and patches that have closed or vanished on
-            the way (an empty array when no contact is left).
-        bool
-            Whether the order in which edges ran may have decided that.
+        this share of the longest. Gaps and patches that close or vanish on the way are left out.
+        Returns also whether the order in which edges ran may have decided the end.
 
         Raises
         ------
@@ -195,18 +181,35 @@ class EdgeMechanics(EdgeProblem):
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
+        raced = False
+        while len(gaps):
+            found, by_order = self._relax_until_one_vanishes(gaps, prescribed, equal_speeds, share)
+            raced = raced or by_order
+            if isinstance(found, Point):
+                return found, raced
+            gaps = found
+        return None, raced
+
+    def _relax_until_one_vanishes(
+        self, gaps: Array, prescribed: float, equal_speeds: bool, share: float
+    ) -> tuple[Point | Array, bool]:
+        """Descend to the next minimum, or until a gap or patch vanishes: the gaps without it."""
         law = EdgeLaw(self.law_at(gaps))
         law.longest_step *= share
         left, rests, raced = ENDLESS, 0, False
         orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            end, orders, left = self._descend(
-                gaps, prescribed, left, orders, law, equal_speeds, start
-            )
-            if end is None or end.event == DescentEvent.NO_FIELD:
+            near = self.response_near(gaps, prescribed, orders)
+            if near is None:
                 raise NoState("there is no field of these edges", prescribed)
-            gaps, raced = end.gaps, raced or end.raced
+            end = near.descend(gaps, start, prescribed, left, equal_speeds, law, self.model)
+            self.count.descent_steps += end.steps
+            self.count.fields += end.steps + end.set_ups
+            if end.event == DescentEvent.NO_FIELD:
+                raise NoState("there is no field of these edges", prescribed)
+            gaps, orders, left = end.gaps, near.orders, left - end.steps
+            raced = raced or end.raced
             if end.event == DescentEvent.VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
@@ -225,7 +228,7 @@ class EdgeMechanics(EdgeProblem):
                 rested = gaps
                 strict = rests <= RESTS
                 point = self.equilibrium(
-                    gaps, prescribed, reach, orders, strict=strict, memory=law.memory
+                    gaps, prescribed, self.longest_step, orders, strict=strict, memory=law.memory
                 )
                 if point is not None:
                     return point, raced
@@ -235,28 +238,6 @@ class EdgeMechanics(EdgeProblem):
                 elif not strict and rests <= 2 * RESTS:
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
-
-    def _descend(
-        self,
-        gaps: Array,
-        prescribed: float,
-        most: int,
-        orders: Integers | None,
-        law: EdgeLaw,
-        equal_speeds: bool,
-        start: Array,
-    ) -> tuple[Descent | None, Integers | None, int]:
-        """Descend on the linear response; returns its orders at the end and the steps left, too.
-
-        None if the edges have no field.
-        """
-        near = self.response_near(gaps, prescribed, orders)
-        if near is None:
-            return None, orders, most
-        end = near.descend(gaps, start, prescribed, most, equal_speeds, law, self.model)
-        self.count.descent_steps += end.steps
-        self.count.fields += end.steps + end.set_ups
-        return end, near.orders, most - end.steps
 
     def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.

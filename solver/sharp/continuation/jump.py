@@ -113,7 +113,7 @@ class Jumps:
             return False
         d = 0.0 if self.edges.is_load else separation
         try:
-            point, _ = self._relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), d)
+            point, _ = self.edges.relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), d)
         except FullContact:
             return True
         return point is not None and self.states.of_point(point).potential < 0
@@ -169,7 +169,7 @@ class Jumps:
         d = event_orders.beyond
 
         def end(start: Array) -> Point | None:
-            return self._end_of(self._relax(start, d)[0], d)
+            return self._end_of(self.edges.relax(start, d)[0], d)
 
         both = None if point is None else end(point.gaps)
         differences = [self._at_stake(before, both, end(start), d) for start in event_orders.starts]
@@ -197,7 +197,7 @@ class Jumps:
 
         def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
             gaps = self.nucleation.insert_seeds(gaps, touching)
-            return self._relax(gaps, d, equal_speeds=equal_speeds)[0]
+            return self.edges.relax(gaps, d, equal_speeds=equal_speeds)[0]
 
         return self._nucleate_until_clear(point, d, relaxed)
 
@@ -272,16 +272,16 @@ class Jumps:
         """
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
-        point, raced = self._relax(gaps, d)
+        point, raced = self.edges.relax(gaps, d)
         if not (raced and self._may_race):
             return point
         others: list[Rival] = []
         try:
-            others.append(self._relax(gaps, d, equal_speeds=True)[0])
+            others.append(self.edges.relax(gaps, d, equal_speeds=True)[0])
         except (FullContact, NoState) as unknown:
             others.append(unknown)
         with suppress(NoState, FullContact):
-            finer, _ = self._relax(gaps, d, share=FINER_STEPS)
+            finer, _ = self.edges.relax(gaps, d, share=FINER_STEPS)
             if point and finer and not self._is_same_minimum(point, finer):
                 end, other = (self.states.of_point(one).potential for one in (finer, point))
                 if end < other:
@@ -300,19 +300,6 @@ class Jumps:
         if other is not None and self.is_same(other.gaps, start):
             return False
         return not self._is_same_minimum(other, point)
-
-    def _relax(
-        self, gaps: Array, d: float, *, equal_speeds: bool = False, share: float = 1.0
-    ) -> tuple[Point | None, bool]:
-        """Descend until nothing vanishes; returns also whether edges may have raced."""
-        reach, races = self.edges.longest_step, False
-        while len(gaps):
-            found, raced = self.edges.relax(gaps, d, reach, equal_speeds=equal_speeds, share=share)
-            races = races or raced
-            if isinstance(found, Point):
-                return found, races
-            gaps = found
-        return None, races
 
 
 class MirrorCheck:
