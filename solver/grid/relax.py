@@ -1,14 +1,7 @@
 """Relax a contact set at a fixed prescribed value: edges move until no move releases energy.
 
-The rules (docs/methods.md):
-
-*   a free node beside a patch that overlaps the rigid profile joins;
-*   otherwise edges move by energy comparison, in proportion to the energy that they release; the
-    leading one's step is doubled while it keeps its direction, is one node after a reversal, and
-    at most a tenth of the shortest wave;
-*   a state is rejected if its energy exceeds that of the last admissible state: the sweep is undone
-    and fewer edges move, finally only the most unstable one, by one node;
-*   contact nucleates where the gap vanishes away from edges, from a relaxed state only.
+A state is rejected if its energy exceeds that of the last admissible state: the sweep is undone
+and fewer edges move, finally only the most unstable one, by one node (docs/methods.md).
 """
 
 from __future__ import annotations
