@@ -32,13 +32,11 @@ from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
-from adhesis.solver.sharp.continuation.jump import History, Jumps
+from adhesis.solver.sharp.continuation.jump import History
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.nucleation import Nucleation
-from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 from adhesis.solver.sharp.tolerances import (
@@ -173,12 +171,8 @@ class SharpMethod(Method):
             least_drop=LEAST_DROP * problem.work_of_adhesion,
             field_share=FIELD_SHARE * accuracy,
         )
-        self.nucleation = Nucleation(problem, self.edges)
-        self.jumps = Jumps(self.edges, self.nucleation, self.states)
-        self.follower = Follower(
-            self.edges, self.nucleation, Cracks(problem, self.edges), self.states, self.jumps,
-            self.resolution,
-        )  # fmt: skip
+        self.follower = Follower(problem, self.edges, self.states, self.resolution)
+        self.nucleation, self.jumps = self.follower.nucleation, self.follower.jumps
         self._loaded: list[ContactState] = []  # without adhesion unloading goes back through them
 
     def report(self) -> SharpReport:

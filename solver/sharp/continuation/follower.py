@@ -10,6 +10,7 @@ import numpy as np
 from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import (
@@ -39,16 +40,11 @@ class Follower:
     """Follows the branches of one problem."""
 
     def __init__(
-        self,
-        edges: EdgeMechanics,
-        nucleation: Nucleation,
-        cracks: Cracks,
-        states: States,
-        jumps: Jumps,
-        resolution: Resolution,
+        self, problem: Problem, edges: EdgeMechanics, states: States, resolution: Resolution
     ) -> None:
-        self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
-        self.cracks, self.resolution = cracks, resolution
+        self.edges, self.states, self.resolution = edges, states, resolution
+        self.nucleation, self.cracks = Nucleation(problem, edges), Cracks(problem, edges)
+        self.jumps = Jumps(edges, self.nucleation, states)
         self._between = equilibrium_between(edges)
         self._came_on: Branch | None = None
 

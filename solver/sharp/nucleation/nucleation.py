@@ -75,8 +75,10 @@ class Nucleation:
     healed : list of (position, opening)
         Touches whose patches did not hold: none is tried there in the same load step unless the
         opening is smaller.
+    heals : int
+        Number of touches that did not hold, so far.
     healed_at : float
-        d of the last touch that did not hold.
+        d of the last of them.
     """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
@@ -84,7 +86,7 @@ class Nucleation:
         self.searched = SearchedGaps()
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
-        self.healed_at = math.nan
+        self.heals, self.healed_at = 0, math.nan
         self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
@@ -224,6 +226,6 @@ class Nucleation:
         if self.range > 0:
             healed = [(touch.theta, touch.opening) for touch in touches if touch.opening > 0]
             self.healed += healed
-            self.healed_at = d
+            self.heals, self.healed_at = self.heals + len(healed), d
             return bool(healed)
         return False
