@@ -22,15 +22,10 @@ class Lattice:
 
     Attributes
     ----------
-    elastic : ElasticGrid
-    compliance : EdgeCompliance
     height : array
         h in m.
     adhesion : array
         γ sqrt(1 + h'²) in J/m².
-    control : Control
-    h_max : float
-        In m.
     origin : int
         Node at the highest crest.
     equal_parts : int

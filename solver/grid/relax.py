@@ -73,12 +73,8 @@ class Relaxation:
     ) -> Contact | None:
         """Move the edges of ``contact`` (solved) to the local minimum reached by descent.
 
-        Descent follows linear kinetics, or with ``equal_speeds`` the alternative kinetics.
-
-        Returns
-        -------
-        Contact or None
-            A relaxed contact, solved to the tight tolerance; None if ``abort`` returned True.
+        Descent follows linear kinetics, or with ``equal_speeds`` the alternative kinetics. The
+        contact is solved to the tight tolerance; None if ``abort`` returned True.
 
         Raises
         ------

@@ -30,6 +30,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import History
@@ -267,7 +268,8 @@ class SharpMethod(Method):
             else:
                 d = point.d  # that of the state but for rounding
             if point is None:
-                before = self.states.of_field(self.edges.field(gaps, d))
+                field = self.edges.field(gaps, d)
+                before = self.states.of_point(Point(d, field, np.zeros(gaps.size), math.nan))
                 point = history.commit(self.jumps.compute(before, gaps, d, target.branch))
             elif d == target.d:
                 history.states.append(state)

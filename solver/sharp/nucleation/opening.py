@@ -1,22 +1,14 @@
-"""Locate cracks that open inside patches, and insert them.
+"""Locate cracks that open inside patches, and insert them (docs/methods.md, rule 11).
 
 An interface of finite strength gives way at a local maximum of tension that reaches the strength,
-away from the edges, where tension is singular.
-
-With adhesion of zero range a gap inside a patch grows only beyond a length. On a flat piece under a
-uniform tension σ that is the length of Griffith's crack,
+away from the edges, where tension is singular. With edges of zero range a crack grows only beyond a
+length, on a flat piece under a uniform tension σ that of Griffith,
 
     l = 4 E*γ/(πσ²),
 
-from which on G = K²/(2E*) exceeds γ, K² = πσ²l/2. Up to there the energy rises by γl/2: a barrier,
-which an interface of finite range does not have.
-
-The shortest crack is put into a patch whose G exceeds γ by a tenth at both tips, so that it grows.
-G is that of the field with the crack, all other edges being held: other gaps and the control change
-it, and so does a tension that falls away from its maximum. Both conditions have to hold, strength
-and growth, as in finite fracture mechanics (D. Leguillon, Eur. J. Mech. A 21, 61, 2002). Where no
-crack that fits grows, tension is so peaked that an interface would only yield there, and nothing
-opens.
+from which on G = K²/(2E*) exceeds γ, K² = πσ²l/2. The shortest crack is put into a patch whose G
+exceeds γ by a tenth at both tips. Both conditions have to hold, strength and growth, as in finite
+fracture mechanics (D. Leguillon, Eur. J. Mech. A 21, 61, 2002).
 """
 
 from __future__ import annotations

@@ -13,7 +13,6 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.edge_problem import EdgeProblem
-from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import patches_between
 from adhesis.solver.values import with_values
@@ -61,9 +60,8 @@ class States:
         self._half = problem.half_space.modulus / 2
         per = self._half * self.q0
         self._tangent_unit = 1 / per if problem.control.is_load else per  # dY/dx at dY/dd = 1
-        m = np.arange(profile.coefficients.size)
-        h = np.abs(profile.coefficients * self.q0) ** 2
-        self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
+        full = problem.full_contact_energy * profile.period
+        self._full_energy = full * self.q0**2 / self._half  # ½∫S_full h~
 
     def to_field_units(self, prescribed: float) -> float:
         """Convert the prescribed value to d: q0 (s - p̄/k) at a stiffness k, -2p̄/E* of a load."""
@@ -96,23 +94,12 @@ class States:
 
         Under a load the loop is closed at the separation of the loss (``model.control``).
         """
-        if self.problem.control.is_load:
-            return self.detached(before.separation * self.q0)
-        return self.detached(d)
+        return self.detached(before.separation * self.q0 if self.problem.control.is_load else d)
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation)
-
-    def of_field(
-        self,
-        gap_field: GapField,
-        slope: float = float("nan"),
-        separation: float | None = None,
-    ) -> ContactState:
-        """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
-        half, gaps, solution = self._half, gap_field.gaps, gap_field.solution
+        half, gaps, solution = self._half, point.gaps, point.field.solution
         q0_s, pressure = solution.separation, solution.pressure
         if separation is None:
             separation = q0_s / self.q0
@@ -128,7 +115,7 @@ class States:
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * closed / self.q0,
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
-            tangent=slope * self._tangent_unit,
+            tangent=point.slope * self._tangent_unit,
             hold_energy=hold,
             internal=ContinuationData(gaps),
         )
