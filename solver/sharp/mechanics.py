@@ -49,6 +49,7 @@ class EdgeMechanics(EdgeProblem):
 
     def __init__(self, *problem: Any) -> None:
         super().__init__(*problem)
+        self._finer: tuple[Point, Field] | None = None
         self.forget()
 
     def forget(self) -> None:
@@ -108,13 +109,19 @@ class EdgeMechanics(EdgeProblem):
         """Return the edges of a point at another ``d``."""
         return Point(d, self.field(point.gaps, d), point.rate, math.nan)
 
+    def solve_finer(self, point: Point) -> Field:
+        """Solve the field of a point more accurately than that of the path, and its derivatives."""
+        if self._finer is None or self._finer[0] is not point:
+            self._finer = point, self.solution(point.gaps, point.d, FIELD_ACCURACY)
+            check_definite(self._finer[1])
+        return self._finer[1]
+
     def fold_displacement(self, point: Point) -> float:
         """Estimate how far in d the error of the field displaces the fold next to a point.
 
         The error of the openings is their difference from those of a more accurate field.
         """
-        finer = self.solution(point.gaps, point.d, FIELD_ACCURACY)
-        check_definite(finer)
+        finer = self.solve_finer(point)
         change = finer.opening - point.field.solution.opening
         _, _, by_prescribed = finer.by_prescribed()
         return point.fold_displacement(change, by_prescribed)

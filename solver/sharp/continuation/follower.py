@@ -126,14 +126,13 @@ class Follower:
         jump = self._nucleation_jump(branch, target)
         if jump is not None:
             return jump
-        held = self.edges.hold(fold.point, fold.d)
-        if self._may_touch_before(fold.point, held):
-            branch.trail.append(held)
+        if self._may_touch_before(fold):
+            branch.trail.append(self.edges.hold(fold.point, fold.d))
             jump = self._nucleation_jump(branch, target)
             if jump is not None:
                 return replace(jump, states=(self.states.of_point(fold.point), *jump.states))
         last = history.states[-1] if history.states else None
-        jump = self._fold_jump(last, fold, held, target, branch.finest)
+        jump = self._fold_jump(last, fold, target, branch.finest)
         if jump is None:
             branch.refine(self.resolution.finest)
             return None
@@ -145,11 +144,11 @@ class Follower:
             return None
         return jump
 
-    def _may_touch_before(self, point: Point, held: Point) -> bool:
+    def _may_touch_before(self, fold: Fold) -> bool:
         """Return whether surfaces may touch on the last step to a fold, the edges being held."""
-        way = abs(held.d - point.d)
+        point, way = fold.point, abs(fold.d - fold.point.d)
         if not self.edges.is_fixed:
-            way = max(way, abs(held.field.separation - point.field.separation))
+            way *= max(1.0, abs(self.edges.solve_finer(point).by_prescribed()[1]))
         # the mean gap closes by the gaps alone, the faster the less of the period they take
         closing = way * 2 * math.pi / lengths_of(point.gaps)[0].sum()
         return bool(self.nucleation.minimum(point.field)[0] <= closing)
@@ -246,7 +245,7 @@ class Follower:
         return replace(jump, misplaced=late + min(since, abs(jump.jump.energy_drop)))
 
     def _fold_jump(
-        self, last: ContactState | None, fold: Fold, held: Point, target: Target, finest: float
+        self, last: ContactState | None, fold: Fold, target: Target, finest: float
     ) -> ComputedJump | None:
         """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
@@ -254,7 +253,7 @@ class Follower:
         states: tuple[ContactState, ...] = ()
         if last is None or last.internal.gaps is not point.field.gaps:
             states = (self.states.of_point(point),)
-        before = self.states.of_point(held)
+        before = self.states.of_point(point, held=(fold.d, self.edges.solve_finer(point)))
         start, event_orders = self._start_at_fold(fold)
         jump = self.jumps.compute(
             before, start, fold.d, target.branch, known=point, event_orders=event_orders

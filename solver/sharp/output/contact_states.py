@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from adhesis.solver._kernels import LoadingDevice, SearchedGaps
+from adhesis.solver._kernels import Field, LoadingDevice, SearchedGaps
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
@@ -96,16 +97,30 @@ class States:
         """
         return self.detached(before.separation * self.q0 if self.problem.control.is_load else d)
 
-    def of_point(self, point: Point, separation: float | None = None) -> ContactState:
-        """Make the state of a point; ``separation`` (m) if it is known without rounding."""
+    def of_point(
+        self,
+        point: Point,
+        separation: float | None = None,
+        held: tuple[float, Field] | None = None,
+    ) -> ContactState:
+        """Make the state of a point, or of its edges ``held`` at another d.
+
+        That is given with a field that knows derivatives; ``separation`` (m) if it is known without
+        rounding.
+        """
         self.count.energies += 1
         half, gaps, solution = self._half, point.gaps, point.field.solution
-        q0_s, pressure = solution.separation, solution.pressure
+        q0_s, pressure, slope = solution.separation, solution.pressure, point.slope
+        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * q0_s * pressure
+        if held is not None:  # p is linear in d, and the energy quadratic
+            (p_rate, s_rate, _), way = held[1].by_prescribed(), held[0] - point.d
+            elastic -= np.pi * s_rate * way * (2 * pressure + p_rate * way)
+            pressure, slope = pressure + p_rate * way, math.nan
+            q0_s = held[0] if self.problem.control.is_fixed else q0_s + s_rate * way
         if separation is None:
             separation = q0_s / self.q0
         mean_stress = pressure * half
         patches, closed = patches_between(gaps), self.adhesion.contact_work(gaps)
-        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * q0_s * pressure
         control, profile = self.problem.control, self.problem.profile
         hold = control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
         return ContactState(
@@ -115,7 +130,7 @@ class States:
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * closed / self.q0,
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
-            tangent=point.slope * self._tangent_unit,
+            tangent=slope * self._tangent_unit,
             hold_energy=hold,
             internal=ContinuationData(gaps),
         )
