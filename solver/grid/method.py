@@ -31,18 +31,7 @@ _FEWEST_NODES = 1024
 
 @dataclass(frozen=True)
 class GridReport(MethodReport):
-    """Resolution, tolerances and counters.
-
-    Attributes
-    ----------
-    nodes : int
-    nodes_per_wave : float
-        Per shortest wave.
-    accuracy : float
-    longest_step : int
-        Largest displacement of an edge in one sweep, in nodes.
-    sweeps, solves : int
-    """
+    """Nodes, also per shortest wave, largest displacement of an edge in one sweep, and counters."""
 
     nodes: int
     nodes_per_wave: float

@@ -61,17 +61,9 @@ from adhesis.solver.sharp.tolerances import (
 
 @dataclass(frozen=True)
 class SharpReport(MethodReport):
-    """Accuracy, tolerances and counters.
+    """Relative accuracy of loss and field, resolution of jumps, and ``edge_problem.Counters``.
 
-    Attributes
-    ----------
-    accuracy : float
-    field_tolerance : float
-        Relative accuracy of the field.
-    jump_resolution : float
-        To which a jump is located: separation over h_max, under a load σ~.
-    fields, energies, openings, newton_steps, descent_steps : int
-        See ``edge_problem.Counters``.
+    A jump is located to that part of h_max, under a load to that σ~.
     """
 
     accuracy: float

@@ -142,19 +142,10 @@ def judge_maximum(
 ) -> Crack:
     """Judge whether a patch opens at a maximum of tension, and with which crack.
 
-    Parameters
-    ----------
-    position : float
-    share : float
-        Tension over the strength.
-    balanced : float
-        Half-length at which G = γ there, under a uniform tension.
-    toughness : float
-        γ of a unit of length there, over γ.
-    release : callable
-        Returns G/γ of the crack of a half-length, the smaller of those at its two tips.
-    shortest, longest : float
-        Least and largest half-length of a crack.
+    ``share`` is the tension over the strength, ``balanced`` the half-length at which G = γ there
+    under a uniform tension, and ``toughness`` γ of a unit of length there, over γ. ``release``
+    returns G/γ of the crack of a half-length, the smaller of those at its two tips; half-lengths
+    are tried from the ``shortest`` to the ``longest``.
     """
     first = max(shortest, GROWTH * balanced)
     if share < 1:
