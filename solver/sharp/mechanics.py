@@ -105,10 +105,6 @@ class EdgeMechanics(EdgeProblem):
         work = np.array([self.adhesion.work(end, False)[0] for end in ends[nearest]])
         return np.asarray(np.maximum(opening, 0.0) ** 2 / (self.critical**2 * work))
 
-    def hold(self, point: Point, d: float) -> Point:
-        """Return the edges of a point at another ``d``."""
-        return Point(d, self.field(point.gaps, d), point.rate, math.nan)
-
     def solve_finer(self, point: Point) -> Field:
         """Solve the field of a point more accurately than that of the path, and its derivatives."""
         if self._finer is None or self._finer[0] is not point:
@@ -161,6 +157,26 @@ class EdgeMechanics(EdgeProblem):
             gaps = found.gaps
             self.forget()
         return None
+
+    def equilibrium_between(self, clear: Point, hit: Point, d: float) -> Point | None:
+        """Return the equilibrium between two points of a branch; None if it is not found.
+
+        Of two that have the same edges, as at a fold, these are held.
+        """
+        if clear.gaps is hit.gaps:
+            return self.hold(clear, d)
+        share = (d - clear.d) / (hit.d - clear.d)
+        gaps, reach = clear.gaps + share * (hit.gaps - clear.gaps), self.longest_step
+        point = self.equilibrium(gaps, d, reach, memory=clear.gaps)
+        near = abs(d - clear.d) < abs(hit.d - d)
+        for start in (clear, hit) if near else (hit, clear):
+            if point is None:
+                point = self.equilibrium(start.extrapolate(d), d, reach, memory=clear.gaps)
+        return point
+
+    def hold(self, point: Point, d: float) -> Point:
+        """Return the edges of a point at another ``d``."""
+        return Point(d, self.field(point.gaps, d), point.rate, math.nan)
 
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
         """Make the point of an equilibrium."""

@@ -292,7 +292,7 @@ class StableBranch:
         self._two_folds = None
         if apart < resolution:
             way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
-            rate, edges = predictor.point.rate, (predictor.leading_edge, other.edge)
+            rate, edges = predictor.point.rate, (predictor.leading.edge, other.edge)
             ahead = tuple((edge, float(np.sign(rate[edge] * way))) for edge in edges)
             self._two_folds = TwoFolds(ahead, predictor.point.d + way, apart)
 

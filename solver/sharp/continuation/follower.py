@@ -24,11 +24,7 @@ from adhesis.solver.sharp.continuation.jump import ComputedJump, EventOrders, Hi
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import (
-    Located,
-    equilibrium_between,
-    locate,
-)
+from adhesis.solver.sharp.nucleation.location import Located, locate
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Crack, Cracks
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
@@ -45,7 +41,6 @@ class Follower:
         self.edges, self.states, self.resolution = edges, states, resolution
         self.nucleation, self.cracks = Nucleation(problem, edges), Cracks(problem, edges)
         self.jumps = Jumps(edges, self.nucleation, states)
-        self._between = equilibrium_between(edges)
         self._came_on: Branch | None = None
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
@@ -165,10 +160,10 @@ class Follower:
         fold, beyond = branch.fold_ahead
         for _ in range(MOST_OPENINGS):
             finest = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
-            touched = locate(self.nucleation, self._between, trail, finest)
+            touched = locate(self.nucleation, self.edges, trail, finest)
             opened = None
             if self.cracks.is_possible:
-                opened = locate(self.cracks, self._between, trail, self.resolution.finest)
+                opened = locate(self.cracks, self.edges, trail, self.resolution.finest)
             if opened is not None and (
                 touched is None or abs(opened.point.d - start) < abs(touched.point.d - start)
             ):

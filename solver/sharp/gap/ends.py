@@ -8,7 +8,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver._kernels import CLOSING_SHARE
 from adhesis.solver.model.profile import Array
@@ -46,18 +45,6 @@ def signs_of(count: int) -> Array:
 def move_edges(gaps: Array, step: Array) -> Array:
     """Move the contact outwards by ``step`` at every edge."""
     return np.asarray(gaps + (signs_of(len(gaps)) * step).reshape(-1, 2))
-
-
-def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
-    """Drop the patches that ``keep`` (one value for the patch right of each gap) excludes."""
-    if not keep.any():
-        return np.empty((0, 2))
-    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
-    lefts = gaps[np.roll(keep, 1), 0]
-    rights = gaps[keep, 1]
-    first = lefts[0]
-    rights = np.sort(np.where(rights <= first, rights + 2 * np.pi, rights))
-    return np.stack([lefts, rights], axis=1)
 
 
 def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
@@ -118,6 +105,12 @@ def without_small(gaps: Array, smallest: float) -> Array | None:
         keep = length >= smallest
         keep[int(np.argmax(length))] = True  # the last gap never closes
         return gaps[keep]  # the patches beside a closed gap merge
-    if patch.min() < smallest:
-        return without_patches(gaps, patch >= smallest)
-    return None
+    if not patch.min() < smallest:
+        return None
+    keep = patch >= smallest
+    if not keep.any():
+        return np.empty((0, 2))
+    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
+    lefts, rights = gaps[np.roll(keep, 1), 0], gaps[keep, 1]
+    rights = np.sort(np.where(rights <= lefts[0], rights + 2 * np.pi, rights))
+    return np.stack([lefts, rights], axis=1)
