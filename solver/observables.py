@@ -25,19 +25,8 @@ def gap_shares(openings: Sequence[Opening], period: float, bins: Array) -> Array
     In a gap (l, r) the position is x = (l + r)/2 - (r - l)/2 cos φ. Between the points of an
     opening t is linear in φ, an exact square root of the distance beside both edges.
 
-    Parameters
-    ----------
-    openings : sequence of Opening
-        One for each gap.
-    period : float
-        λ in m.
-    bins : array, shape (n + 1,)
-        Ascending gaps in m. Gaps outside count in the outermost bins.
-
-    Returns
-    -------
-    array, shape (n,)
-        The sum is the share of the period that is out of contact.
+    ``openings`` has one for each gap, ``bins`` n + 1 ascending gaps in m; gaps outside count in the
+    outermost of the n bins. The sum is the share of the period that is out of contact.
     """
     total = np.zeros(bins.size - 1)
     for opening in openings:
@@ -81,17 +70,7 @@ def openings_between(
     """Interpolate the openings of the gaps between contact edges from equally spaced nodes.
 
     The interpolant (monotone cubic) is that of t/sqrt((x - l)(r - x)), which is smooth across a gap
-    (l, r) and known at both edges.
-
-    Parameters
-    ----------
-    edges : array, shape (patches, 2)
-        As in :class:`~adhesis.solver.method.ContactState`.
-    fields : Fields
-    coefficient : array, shape (patches, 2)
-        t/sqrt(r) at each edge in sqrt(m).
-    period : float
-        λ in m.
+    (l, r) and known at both edges: ``coefficient`` is t/sqrt(r) at each edge in sqrt(m).
     """
     out = []
     for k, (_, left) in enumerate(edges):
@@ -135,16 +114,7 @@ def _opening(
 def spectral_density(values: Array, period: float) -> Array:
     """Compute the two-sided spectral density C(m q0) = |v_m|²/q0 of the harmonics m = 0 … n/2.
 
-    Parameters
-    ----------
-    values : array, shape (n,)
-        v at equally spaced nodes of the period, in any unit u.
-    period : float
-        λ in m.
-
-    Returns
-    -------
-    array, shape (n // 2 + 1,)
-        In u² m; ∫ C dq over positive and negative q is the mean square.
+    In u² m for n values v at equally spaced nodes, in any unit u; ∫ C dq over positive and negative
+    q is the mean square.
     """
     return np.asarray(np.abs(np.fft.rfft(values) / values.size) ** 2 * (period / (2 * np.pi)))

@@ -16,16 +16,8 @@ def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
     The height of a maximum is that of the parabola through it and its neighbours: where values have
     large and steep minima a maximum can lie well above all values. The prominence of a maximum is
     its height above the higher one of the two minima between which it is the largest value; it is
-    no maximum unless its neighbours have values.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Periodic; NaN where there is no value.
-    most : int
-        Largest number of maxima.
-    least : float
-        Not negative.
+    no maximum unless its neighbours have values. The values are periodic, NaN where there is none.
+    At most ``most`` are returned; ``least`` is not negative.
     """
     nothing = np.flatnonzero(np.isnan(values))
     start = int(nothing[0]) if nothing.size else 0

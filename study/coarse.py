@@ -18,8 +18,7 @@ import numpy as np
 
 from adhesis.ensemble.campaign.tasks import task_seed
 from adhesis.ensemble.report.paper import TABLE_1
-from adhesis.solver.grid.contact import Contact, ContactSolver
-from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
@@ -48,20 +47,9 @@ class CoarsePath:
     """
 
     def __init__(self, problem: Problem, nodes: int) -> None:
-        profile = problem.profile
         self.problem = problem
-        self.lattice = Lattice.of(problem, nodes)
-        closing = self.lattice.closing_gap(problem.work_of_adhesion, float(np.sqrt(profile.m4)))
-        self.solver = ContactSolver(
-            self.lattice.elastic, self.lattice.height, closing, problem.control
-        )
-        self.relaxation = Relaxation(
-            self.lattice,
-            self.solver,
-            longest_step=max(1, int(0.1 * profile.shortest_wavelength / self.lattice.dx)),
-            loose=0.02,
-            tight=1e-4,
-        )
+        self.relaxation = Relaxation(problem, nodes)
+        self.lattice, self.solver = self.relaxation.lattice, self.relaxation.solver
 
     def start(self) -> Contact:
         """Return the surfaces apart, at the separation of the highest crest."""

@@ -242,8 +242,9 @@ def tension_of(
     largest = late = 0.0
     for state in _staying(loop, states):
         field = method.edges.field(state.internal.gaps, method.states.prescribed_of(state))
-        least, found = openings.minimum(field)
-        largest = max([largest, *(crack.tension for crack in found)])
+        least, _ = openings.minimum(field)
+        maxima = openings.inner.maxima(field, 0.0)
+        largest = max([largest, *(maximum.tension / openings.strength for maximum in maxima)])
         late = max(late, -least)
     return largest, late
 

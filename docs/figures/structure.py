@@ -46,9 +46,7 @@ LOOP = {
     "runtime": (5, 4, SOLVER, "threads, signals\n(for all)"),
     "output": (1, 2, SHARP, "states and fields\nin SI units"),
     "continuation": (2, 2, SHARP, "predictor, steps,\nevents, jumps"),
-    "system": (3, 2, SHARP, "numbers of one\nproblem, responses"),
     "nucleation": (2, 1, SHARP, "first touch,\nfirst opening"),
-    "equilibrium": (3, 1, SHARP, "balance of edges,\nways off a saddle"),
     "gap": (1, 0, SHARP, "ends of gaps,\nfull-contact stress"),
     "field": (2, 0, SHARP, "fields of given\nedges, openings"),
 }
@@ -75,10 +73,7 @@ LOOP_ARROWS = (
     ("references", "validate", "exact"),
     ("output", "sharp", "states"),
     ("continuation", "output", "points"),
-    ("system", "continuation", "fields"),
     ("nucleation", "continuation", "touches"),
-    ("equilibrium", "continuation", "points"),
-    ("field", "equilibrium", "release rates"),
     ("field", "nucleation", "openings"),
     ("gap", "field", "stress"),
 )

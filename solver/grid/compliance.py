@@ -63,13 +63,7 @@ def _rounded(length: int) -> int:
 
 
 class EdgeCompliance:
-    """S of edge nodes on a periodic grid, cached by geometry.
-
-    Parameters
-    ----------
-    kernel : array, shape (n,)
-        First column of V, in m/Pa.
-    """
+    """S of edge nodes on a periodic grid, cached by geometry, from the first column of V."""
 
     def __init__(self, kernel: Array) -> None:
         self.n = kernel.size
@@ -117,16 +111,10 @@ class EdgeCompliance:
         return width, self.n - width, 0, 0, 0
 
     def across_patch(self, width: int, left: int, right: int, before: int, after: int) -> Array:
-        """Compute S of the two free nodes beside a patch, shape (2, 2), in m/Pa.
+        """Compute S of the two free nodes beside a patch of ``width`` nodes, shape (2, 2), in m/Pa.
 
-        Parameters
-        ----------
-        width : int
-            Nodes of the patch.
-        left, right : int
-            Free nodes on either side.
-        before, after : int
-            Contact nodes beyond them; 0 for none.
+        ``left`` and ``right`` are the free nodes on either side, ``before`` and ``after`` the
+        contact nodes beyond them; 0 for none.
         """
         if before == 0 and after == 0:
             key = (0, *self._rounded_patch(width))
@@ -153,10 +141,7 @@ class EdgeCompliance:
     def across_gap(self, near: int, gap: int, far: int) -> Array:
         """Compute S of the first and last free node of a gap, shape (2, 2), in m/Pa.
 
-        Parameters
-        ----------
-        near, gap, far : int
-            Nodes of the patch before the gap, of the gap, and of the patch after it.
+        From the nodes of the patch before the gap, of the gap, and of the patch after it.
         """
         key = (1, *(_rounded(k) for k in (near, gap, far)))
         known = self._pairs.get(key)

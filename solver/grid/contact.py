@@ -116,17 +116,12 @@ class Contact:
 class ContactSolver:
     """Conjugate gradients on the contact sets of one grid.
 
-    Parameters
+    Attributes
     ----------
-    elastic : ElasticGrid
     height : array, shape (n,)
         h in m.
     closing_gap : float
         Largest gap in m that adhesion closes beside an edge: the unit of residuals.
-    control : Control
-
-    Attributes
-    ----------
     solves : int
         Counter.
     """
@@ -155,13 +150,8 @@ class ContactSolver:
     def solve(self, contact: Contact, tolerance: float) -> None:
         """Solve stress, displacement and energy of ``contact`` for its contact set, in place.
 
-        The initial guess is the present stress, restricted to Ω.
-
-        Parameters
-        ----------
-        contact : Contact
-        tolerance : float
-            Largest residual displacement on Ω, in closing gaps.
+        The initial guess is the present stress, restricted to Ω; ``tolerance`` is the largest
+        residual displacement there, in closing gaps.
 
         Raises
         ------

@@ -44,15 +44,9 @@ class Edges:
 
 
 def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
-    """Compute the energy of moving every edge of a contact set.
+    """Compute the energy of moving every edge of a solved contact.
 
-    Parameters
-    ----------
-    contact : Contact
-        Solved.
-    lattice : Lattice
-    overlap_below : float
-        Gap in m below which a node counts as overlapping.
+    A node counts as overlapping where the gap in m is below ``overlap_below``.
     """
     n, dx = lattice.n, lattice.dx
     compliance, adhesion = lattice.compliance, lattice.adhesion

@@ -16,21 +16,8 @@ from adhesis.solver.model.profile import Array
 class ElasticGrid:
     """Compliance of the half-space on n equally spaced nodes of one period.
 
-    Its transforms have their own buffers: each result is valid until the next one is computed.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes, even.
-    period : float
-        λ in m.
-    modulus : float
-        E* in Pa.
-
-    Attributes
-    ----------
-    dx : float
-        Distance of two nodes, in m.
+    Their number is even, the period in m and E* in Pa. The transforms have their own buffers: each
+    result is valid until the next one is computed.
     """
 
     def __init__(self, n: int, period: float, modulus: float) -> None:

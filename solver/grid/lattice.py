@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from adhesis.solver._kernels import dot, total
 from adhesis.solver.grid.compliance import EdgeCompliance
-from adhesis.solver.grid.contact import EDGE_COMPLIANCE, Contact
+from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.problem import Problem
@@ -22,15 +22,10 @@ class Lattice:
 
     Attributes
     ----------
-    elastic : ElasticGrid
-    compliance : EdgeCompliance
     height : array
         h in m.
     adhesion : array
         γ sqrt(1 + h'²) in J/m².
-    control : Control
-    h_max : float
-        In m.
     origin : int
         Node at the highest crest.
     equal_parts : int
@@ -71,15 +66,6 @@ class Lattice:
     def dx(self) -> float:
         """Distance of two nodes, in m."""
         return self.elastic.dx
-
-    def closing_gap(self, work_of_adhesion: float, curvature: float) -> float:
-        """Compute the largest gap in m that adhesion closes beside an edge, the unit of tolerances.
-
-        It is at least dx²/8 times the curvature (1/m), the height within half a node of a crest.
-        """
-        modulus = self.elastic.modulus
-        closing = float(np.sqrt(2 * work_of_adhesion * EDGE_COMPLIANCE * self.dx / modulus))
-        return max(closing, 0.125 * self.dx**2 * curvature)
 
     def extra_compliance(self, contact: Contact, nodes: NDArray[np.intp]) -> tuple[float, Array]:
         """Compute c and g of the compliance c g gᵀ that a free separation adds; c = 0 at fixed s.

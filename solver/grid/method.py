@@ -11,8 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from adhesis.solver.grid.contact import Contact, ContactSolver
-from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.path import Steps
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import mask_of
@@ -32,18 +31,7 @@ _FEWEST_NODES = 1024
 
 @dataclass(frozen=True)
 class GridReport(MethodReport):
-    """Resolution, tolerances and counters.
-
-    Attributes
-    ----------
-    nodes : int
-    nodes_per_wave : float
-        Per shortest wave.
-    accuracy : float
-    longest_step : int
-        Largest displacement of an edge in one sweep, in nodes.
-    sweeps, solves : int
-    """
+    """Nodes, also per shortest wave, largest displacement of an edge in one sweep, and counters."""
 
     nodes: int
     nodes_per_wave: float
@@ -85,19 +73,10 @@ class GridMethod(Method):
         chosen: str | None = None,
     ) -> None:
         super().__init__(problem, chosen=chosen)
-        profile = problem.profile
         self.accuracy = accuracy
         self.nodes = _node_count(problem.highest_harmonic, accuracy, nodes_per_wave)
-        self.lattice = lattice = Lattice.of(problem, self.nodes)
-        closing = lattice.closing_gap(problem.work_of_adhesion, float(np.sqrt(profile.m4)))
-        self.solver = ContactSolver(lattice.elastic, lattice.height, closing, problem.control)
-        self.relaxation = Relaxation(
-            lattice,
-            self.solver,
-            longest_step=max(1, int(0.1 * problem.shortest_wavelength / lattice.dx)),
-            loose=0.02,
-            tight=1e-4,
-        )
+        self.relaxation = Relaxation(problem, self.nodes)
+        self.lattice, self.solver = self.relaxation.lattice, self.relaxation.solver
 
     # ------------------------------------------------------------------ contract
 

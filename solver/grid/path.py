@@ -25,15 +25,6 @@ _FEWEST_NODES_APART = 2
 _LONGEST = 0.05  # of the range: jumps hide in longer steps, where D is smooth by chance
 
 
-def first_width(problem: Problem) -> float:
-    """Compute the first equilibrium width in m of a patch on a crest of rms curvature κ.
-
-    (16 Γ/(π κ²))^(1/3) in units of 1/q0, Γ = 2γq0/E* (docs/methods.md, "Resolution").
-    """
-    rigidity = problem.half_space.modulus * problem.profile.m4
-    return float(np.cbrt(32 * problem.work_of_adhesion / (np.pi * rigidity)))
-
-
 class Steps:
     """Sub-steps of one call of ``follow``, with location of the jumps.
 
@@ -71,7 +62,10 @@ class Steps:
         # Relative error of a drop, and size in J/m² of the drop in which a patch appears.
         self.coarse = self.least_drop = 0.0
         if self.adhesion_scale:
-            width = first_width(problem)
+            # the first equilibrium width of a patch on a crest of rms curvature κ, which is
+            # (16 Γ/(π κ²))^(1/3) in units of 1/q0, Γ = 2γq0/E* (docs/methods.md, "Resolution")
+            rigidity = problem.half_space.modulus * problem.profile.m4
+            width = float(np.cbrt(32 * problem.work_of_adhesion / (np.pi * rigidity)))
             self.coarse = _COARSE * self.lattice.dx / width
             self.least_drop = _UNSEEN * problem.work_of_adhesion * width / self.period
         # Displacement, in nodes, beyond which an edge has run and two end states are different
@@ -126,7 +120,10 @@ class Steps:
                 step *= self.share
                 continue
             if not located:
-                self.error += self._unseen_drops(contact, after)
+                # With adhesion no patch comes or goes without a jump: where a few nodes make one
+                # it does so smoothly, and its drop is lost.
+                one, other = (patch_ranges(state.mask)[0].size for state in (contact, after))
+                self.error += self.least_drop * abs(one - other)
                 self._append(after)
             contact = after
             if not control.is_fixed and np.count_nonzero(~contact.mask) <= 1:
@@ -136,15 +133,6 @@ class Steps:
             step *= 2
         if not self.states or self.reached != prescribed:
             self._append(contact)
-
-    def _unseen_drops(self, before: Contact, after: Contact) -> float:
-        """Estimate the drops, in J/m², in which patches came or went without a jump.
-
-        With adhesion none comes or goes without one: where a few nodes make a patch it does so
-        smoothly, and its drop is lost.
-        """
-        one, other = (patch_ranges(contact.mask)[0].size for contact in (before, after))
-        return self.least_drop * abs(one - other)
 
     def _substep(
         self, contact: Contact, target: float, divisible: bool

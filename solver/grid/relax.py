@@ -1,14 +1,7 @@
 """Relax a contact set at a fixed prescribed value: edges move until no move releases energy.
 
-The rules (docs/methods.md):
-
-*   a free node beside a patch that overlaps the rigid profile joins;
-*   otherwise edges move by energy comparison, in proportion to the energy that they release; the
-    leading one's step is doubled while it keeps its direction, is one node after a reversal, and
-    at most a tenth of the shortest wave;
-*   a state is rejected if its energy exceeds that of the last admissible state: the sweep is undone
-    and fewer edges move, finally only the most unstable one, by one node;
-*   contact nucleates where the gap vanishes away from edges, from a relaxed state only.
+A state is rejected if its energy exceeds that of the last admissible state: the sweep is undone
+and fewer edges move, finally only the most unstable one, by one node (docs/methods.md).
 """
 
 from __future__ import annotations
@@ -17,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from adhesis.solver.grid.contact import Contact, ContactSolver
+from adhesis.solver.grid.contact import EDGE_COMPLIANCE, Contact, ContactSolver
 from adhesis.solver.grid.edges import Edges, Indices, survey
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.moves import (
@@ -31,8 +24,10 @@ from adhesis.solver.grid.moves import (
     pair_moves,
 )
 from adhesis.solver.method import PathError
+from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, first_of_equal
 
+_LOOSE = 0.02  # closing gaps: tolerance of the residual while edges move
 _MAX_SWEEPS = 1_000_000
 _MAX_ACTIVE_SETS = 1000
 
@@ -45,33 +40,28 @@ _SAME_NODE = 2.0
 
 
 class Relaxation:
-    """Edge descent on one grid.
+    """Edge descent on a grid of ``nodes`` nodes of one problem.
 
-    Parameters
+    Attributes
     ----------
-    lattice : Lattice
-    solver : ContactSolver
     longest_step : int
         Largest step of an edge, in nodes.
-    loose, tight : float
-        Tolerances of the residual while edges move, and of a relaxed state, in closing gaps.
+    tight : float
+        Tolerance of the residual of a relaxed state, in closing gaps.
     """
 
-    def __init__(
-        self,
-        lattice: Lattice,
-        solver: ContactSolver,
-        *,
-        longest_step: int,
-        loose: float,
-        tight: float,
-    ) -> None:
-        self.lattice = lattice
-        self.solver = solver
-        self.longest_step = longest_step
-        self.loose = loose
-        self.tight = tight
-        self.tight_residual = tight * solver.closing_gap
+    tight = 1e-4
+
+    def __init__(self, problem: Problem, nodes: int) -> None:
+        self.lattice = lattice = Lattice.of(problem, nodes)
+        # The largest gap that adhesion closes beside an edge, at least the height of a crest of rms
+        # curvature within half a node.
+        modulus, curvature = problem.half_space.modulus, float(np.sqrt(problem.profile.m4))
+        closing = 2 * problem.work_of_adhesion * EDGE_COMPLIANCE * lattice.dx / modulus
+        closing_gap = max(float(np.sqrt(closing)), 0.125 * lattice.dx**2 * curvature)
+        self.solver = ContactSolver(lattice.elastic, lattice.height, closing_gap, problem.control)
+        self.longest_step = max(1, int(0.1 * problem.shortest_wavelength / lattice.dx))
+        self.tight_residual = self.tight * closing_gap
         self.tie_height = EQUAL_CRESTS * float(np.abs(lattice.height).max())
         # smaller falls of the energy are within the error of S
         self.least_fall = 0.1 * least_release(lattice)
@@ -83,12 +73,8 @@ class Relaxation:
     ) -> Contact | None:
         """Move the edges of ``contact`` (solved) to the local minimum reached by descent.
 
-        Descent follows linear kinetics, or with ``equal_speeds`` the alternative kinetics.
-
-        Returns
-        -------
-        Contact or None
-            A relaxed contact, solved to the tight tolerance; None if ``abort`` returned True.
+        Descent follows linear kinetics, or with ``equal_speeds`` the alternative kinetics. The
+        contact is solved to the tight tolerance; None if ``abort`` returned True.
 
         Raises
         ------
@@ -191,7 +177,7 @@ class _Descent:
         self.anchor: Contact | None = None
         self.anchor_energy = np.inf
         self.tight_energy = np.inf
-        self.tolerance = rules.loose
+        self.tolerance = _LOOSE
         self.motions: EdgeMotions = {}
         self.blocked: set[Key] = set()
         self.caution = 0

@@ -72,17 +72,9 @@ def turning_of(control: Control, max_penetration: T | None, max_stress: T | None
 def turn_arguments(
     control: Control, turn: object, at_preload: bool, latest: float | None
 ) -> dict[str, Any]:
-    """Return the arguments of ``run_loop`` for a turning point of any kind.
+    """Return the arguments of ``run_loop``, or ``run_loops``, for turning points of any kind.
 
-    Parameters
-    ----------
-    control : Control
-    turn : object
-        Turning point, or turning points of ``run_loops``.
-    at_preload : bool
-        Whether it is a preload in Pa.
-    latest : float, optional
-        Then, where the path turns at the latest.
+    At a preload in Pa the path turns at ``latest`` at the latest.
     """
     if at_preload:
         return {"preload": turn, "max_penetration": latest}
@@ -112,23 +104,15 @@ def check_preload(preload: float, control: Control) -> float:
 def latest_turn(
     problem: Problem, preload: float, max_penetration: float | None, max_stress: object = None
 ) -> float:
-    """Return the turning point of a path whose mean stress does not reach the preload.
+    """Return the turning point of a path whose mean stress does not reach the preload in Pa.
 
-    Parameters
-    ----------
-    problem : Problem
-    preload : float
-        In Pa; the largest of several.
-    max_penetration : float, optional
-        As given; without it nearly full contact at fixed separation, and with a stiffness the
-        displacement at which every state with a gap carries more.
-    max_stress : object
-        Refused, unless it is None.
+    It is the penetration that is given; without it nearly full contact at fixed separation, and
+    with a stiffness the displacement at which every state with a gap carries more.
 
     Raises
     ------
     ValueError
-        If the preload is out of bounds, or the path is one under a load.
+        If the preload is out of bounds, the path is one under a load, or a stress is given, too.
     TypeError
         If it is not a number.
     """

@@ -69,15 +69,8 @@ class Ledger:
         """Enter the states of a path, arrays of shape (states,), and the jumps between them.
 
         The integral is the end-corrected trapezoidal rule: with the slopes dY/dx at both ends of an
-        interval its order is four on smooth pieces, and two where a slope is NaN.
-
-        Parameters
-        ----------
-        problem : Problem
-        jumps : sequence of Jump
-        branch, separation, mean_stress, tangent, contact_fraction, elastic_energy, \
-adhesion_energy, edge_friction
-            As in :class:`~adhesis.solver.loading.equilibrium_path.EquilibriumPath`.
+        interval its order is four on smooth pieces, and two where a slope is NaN. The arrays are
+        those of :class:`~adhesis.solver.loading.equilibrium_path.EquilibriumPath`.
         """
         control, h_max, period = problem.control, problem.profile.h_max, problem.profile.period
         x = control.prescribed(separation, mean_stress)
@@ -154,16 +147,7 @@ def estimated_error(own: float, jumps: Sequence[Jump], residual: float, problem:
 
     It is the sum of the method's own estimate (if there is none, a hundredth of the drops), the
     residual of the audit, and the sizes of negative drops, which are errors: energy falls in every
-    jump, after the barrier of an opening.
-
-    Parameters
-    ----------
-    own : float
-        Estimate of the method, in J/m²; NaN if there is none.
-    jumps : sequence of Jump
-    residual : float
-        Of the ledger.
-    problem : Problem
+    jump, after the barrier of an opening. ``own`` is NaN for a method without an estimate.
     """
     # Under a load the last drop is U, and may be negative (adhesis.solver.model.control).
     counted = [j for j in jumps if not (problem.control.is_load and j.kind == "pull-off")]

@@ -86,7 +86,6 @@ class LoadingBranch:
 
     Parameters
     ----------
-    method : Method
     turning_points : sequence of float, shape (loops,)
         Different ones: Δ/h_max or u_tot/h_max, or p̄ in Pa under a load; with ``latest``,
         preloads in Pa.
@@ -157,18 +156,7 @@ class LoadingBranch:
     ) -> LoopResult:
         """Follow the branch to a turning point not yet passed, and unload from there.
 
-        Parameters
-        ----------
-        turn : float
-        marks : sequence of float
-            Further values at which a step of the unloading branch ends.
-        progress, on_state : callable, optional
-            As in :func:`run_loop`.
-
-        Returns
-        -------
-        LoopResult
-            As in :func:`run_loops`.
+        ``marks`` are further values at which a step of the unloading branch ends.
 
         Raises
         ------

@@ -92,18 +92,8 @@ def state_at_stress(
 ) -> LoopState:
     """Find the first state in contact of a branch that has a mean stress.
 
-    Where only jumps pass the mean stress, it is the end of the first of them.
-
-    Parameters
-    ----------
-    path : EquilibriumPath
-    method : Method
-        Of the path.
-    branch : {"loading", "unloading"}
-    chosen : array of int
-        Indices of the states of the branch.
-    stress : float
-        In Pa.
+    Where only jumps pass the mean stress, it is the end of the first of them. ``chosen`` are the
+    indices of the states of the branch; the stress is in Pa.
 
     Raises
     ------

@@ -33,24 +33,10 @@ _END_LOCATED = 1e-6
 def follow_to_stress(
     method: Method, state: ContactState, prescribed: float, stress: float
 ) -> tuple[Path, bool]:
-    """Follow the path to a prescribed value, or up to where p̄ has risen to ``stress``.
+    """Follow the path to a prescribed value in m, or up to where p̄ has risen to ``stress`` in Pa.
 
-    Parameters
-    ----------
-    method : Method
-    state : ContactState
-        With a smaller mean stress.
-    prescribed : float
-        x of :mod:`adhesis.solver.model.control`, in m.
-    stress : float
-        In Pa, positive.
-
-    Returns
-    -------
-    Path
-        The last state is the one that reaches the stress, or that at the prescribed value.
-    bool
-        Whether the stress is reached.
+    The state has a smaller mean stress, and the last one of the path is the one that reaches the
+    stress, or that at the prescribed value. Returns also whether the stress is reached.
 
     Raises
     ------
@@ -83,13 +69,8 @@ def has_reached(mean_stress: float, stress: float) -> bool:
 def up_to(method: Method, state: ContactState, path: Path, excess: Excess) -> tuple[Path, bool]:
     """Return a path that was followed from ``state``, up to where the excess reaches 0, if it does.
 
-    Returns
-    -------
-    Path
-        It ends where the excess is 0, or after the jump that goes beyond; otherwise it is the given
-        one.
-    bool
-        Whether the excess reaches 0.
+    It ends where the excess is 0, or after the jump that goes beyond; otherwise it is the given
+    one. Returns also whether the excess reaches 0.
     """
     states = (state, *path.states)
     k = next((k for k in range(1, len(states)) if excess(states[k]) >= -REACHED), None)
@@ -104,12 +85,7 @@ def up_to(method: Method, state: ContactState, path: Path, excess: Excess) -> tu
 def locate(method: Method, start: ContactState, end: ContactState, excess: Excess) -> Path:
     """Follow the stable branch from ``start`` towards ``end`` to the state whose excess is 0.
 
-    Parameters
-    ----------
-    method : Method
-    start, end : ContactState
-        Neighbours on a stable branch, with an excess below 0 and above 0.
-    excess : callable
+    The states are neighbours on a stable branch, with an excess below 0 and above 0.
     """
     from scipy.optimize import brentq  # commands that follow no path do not load it
 

@@ -47,18 +47,7 @@ def progress_of(
 ) -> Iterator[Progress | None]:
     """Return the function to call after each load step: the given one, or for True a bar's.
 
-    Parameters
-    ----------
-    progress : callable or bool, optional
-    top : float
-        The largest turning point, at which the bar is full.
-    control : Control
-        Of the path: a load is shown with its unit.
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
+    That is full at the largest turning point, ``top``. TypeError if ``progress`` is neither.
     """
     if progress is True:
         with views.maker().progress_bar(top, control.is_load) as bar:
@@ -118,14 +107,8 @@ class Axis:
 class Record:
     """A path that is followed: its states in order, each with its branch, and the jumps.
 
-    Parameters
-    ----------
-    method : Method
-    axis : Axis
-        Load steps of the path.
-    on_state : callable, optional
-    progress : callable, optional
-        Called with every load step before it is recorded; if it raises, the record is unchanged.
+    ``progress`` is called with every load step before it is recorded; if it raises, the record is
+    unchanged.
 
     Attributes
     ----------

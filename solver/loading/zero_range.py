@@ -1,38 +1,15 @@
-"""Compute the four ranges of adhesion that bound the zero-range model.
+"""Compute the four ranges of adhesion that bound the zero-range model (docs/zero-range.md).
 
-A zero range of adhesion is an infinite strength: inside a contact nothing opens, whatever the
-tension there. An interface of range δ gives way near σ_th = γ/δ. So with σ_in the largest local
-maximum of tension inside patches, away from their edges, where tension is singular, nothing opens
-inside for ranges below
+    valid_range = γ/σ_in                    nothing opens inside patches below it
+    edge_range  = sqrt(4 γ l/(π E*))        a cohesive zone (π/4) E* δ²/γ at an edge is as long as l
+    touch_range = 0.01 loss / Σ |Δp̄|        earlier touches lose a hundredth; Σ over all touches
+    turn_range                              within it jumps beyond a turning point lose a hundredth
 
-    valid_range = γ/σ_in.
-
-At an edge a range δ smears the singularity over a cohesive zone of the length (π/8)(K/σ_th)² =
-(π/4) E* δ²/γ (Dugdale, with K² = 2E*γ). At
-
-    edge_range = sqrt(4 γ l/(π E*))
-
-it is as long as l, the narrowest length that decides where edges stand: the least of λ_min and of
-the patches and gaps beside the edges that move in the jumps which make up nine tenths of all drops,
-as long as these are before the jump.
-
-Surfaces that attract each other from a distance δ jump into contact a way δ sooner. In first order
-in δ the loop then loses δ times the change of mean stress less at every touch, and a hundredth of
-the loss in all at
-
-    touch_range = 0.01 loss / Σ |Δp̄|,
-
-the sum over the jumps in which a patch appears or a gap closes.
-
-A loop of a finite range has earlier touches in it, and its ``touch_range`` is infinite.
-
-A jump of loading that lies just beyond the turning point comes before it likewise, and the loop is
-that of a deeper one. Within
-
-    turn_range
-
-of separation beyond a turning point the jumps take a hundredth of the loss in all. It is looked for
-up to the least of the other three, on the path itself.
+σ_in is the largest local maximum of tension inside patches, away from their edges, and l the
+narrowest length that decides where edges stand: the least of λ_min and of the patches and gaps
+beside the edges that move in the jumps which make up nine tenths of all drops, as long as these are
+before the jump. A loop of a finite range has earlier touches in it, and its ``touch_range`` is
+infinite.
 """
 
 from __future__ import annotations
@@ -220,13 +197,7 @@ def touch_stress(
     |Δp̄|. Otherwise dx/ds is that between the state before the jump and the one before that; before
     first touch it is 1, and 0 under a load, which then moves nothing but the solid.
 
-    Parameters
-    ----------
-    jumps : sequence of Jump
-    before : sequence of int, shape (jumps,)
-        Index of the state before each jump.
-    separation, mean_stress, patches : array, shape (states,)
-    control : Control
+    ``before`` has the index of the state before each jump; the arrays have the shape (states,).
     """
     x = control.prescribed(separation, mean_stress)
     y = control.conjugate(separation, mean_stress, 0.0)
@@ -249,23 +220,8 @@ def turn_range(method: Method, record: Record, step: float, lost: float, longest
 
     Each leg of loading is followed beyond its end, where the path turns or ends. Where it cannot be
     followed so far, or full contact is near, the way up to there counts: nothing is known beyond.
-
-    Parameters
-    ----------
-    method : Method
-    record : Record
-        Of the path.
-    step : float
-        Load step in the prescribed value, positive.
-    lost : float
-        Loss in J/m².
-    longest : float
-        The way is followed so far, in m.
-
-    Returns
-    -------
-    float
-        The least over the turning points; infinite if it is longer than ``longest``.
+    The least over the turning points is returned; infinite if it is longer than ``longest``, in m.
+    ``step`` is the load step in the prescribed value, positive, ``lost`` the loss in J/m².
     """
     if method.problem.work_of_adhesion == 0:
         return math.inf
@@ -318,19 +274,6 @@ def least_range(
 def stress_text(pascals: float) -> str:
     """Return a stress in a unit of its size: "100 kPa"."""
     return f"{1e-6 * pascals:.3g} MPa" if pascals >= 1e6 else f"{1e-3 * pascals:.3g} kPa"
-
-
-def opening_warnings(jumps: Sequence[Jump]) -> list[str]:
-    """Return a warning if patches open from inside, of a real interface over a zone.
-
-    At a tenth of ``edge_range`` losses were up to 23 % too small (docs/zero-range.md).
-    """
-    if not any(jump.barrier > 0 for jump in jumps):
-        return []
-    return [
-        "patches open from inside: a real interface yields over a zone before, and loses more "
-        "(docs/zero-range.md)"
-    ]
 
 
 def beyond_limit(

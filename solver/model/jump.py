@@ -103,17 +103,8 @@ class Jump(NotebookDisplay):
     ) -> Jump:
         """Make the jump from one contact state to another at the same prescribed value.
 
-        Parameters
-        ----------
-        before, after : ContactState
-        branch : {"loading", "unloading"}
-        period : float
-            λ in m.
-        raced, at_stake, barrier
-            As in the class; a jump with a barrier is an opening.
-        falls_off : bool
-            Whether the solid falls off under a load, whose own work is then not counted: the drop
-            is U before (:mod:`adhesis.solver.model.control`).
+        A jump with a barrier is an opening. Where the solid falls off under a load, the work of
+        that is not counted: the drop is U before (:mod:`adhesis.solver.model.control`).
         """
         edges = np.concatenate([before.edges, after.edges])
         kind: JumpKind = "opening" if barrier > 0 else classify(before.edges, after.edges, period)

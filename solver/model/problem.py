@@ -18,7 +18,6 @@ from adhesis.solver.checks import (
     plain,
     real,
 )
-from adhesis.solver.crack import griffith_length
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.control import Control, Value
 from adhesis.solver.model.half_space import HalfSpace
@@ -79,6 +78,11 @@ def strength_of(
             )
         found = work_of_adhesion / real("adhesion_range", adhesion_range, ADHESION_RANGE)
     return found if work_of_adhesion > 0 else math.inf
+
+
+def griffith_length(tension: float, modulus: float, work_of_adhesion: float) -> float:
+    """Compute the length in m of the crack that is in equilibrium under a uniform tension in Pa."""
+    return 4 * modulus * work_of_adhesion / (math.pi * tension**2)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

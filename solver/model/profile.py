@@ -349,23 +349,10 @@ def first_of_equal(
 
     That is the first to the right of the highest crest, with its copies in the other equal parts of
     the period. The rest are its mirror images, or equal it by chance: in any other profile one of
-    them comes first, however little they differ.
+    them comes first, however little they differ. Returned are the indices of the places.
 
-    Parameters
-    ----------
-    position : array, shape (n,)
-        n ≥ 1; the other lengths are in its unit.
-    origin : float
-        The highest crest.
-    part, period : float
-        Length of one of the equal parts, and of all.
-    near : float
-        Error of the positions, at most.
-
-    Returns
-    -------
-    int array
-        Indices of the places that are chosen.
+    ``origin`` is the highest crest, ``part`` and ``period`` are the lengths of one of the equal
+    parts and of all, and ``near`` is the largest error of the positions, all in one unit.
     """
     away = (position - origin + near) % period
     apart = (position - position[np.argmin(away)] + 0.5 * part) % part - 0.5 * part

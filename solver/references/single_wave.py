@@ -263,11 +263,7 @@ class SingleWave:
     @cached_property
     def fold_half_width(self) -> float:
         """a_out in m, at the end of the branch on unloading (ds/da = 0); 0 without adhesion."""
-        if self.work_of_adhesion == 0:
-            return 0.0
-        # ds/da is positive towards a = 0 and negative towards λ/2, with one zero in between.
-        low, high = 1e-9 * self.period, (0.5 - 1e-9) * self.period
-        return _root(self.separation_slope, low, high)
+        return self.stable_range(np.inf)[0]
 
     @cached_property
     def touch_half_width(self) -> float:
@@ -293,9 +289,9 @@ class SingleWave:
     @cached_property
     def loop(self) -> WaveLoop:
         """The exact loop at fixed separation; see :class:`WaveLoop`."""
-        return self._loop_between(self.touch_half_width, self.fold_half_width, np.inf)
+        return self.loop_under(np.inf)
 
-    # ------------------------------------------------------------------ other controls
+    # ------------------------------------------------------------------ any control
 
     def mean_stress_slope(self, a: ArrayLike) -> Array:
         """Compute dp̄/da along the branch, in Pa/m; positive where it is stable under load."""
@@ -305,7 +301,7 @@ class SingleWave:
         return np.asarray(np.pi / self.period * slope)
 
     def displacement(self, a: ArrayLike, stiffness: float) -> Array:
-        """Compute u(a) = Δ + p̄/k in m at equilibrium, k in Pa/m, positive."""
+        """Compute u(a) = Δ + p̄/k in m at equilibrium, k in Pa/m, positive; Δ if infinite."""
         return np.asarray(self.amplitude - self.separation(a) + self.mean_stress(a) / stiffness)
 
     def _prescribed(self, a: ArrayLike, stiffness: float) -> Array:
@@ -318,7 +314,7 @@ class SingleWave:
         return np.asarray(self.mean_stress_slope(a) / stiffness - self.separation_slope(a))
 
     def stable_range(self, stiffness: float) -> tuple[float, float]:
-        """Compute the half-widths (a_out, a_full) in m of the stable branch, k in Pa/m, γ > 0.
+        """Compute the half-widths (a_out, a_full) in m of the stable branch, k in Pa/m.
 
         Raises
         ------
@@ -337,10 +333,10 @@ class SingleWave:
             return self._prescribed_slope(x, stiffness)
 
         full = _root(function, a[top], ends[1]) if slope[-1] < 0 else ends[1]
-        return _root(function, ends[0], a[top]), full
+        return _root(function, ends[0], a[top]) if slope[0] < 0 else 0.0, full
 
     def half_width_under(self, stiffness: float, prescribed: float) -> float:
-        """Compute a in m of the stable state at u = ``prescribed`` in m (k = 0: p̄ in Pa), γ > 0.
+        """Compute a in m of the stable state at u = ``prescribed`` in m (k = 0: p̄ in Pa).
 
         Raises
         ------
@@ -357,7 +353,7 @@ class SingleWave:
         return _root(lambda a: self._prescribed(a, stiffness) - prescribed, low, high)
 
     def loop_under(self, stiffness: float) -> WaveLoop:
-        """Compute the exact loop with a stiffness in Pa/m of nominal area (0: a load), γ > 0.
+        """Compute the exact loop with a stiffness in Pa/m of nominal area (0: a load).
 
         Raises
         ------
@@ -366,10 +362,6 @@ class SingleWave:
         """
         a_in = self.half_width_under(stiffness, 0.0)
         a_out, _ = self.stable_range(stiffness)
-        return self._loop_between(a_in, a_out, stiffness)
-
-    def _loop_between(self, a_in: float, a_out: float, stiffness: float) -> WaveLoop:
-        """Make the loop with these half-widths after first touch and before the fold."""
 
         def spring(a: float) -> float:
             return 0.0 if stiffness == 0 else float(self.mean_stress(a)) ** 2 / (2 * stiffness)

@@ -9,31 +9,29 @@ import numpy as np
 
 from adhesis.solver._kernels import (
     CLOSING_SHARE,
-    Descent,
     DescentEvent,
     EdgeLaw,
     Equilibrium,
     Field,
     FieldModel,
+    LinearResponse,
+    set_up_response,
+    shortest_length,
     solve_field,
 )
 from adhesis.solver.model.profile import Array, Integers
-from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point
-from adhesis.solver.sharp.equilibrium.griffith import (
-    imbalance,
-    leaving_step,
+from adhesis.solver.runtime.threads import one_thread
+from adhesis.solver.sharp.branch_point import PinnedEdges, Point
+from adhesis.solver.sharp.edge_problem import EdgeProblem
+from adhesis.solver.sharp.errors import FullContact, NoState
+from adhesis.solver.sharp.field.gap_field import GapField, check_definite
+from adhesis.solver.sharp.gap.ends import (
+    lengths_of,
+    move_edges,
     positions,
     step_limits,
+    without_small,
 )
-from adhesis.solver.sharp.errors import FullContact, NoState
-from adhesis.solver.sharp.field.gap_field import (
-    FixedEdgeResponse,
-    GapField,
-    respond_at_fixed_edges,
-)
-from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, without_small
-from adhesis.solver.sharp.system.edge_problem import EdgeProblem
-from adhesis.solver.sharp.system.kept_response import KeptResponse
 from adhesis.solver.sharp.tolerances import (
     ENDLESS,
     EQUAL,
@@ -46,13 +44,41 @@ from adhesis.solver.sharp.tolerances import (
 class EdgeMechanics(EdgeProblem):
     """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
-    The linear response of the gaps is kept from one state to the next.
+    The linear response of the gaps is kept from one state to the next, and changes in place.
     """
 
     def __init__(self, *problem: Any) -> None:
         super().__init__(*problem)
-        self.kept = KeptResponse(self)
         self._finer: tuple[Point, Field] | None = None
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the response: results depend on it within the error of the field."""
+        self._response: LinearResponse | None = None
+
+    def response_near(
+        self, gaps: Array, prescribed: float, orders: Integers | None = None
+    ) -> LinearResponse | None:
+        """Return a response of as many gaps; None if these have no field.
+
+        ``orders`` are the least orders of the gaps, for one that is set up.
+        """
+        if not shortest_length(gaps) > 0:
+            return None
+        if self._response is None or self._response.gap_count != len(gaps):
+            self.count.fields += 1
+            law = self.law_at(gaps)
+            self._response = set_up_response(gaps, prescribed, orders, law, self.model)
+        return self._response
+
+    def response_at(self, gaps: Array, prescribed: float) -> LinearResponse | None:
+        """Return the response about these gaps; None if they have no field."""
+        for _ in range(RESPONSE_TRIALS):
+            response = self.response_near(gaps, prescribed)
+            if response is None or response.settle(gaps, prescribed, self.law_at(gaps), self.model):
+                return response
+            self.forget()
+        return None
 
     def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Field:
         """Solve the field of these gaps to a ``share`` of the tolerance."""
@@ -79,24 +105,22 @@ class EdgeMechanics(EdgeProblem):
         work = np.array([self.adhesion.work(end, False)[0] for end in ends[nearest]])
         return np.asarray(np.maximum(opening, 0.0) ** 2 / (self.critical**2 * work))
 
-    def response_before_fold(self, point: Point) -> FixedEdgeResponse:
-        """Return the response at a point next to a fold, the edges held."""
-        return respond_at_fixed_edges(self._solve_finer(point))
+    def solve_finer(self, point: Point) -> Field:
+        """Solve the field of a point more accurately than that of the path, and its derivatives."""
+        if self._finer is None or self._finer[0] is not point:
+            self._finer = point, self.solution(point.gaps, point.d, FIELD_ACCURACY)
+            check_definite(self._finer[1])
+        return self._finer[1]
 
     def fold_displacement(self, point: Point) -> float:
         """Estimate how far in d the error of the field displaces the fold next to a point.
 
         The error of the openings is their difference from those of a more accurate field.
         """
-        finer = self._solve_finer(point)
+        finer = self.solve_finer(point)
         change = finer.opening - point.field.solution.opening
-        return point.fold_displacement(change, respond_at_fixed_edges(finer).opening)
-
-    def _solve_finer(self, point: Point) -> Field:
-        """Solve the field of a point more accurately than that of the path."""
-        if self._finer is None or self._finer[0] is not point:
-            self._finer = point, self.solution(point.gaps, point.d, FIELD_ACCURACY)
-        return self._finer[1]
+        _, _, by_prescribed = finer.by_prescribed()
+        return point.fold_displacement(change, by_prescribed)
 
     def equilibrium(
         self,
@@ -120,21 +144,39 @@ class EdgeMechanics(EdgeProblem):
         reach = max(reach, self.newton_tolerance)
         law = self.law_at(gaps if memory is None else memory)
         for _ in range(RESPONSE_TRIALS):
-            near = self.kept.near(gaps, prescribed, orders)
+            near = self.response_near(gaps, prescribed, orders)
             if near is None:
                 break
             found = near.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
             self.count.newton_steps += found.corrections
             self.count.fields += found.corrections
             if found.found:
-                point = self._point(prescribed, found)
-                self.kept.settled = point.gaps
-                return point
+                return self._point(prescribed, found)
             if not found.is_outgrown:
                 break
             gaps = found.gaps
-            self.kept.forget()
+            self.forget()
         return None
+
+    def equilibrium_between(self, clear: Point, hit: Point, d: float) -> Point | None:
+        """Return the equilibrium between two points of a branch; None if it is not found.
+
+        Of two that have the same edges, as at a fold, these are held.
+        """
+        if clear.gaps is hit.gaps:
+            return self.hold(clear, d)
+        share = (d - clear.d) / (hit.d - clear.d)
+        gaps, reach = clear.gaps + share * (hit.gaps - clear.gaps), self.longest_step
+        point = self.equilibrium(gaps, d, reach, memory=clear.gaps)
+        near = abs(d - clear.d) < abs(hit.d - d)
+        for start in (clear, hit) if near else (hit, clear):
+            if point is None:
+                point = self.equilibrium(start.extrapolate(d), d, reach, memory=clear.gaps)
+        return point
+
+    def hold(self, point: Point, d: float) -> Point:
+        """Return the edges of a point at another ``d``."""
+        return Point(d, self.field(point.gaps, d), point.rate, math.nan)
 
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
         """Make the point of an equilibrium."""
@@ -146,31 +188,14 @@ class EdgeMechanics(EdgeProblem):
         pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)
 
-    def forget(self) -> None:
-        """Forget what results would depend on within the error of the field."""
-        self.kept.forget()
-
     def relax(
-        self,
-        gaps: Array,
-        prescribed: float,
-        reach: float,
-        *,
-        equal_speeds: bool = False,
-        share: float = 1.0,
-    ) -> tuple[Point | Array, bool]:
-        """Descend in energy at a prescribed value to the next minimum.
+        self, gaps: Array, prescribed: float, *, equal_speeds: bool = False, share: float = 1.0
+    ) -> tuple[Point | None, bool]:
+        """Descend in energy at a prescribed value to the next minimum; None if no contact is left.
 
         By linear kinetics, or with ``equal_speeds``, to be compared with that; in steps of at most
-        this share of the longest.
-
-        Returns
-        -------
-        Point or array
-            The minimum, or the gaps without those gaps and patches that have closed or vanished on
-            the way (an empty array when no contact is left).
-        bool
-            Whether the order in which edges ran may have decided that.
+        this share of the longest. Gaps and patches that close or vanish on the way are left out.
+        Returns also whether the order in which edges ran may have decided the end.
 
         Raises
         ------
@@ -179,18 +204,35 @@ class EdgeMechanics(EdgeProblem):
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
+        raced = False
+        while len(gaps):
+            found, by_order = self._relax_until_one_vanishes(gaps, prescribed, equal_speeds, share)
+            raced = raced or by_order
+            if isinstance(found, Point):
+                return found, raced
+            gaps = found
+        return None, raced
+
+    def _relax_until_one_vanishes(
+        self, gaps: Array, prescribed: float, equal_speeds: bool, share: float
+    ) -> tuple[Point | Array, bool]:
+        """Descend to the next minimum, or until a gap or patch vanishes: the gaps without it."""
         law = EdgeLaw(self.law_at(gaps))
         law.longest_step *= share
         left, rests, raced = ENDLESS, 0, False
         orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            end, orders, left = self._descend(
-                gaps, prescribed, left, orders, law, equal_speeds, start
-            )
-            if end is None or end.event == DescentEvent.NO_FIELD:
+            near = self.response_near(gaps, prescribed, orders)
+            if near is None:
                 raise NoState("there is no field of these edges", prescribed)
-            gaps, raced = end.gaps, raced or end.raced
+            end = near.descend(gaps, start, prescribed, left, equal_speeds, law, self.model)
+            self.count.descent_steps += end.steps
+            self.count.fields += end.steps + end.set_ups
+            if end.event == DescentEvent.NO_FIELD:
+                raise NoState("there is no field of these edges", prescribed)
+            gaps, orders, left = end.gaps, near.orders, left - end.steps
+            raced = raced or end.raced
             if end.event == DescentEvent.VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
@@ -209,7 +251,7 @@ class EdgeMechanics(EdgeProblem):
                 rested = gaps
                 strict = rests <= RESTS
                 point = self.equilibrium(
-                    gaps, prescribed, reach, orders, strict=strict, memory=law.memory
+                    gaps, prescribed, self.longest_step, orders, strict=strict, memory=law.memory
                 )
                 if point is not None:
                     return point, raced
@@ -220,28 +262,6 @@ class EdgeMechanics(EdgeProblem):
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
-    def _descend(
-        self,
-        gaps: Array,
-        prescribed: float,
-        most: int,
-        orders: Integers | None,
-        law: EdgeLaw,
-        equal_speeds: bool,
-        start: Array,
-    ) -> tuple[Descent | None, Integers | None, int]:
-        """Descend on the linear response; returns its orders at the end and the steps left, too.
-
-        None if the edges have no field.
-        """
-        near = self.kept.near(gaps, prescribed, orders)
-        if near is None:
-            return None, orders, most
-        end = near.descend(gaps, start, prescribed, most, equal_speeds, law, self.model)
-        self.count.descent_steps += end.steps
-        self.count.fields += end.steps + end.set_ups
-        return end, near.orders, most - end.steps
-
     def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.
 
@@ -249,7 +269,7 @@ class EdgeMechanics(EdgeProblem):
         first, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
-        near, free = self.kept.at(gaps, prescribed), law.free_edges(gaps)
+        near, free = self.response_at(gaps, prescribed), law.free_edges(gaps)
         if near is None or self.critical == 0 or len(free) == 0:
             return []
         tangent = near.tangent_between(gaps, free, prescribed, law, self.model)
@@ -273,7 +293,7 @@ class EdgeMechanics(EdgeProblem):
     def _force_along(self, gaps: Array, step: Array, prescribed: float, law: EdgeLaw) -> float:
         """Compute the force along a ``step`` at its end: positive where the energy falls."""
         opening = self.solution(gaps, prescribed).opening
-        residual = imbalance(opening, gaps, law)
+        residual = opening - law.critical_of(gaps, opening)
         return -float((residual * (2 * opening - residual)) @ step)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
@@ -302,8 +322,26 @@ class EdgeMechanics(EdgeProblem):
         minimum: the flow stands still there. A minimum draws the edge back.
         """
         opening = self.solution(gaps, prescribed).opening
-        residual = imbalance(opening, gaps, law)
+        residual = opening - law.critical_of(gaps, opening)
         e = int(np.argmax(np.abs(residual)))
         step = np.zeros(gaps.size)
         step[e] = -np.sign(residual[e]) * step_limits(gaps, 0.5 * times * law.longest_step)[e]
         return move_edges(gaps, step)
+
+
+def leaving_step(hessian: Array, limit: Array, order: Array) -> Array | None:
+    """Step off a saddle, along its softest modes, up to the limit of an edge; None off a minimum.
+
+    One edge leads, outwards; it is the one that moves most freely in these modes, of equal ones the
+    first in ``order`` (positions). Where symmetry makes several modes equally soft, the step is the
+    leading edge's projection on all of them: which of equivalent edges leads does not matter.
+    """
+    with one_thread():
+        values, vectors = np.linalg.eigh(hessian)
+    if not values[0] < 0:
+        return None
+    soft = vectors[:, values <= min(values[0] + EQUAL * np.abs(values).max(), 0.0)]
+    freedom = (soft**2).sum(axis=1)
+    equal = np.flatnonzero(freedom > (1 - EQUAL) * freedom.max())
+    step = soft @ soft[equal[np.argmin(order[equal])]]
+    return np.asarray(step / np.abs(step / limit).max())

@@ -27,23 +27,19 @@ from adhesis.solver.method import (
     PathError,
 )
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
-from adhesis.solver.sharp.continuation.jump import History, Jumps
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.continuation.jump import History
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Cracks
 from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
-from adhesis.solver.sharp.output.interior_tension import largest_tension
 from adhesis.solver.sharp.tolerances import (
     FIELD_ACCURACY,
     FIELD_RESOLVES,
@@ -65,17 +61,9 @@ from adhesis.solver.sharp.tolerances import (
 
 @dataclass(frozen=True)
 class SharpReport(MethodReport):
-    """Accuracy, tolerances and counters.
+    """Relative accuracy of loss and field, resolution of jumps, and ``edge_problem.Counters``.
 
-    Attributes
-    ----------
-    accuracy : float
-    field_tolerance : float
-        Relative accuracy of the field.
-    jump_resolution : float
-        To which a jump is located: separation over h_max, under a load σ~.
-    fields, energies, openings, newton_steps, descent_steps : int
-        See ``system.edge_problem.Counters``.
+    A jump is located to that part of h_max, under a load to that σ~.
     """
 
     accuracy: float
@@ -86,11 +74,6 @@ class SharpReport(MethodReport):
     openings: int
     newton_steps: int
     descent_steps: int
-
-
-def _adhesion_ratio(profile: Profile, critical: float) -> float:
-    """Compute the critical opening over the opening caused by roughness, h' sqrt(λ_min)."""
-    return float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
 
 
 class SharpMethod(Method):
@@ -136,7 +119,8 @@ class SharpMethod(Method):
         self.q0 = profile.q0
         h_max = profile.h_max * self.q0
         critical = float(4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus)))
-        ratio = _adhesion_ratio(profile, critical)
+        # over the opening that roughness makes, h' sqrt(λ_min)
+        ratio = float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
         # If adhesion is weak, C_c is a small difference of the openings caused by roughness, and
         # the loss, of the order of its square, a small difference of two works: the field, and the
         # integral along a branch (of fourth order), have to be as much finer.
@@ -180,12 +164,8 @@ class SharpMethod(Method):
             least_drop=LEAST_DROP * problem.work_of_adhesion,
             field_share=FIELD_SHARE * accuracy,
         )
-        self.nucleation = Nucleation(problem, self.edges)
-        self.jumps = Jumps(self.edges, self.nucleation, self.states)
-        self.follower = Follower(
-            self.edges, self.nucleation, Cracks(problem, self.edges), self.states, self.jumps,
-            self.resolution,
-        )  # fmt: skip
+        self.follower = Follower(problem, self.edges, self.states, self.resolution)
+        self.nucleation, self.jumps = self.follower.nucleation, self.follower.jumps
         self._loaded: list[ContactState] = []  # without adhesion unloading goes back through them
 
     def report(self) -> SharpReport:
@@ -208,7 +188,15 @@ class SharpMethod(Method):
     @one_at_a_time
     def largest_tension(self, states: Sequence[ContactState]) -> PatchTension | None:
         """Find the largest local maximum of tension inside patches; see the contract."""
-        return largest_tension(self.problem, lambda i: self._field(states[i]), len(states))
+        best: PatchTension | None = None
+        largest, unit = 0.0, self.problem.half_space.modulus / 2
+        for number, state in enumerate(states):
+            for maximum in self.follower.cracks.inner.maxima(self._field(state), largest):
+                if maximum.tension > largest:
+                    largest = maximum.tension
+                    position = maximum.theta / self.q0 % self.problem.profile.period
+                    best = PatchTension(number, position, largest * unit)
+        return best
 
     @one_at_a_time
     def openings(self, state: ContactState) -> list[Opening]:
@@ -262,9 +250,9 @@ class SharpMethod(Method):
                 history.states.append(self.detached(apart))
                 return history
             d = first
-            before = self.states.detached(touch)
-            history.states.append(before)
-            point = self._jump(history, before, np.empty((0, 2)), d, target, highest)
+            before, gaps = self.states.detached(touch), np.empty((0, 2))
+            jump = self.jumps.compute(before, gaps, d, target.branch, highest)
+            point = history.commit(jump)
         else:
             gaps = state.internal.gaps
             if point is None:
@@ -272,9 +260,9 @@ class SharpMethod(Method):
             else:
                 d = point.d  # that of the state but for rounding
             if point is None:
-                before = self.states.of_field(self.edges.field(gaps, d))
-                history.states.append(before)
-                point = self._jump(history, before, gaps, d, target)
+                field = self.edges.field(gaps, d)
+                before = self.states.of_point(Point(d, field, np.zeros(gaps.size), math.nan))
+                point = history.commit(self.jumps.compute(before, gaps, d, target.branch))
             elif d == target.d:
                 history.states.append(state)
         while point is not None and d != target.d:
@@ -284,20 +272,6 @@ class SharpMethod(Method):
                 raise NoState("contact is lost where surfaces overlap", d)
             history.states.append(self.detached(target.prescribed))
         return history
-
-    def _jump(
-        self,
-        history: History,
-        before: ContactState,
-        gaps: Array,
-        d: float,
-        target: Target,
-        touches: list[Touch] | None = None,
-    ) -> Point | None:
-        """Compute the jump from a state that no branch led to, and return the point after it."""
-        jump = self.jumps.compute(before, gaps, d, target.branch, touches)
-        history.commit(jump)
-        return jump.point
 
     def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
         """Follow a path without adhesion, whose states are unique and do not jump.

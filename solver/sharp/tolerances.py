@@ -73,6 +73,20 @@ STRENGTH_EXCEEDED = 2e-5
 """σ_th. Tension inside a patch may exceed the strength by this share when it opens."""
 SHORTEST_CRACK = 0.02
 """λ_min. Shorter ones are not put: steps of their edges would count as rest."""
+GROWTH = 1.1
+"""G/γ of the crack that is put into a patch, and its inverse for a patch in a gap."""
+LONGEST_TRIAL_HALF_LENGTH = 0.25
+"""λ_min. Half-length of the longest crack or patch: it is then as long as half a wave."""
+IN_PATCH = 0.8
+"""Half-length of the longest one, over the distance of its middle from the nearest edge."""
+EQUAL_TENSIONS = 1e-4
+"""σ_th. Maxima of tension that differ by less open together."""
+NEAR_STRENGTH = 0.8
+"""σ_th. Smaller maxima of tension are not judged."""
+MOST_MAXIMA = 32
+"""Maxima of tension of one field that are refined."""
+MOST_OPENINGS = 1000
+"""Openings one after the other at one prescribed value; more are an endless loop."""
 
 # ---------------------------------------------------------------- continuation of a branch
 

@@ -23,11 +23,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.solver.crack import griffith_length
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.control import Control
-from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.problem import Problem, griffith_length
 from adhesis.solver.model.profile import Array, Profile, self_affine_profile
 from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
 from adhesis.solver.references.last_gap import LastGap

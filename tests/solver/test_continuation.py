@@ -10,8 +10,8 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Fold, Resolution, StableBranch, Target
-from adhesis.solver.sharp.equilibrium.branch_point import Point
 
 WAVE, FOLD = 1.0, 0.2
 
@@ -51,7 +51,7 @@ def branch(curve: Curve, start: float, jump: float) -> StableBranch:
     """Make a branch that is followed down to 0, to a resolution of folds."""
     resolution = Resolution(jump, 1e-3, np.inf, 1.0, 1e-9, 0.5, 0.0, 0.05)
     aim = Target(0.0, 0.0, "loading")
-    return StableBranch(cast(Any, curve), resolution, curve.point(start), aim)
+    return StableBranch(cast(Any, curve), resolution, cast(Any, None), curve.point(start), aim)
 
 
 def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked():

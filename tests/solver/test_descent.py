@@ -15,7 +15,6 @@ from adhesis.solver._kernels import (
     distance_to_minimum,
     implicit_step,
 )
-from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.dense import DenseSolution, dense_tangent, solve_densely
@@ -31,7 +30,8 @@ class Solved(NamedTuple):
 
     @property
     def residual(self) -> np.ndarray:
-        return imbalance(self.solution.opening, self.gaps, self.edges.law)
+        opening = self.solution.opening
+        return opening - self.edges.law.critical_of(self.gaps, opening)
 
     def openings(self, motion: np.ndarray) -> np.ndarray:
         gaps = self.gaps + (motion * np.tile([1.0, -1.0], len(self.gaps))).reshape(-1, 2)
@@ -134,7 +134,7 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     """Descend on a single wave of amplitude 1 µm, at a separation in amplitudes."""
     edges, ends = method.edges, np.array(gaps, dtype=float)
     prescribed = separation * 2 * np.pi * 1e-3
-    near = edges.kept.near(ends, prescribed, None)
+    near = edges.response_near(ends, prescribed)
     assert near is not None
     return near.descend(ends, ends, prescribed, most, False, edges.law, edges.model)
 

@@ -20,7 +20,6 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from adhesis.solver.loading.equilibrium_path import strain_warnings
 from adhesis.solver.loading.zero_range import (
     TOUCHES,
     _narrowest_moved,
@@ -152,9 +151,11 @@ def test_strains_that_are_not_small_are_doubtful():
     problem = loop_of(1e7).problem
     young, period = problem.half_space.young, problem.profile.period
     patches, stress = np.array([1, 0]), np.array([-0.4 * young, 0.0])
-    (tension,) = strain_warnings(problem, stress, np.array([0.0, period]), patches)
+    states = replace(loop_of(1e7), mean_stress=stress, patches=patches)
+    (tension,) = replace(states, separation=np.array([0.0, period])).strain_warnings()
     assert "is 0.4 of Young's modulus: small strain does not hold" in tension
-    (neck,) = strain_warnings(problem, 0.5 * stress, np.array([0.5, 9.0]) * period, patches)
+    long, weak = np.array([0.5, 9.0]) * period, 0.5 * stress
+    (neck,) = replace(states, mean_stress=weak, separation=long).strain_warnings()
     assert ", 0.5 of the period: small strain does not hold" in neck
 
 

@@ -8,7 +8,7 @@ import pytest
 from adhesis import Control, HalfSpace, Problem, Profile, run_loop, run_loops, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.continuation.jump import Jumps
-from adhesis.solver.sharp.equilibrium.griffith import leaving_step
+from adhesis.solver.sharp.mechanics import leaving_step
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.grids import grid_of
 

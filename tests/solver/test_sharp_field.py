@@ -6,9 +6,9 @@ import pytest
 from adhesis import Problem, self_affine_profile, single_wave
 from adhesis.solver._kernels import FieldModel, LoadingDevice, solve_field
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.field.gap_field import GapField, respond_at_fixed_edges
+from adhesis.solver.sharp.edge_problem import FIXED_SEPARATION
+from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.system.edge_problem import FIXED_SEPARATION
 from tests.support.dense import solve_densely
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.grids import grid_of
@@ -168,12 +168,10 @@ def test_field_and_derivatives_do_not_know_what_holds_them(source, separation, n
     assert np.allclose(field.opening, fixed.opening, rtol=1e-9)
     way = 0.5 * separation
     other = solved_field(source, GAPS, prescribed + way, 1e-13, device)
-    by_prescribed = respond_at_fixed_edges(field.solution)
+    pressure, _, opening = field.solution.by_prescribed()
     change = other.solution.opening - field.solution.opening
-    assert np.allclose(change, way * by_prescribed.opening, rtol=1e-8)
-    assert abs(other.pressure - field.pressure - way * by_prescribed.pressure) < (
-        1e-8 * abs(field.pressure)
-    )
+    assert np.allclose(change, way * opening, rtol=1e-8)
+    assert abs(other.pressure - field.pressure - way * pressure) < 1e-8 * abs(field.pressure)
 
 
 def test_edge_opening_against_the_edge_stress_of_the_grid():

@@ -6,7 +6,6 @@ import numpy as np
 
 from adhesis.solver._kernels import FieldModel, solve_field
 from adhesis.solver.model.profile import Array, Integers
-from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 
 _STEP = 1e-6  # of an edge in θ, to both sides
@@ -48,7 +47,7 @@ def dense_residual(
 ) -> Array:
     """Compute C_e - C_c at all edges."""
     opening = solve_densely(gaps, prescribed, edges.model, orders).opening
-    return imbalance(opening, gaps, edges.law)
+    return np.asarray(opening - edges.law.critical_of(gaps, opening))
 
 
 def dense_tangent(gaps: Array, prescribed: float, edges: EdgeMechanics) -> Array:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from adhesis.solver._kernels import COMPARABLE, STEP_GROWTH, STEP_REDUCTION, shortest_length
+from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.continuation.predictor import Predictor
-from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import signs_of, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
     ORDER_RESOLVED,
@@ -24,8 +25,6 @@ from adhesis.solver.sharp.tolerances import (
     WORK_RESOLVED,
     WORK_STALLED,
 )
-
-EnergyResidual = Callable[[Point, Point], float]
 
 
 @dataclass(frozen=True)
@@ -102,19 +101,17 @@ class TwoFolds:
 
     Attributes
     ----------
-    edges : tuple of int
-        The edge that leads to each of them.
-    ways : tuple of float
-        The way on which it does: 1 outwards of the contact, -1 inwards. Next to the one fold its
-        edge takes the other one along, so that the rates there do not show it.
+    ahead : tuple of (int, float)
+        The edge that leads to each of them, and the way on which it does: 1 outwards of the
+        contact, -1 inwards. Next to the one fold its edge takes the other one along, so that the
+        rates there do not show it.
     beyond : float
         d beyond both.
     apart : float
         Their distance in d.
     """
 
-    edges: tuple[int, ...]
-    ways: tuple[float, ...]
+    ahead: tuple[tuple[int, float], ...]
     beyond: float
     apart: float
 
@@ -141,15 +138,6 @@ class Fold:
 class StableBranch:
     """A stable branch that is followed from a point towards a target.
 
-    Parameters
-    ----------
-    edges : EdgeMechanics
-    resolution : Resolution
-    point : Point
-    target : Target
-    energy_residual : callable, optional
-        Computes the difference of work and energy between two points, in J/m².
-
     Attributes
     ----------
     point : Point
@@ -165,17 +153,17 @@ class StableBranch:
         self,
         edges: EdgeMechanics,
         resolution: Resolution,
+        states: States,
         point: Point,
         target: Target,
-        energy_residual: EnergyResidual | None = None,
     ) -> None:
-        self._energy_residual = energy_residual
-        self._edges, self._resolution = edges, resolution
+        self._edges, self._resolution, self._states = edges, resolution, states
         self._target = target
         before = point.previous
         if before is not None and (point.d - before.d) * (target.d - point.d) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
+        self._at_output: ContactState | None = None  # the state there, where work is compared
         self.trail = [point]
         self.finest, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
@@ -194,7 +182,7 @@ class StableBranch:
             d = self._target.d if step == left else self.point.d + step
             reached = correct(self._edges, self._predictor, d)
             if reached is not None:
-                error = self._error(self._output, reached)
+                error = max(self._trapezoid_error(reached), self._work_error(reached))
                 share = 0.5 if error > TRAPEZOID_FAR else self._share_to_turn(reached, step)
                 if share == 1 or abs(step) <= 2 * self._resolution.finest:
                     return self._accept(reached, step, error)
@@ -280,7 +268,7 @@ class StableBranch:
         self.point = point
         self._work_before = (0.0, math.inf)
         if is_output:
-            self._output = point
+            self._output, self._at_output = point, None
         if point.d != self._target.d:
             # what lies before a kink predicts nothing beyond it
             kink = self._begins_to_move
@@ -304,20 +292,17 @@ class StableBranch:
         self._two_folds = None
         if apart < resolution:
             way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
-            edges = predictor.leading_edge, other.edge
-            ways = tuple(float(np.sign(predictor.point.rate[e] * way)) for e in edges)
-            self._two_folds = TwoFolds(edges, ways, predictor.point.d + way, apart)
+            rate, edges = predictor.point.rate, (predictor.leading.edge, other.edge)
+            ahead = tuple((edge, float(np.sign(rate[edge] * way))) for edge in edges)
+            self._two_folds = TwoFolds(ahead, predictor.point.d + way, apart)
 
-    def _error(self, output: Point, point: Point) -> float:
-        """Error of the integral since the last output, in units of what is allowed."""
-        return max(self._trapezoid_error(output, point), self._work_error(output, point))
-
-    def _trapezoid_error(self, output: Point, point: Point) -> float:
+    def _trapezoid_error(self, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed.
 
         Over stripes of the work of adhesion, and where edges are pinned on the way, slopes at both
         ends are equal by chance: there their difference from the mean slope counts, too.
         """
+        output = self._output
         way = point.d - output.d
         # p = q0 h_max is σ~ = 1
         h_max = self._resolution.h_max
@@ -330,18 +315,21 @@ class StableBranch:
             change = max(change, *(abs(here - before - way * p.slope) for p in (output, point)))
         return float(change / 12 / (self._resolution.bend * scale))
 
-    def _work_error(self, output: Point, point: Point) -> float:
+    def _work_error(self, point: Point) -> float:
         """Difference of work and energy since the last output, in units of what is allowed.
 
         Zero for steps much shorter than the resolution of jumps. A difference that a shorter step
         does not reduce is no error of the step: energies differ by it where the number of modes of
         a gap changes. No smaller one halves a further step of the branch.
         """
-        span = abs(point.d - output.d)
+        span = abs(point.d - self._output.d)
         short = span < WORK_RESOLVED * self._resolution.jump
-        if self._energy_residual is None or short:
+        if math.isinf(self._resolution.work) or short:
             return 0.0
-        error = abs(self._energy_residual(output, point)) / self._resolution.work
+        if self._at_output is None:
+            self._at_output = self._states.of_point(self._output)
+        residual = self._states.energy_residual(self._at_output, self._states.of_point(point))
+        error = abs(residual) / self._resolution.work
         if math.isnan(error):
             return 0.0
         longer, larger = self._work_before

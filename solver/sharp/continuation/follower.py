@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from adhesis.solver._kernels import SearchedGaps
-from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import (
     Accepted,
     Fold,
@@ -20,52 +21,27 @@ from adhesis.solver.sharp.continuation.branch import (
     Target,
 )
 from adhesis.solver.sharp.continuation.jump import ComputedJump, EventOrders, History, Jumps
-from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import positions, step_limits
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.gap.ends import lengths_of, move_edges
+from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import (
-    Located,
-    equilibrium_between,
-    locate,
-)
+from adhesis.solver.sharp.nucleation.location import Located, locate
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Cracks
+from adhesis.solver.sharp.nucleation.opening import Crack, Cracks
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import EQUAL, SECOND_FOLD_DISPLACED
+from adhesis.solver.sharp.tolerances import EQUAL, MOST_OPENINGS, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 
 class Follower:
-    """Follows the branches of one problem.
-
-    Parameters
-    ----------
-    edges : EdgeMechanics
-    nucleation : Nucleation
-        Contact that appears in gaps.
-    cracks : Cracks
-        Gaps that appear in contact.
-    states : States
-    jumps : Jumps
-    resolution : Resolution
-    """
+    """Follows the branches of one problem."""
 
     def __init__(
-        self,
-        edges: EdgeMechanics,
-        nucleation: Nucleation,
-        cracks: Cracks,
-        states: States,
-        jumps: Jumps,
-        resolution: Resolution,
+        self, problem: Problem, edges: EdgeMechanics, states: States, resolution: Resolution
     ) -> None:
-        self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
-        self.cracks, self.resolution = cracks, resolution
-        self._between = equilibrium_between(edges)
+        self.edges, self.states, self.resolution = edges, states, resolution
+        self.nucleation, self.cracks = Nucleation(problem, edges), Cracks(problem, edges)
+        self.jumps = Jumps(edges, self.nucleation, states)
         self._came_on: Branch | None = None
-        self._output: tuple[Point, ContactState] | None = None
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
@@ -87,15 +63,15 @@ class Follower:
             d reached and the stable point there, None if no contact is left.
         """
         if self.edges.pins and self._came_on not in (None, target.branch):
-            point = self._turned_back(point)
+            # where a path turns back all its edges are pinned at first
+            turned = self.edges.equilibrium(point.gaps, point.d, self.edges.newton_tolerance)
+            point = point.with_previous(None) if turned is None else turned
             history.states.append(self.states.of_point(point))
         self._came_on = None
         jump = self._opening_at(history, point, target)
         if jump is not None:
-            history.commit(jump)
-            return jump.d, jump.point
-        energy_residual = self._energy_residual if math.isfinite(self.resolution.work) else None
-        branch = StableBranch(self.edges, self.resolution, point, target, energy_residual)
+            return jump.d, history.commit(jump)
+        branch = StableBranch(self.edges, self.resolution, self.states, point, target)
         while branch.point.d != target.d:
             event = branch.advance()
             if isinstance(event, Fold):
@@ -103,21 +79,9 @@ class Follower:
             else:
                 jump = self._handle_accepted(history, branch, event, target)
             if jump is not None:
-                history.commit(jump)
-                return jump.d, jump.point
+                return jump.d, history.commit(jump)
         self._remember(history, branch, target.branch)
         return target.d, branch.point
-
-    def _turned_back(self, point: Point) -> Point:
-        """Return the point at which a path turns back: all its edges are pinned there at first."""
-        pinned = self.edges.equilibrium(point.gaps, point.d, self.edges.newton_tolerance)
-        return point.with_previous(None) if pinned is None else pinned
-
-    def _energy_residual(self, output: Point, point: Point) -> float:
-        """Compute the change of energy between two points of a branch, less the work, in J/m²."""
-        if self._output is None or self._output[0] is not output:
-            self._output = output, self.states.of_point(output)
-        return self.states.energy_residual(self._output[1], self.states.of_point(point))
 
     def _remember(self, history: History, branch: StableBranch, name: Branch) -> None:
         """Let the last state remember its point."""
@@ -141,16 +105,14 @@ class Follower:
         jump = None
         if event.is_output or event.remaining is not None:
             jump = self._nucleation_jump(branch, target)
-        if output is not None and (jump is None or self._is_before(output, jump, target)):
-            history.states.append(output)
-        if jump is not None:
-            return jump
-        if event.remaining is None:
-            return None
-        states = () if event.is_output else (self.states.of_point(point),)
-        before = states[-1] if states else history.states[-1]
-        jump = self.jumps.compute(before, event.remaining, point.d, target.branch, known=point)
-        return replace(jump, states=states + jump.states)
+        if jump is None and event.remaining is not None:
+            before = output or self.states.of_point(point)
+            return self.jumps.compute(before, event.remaining, point.d, target.branch, known=point)
+        if output is not None:
+            onwards = -1.0 if target.branch == "loading" else 1.0
+            if jump is None or onwards * (self.states.prescribed_of(output) - jump.d) < 0:
+                history.states.append(output)
+        return jump
 
     def _handle_fold(
         self, history: History, branch: StableBranch, fold: Fold, target: Target
@@ -160,12 +122,10 @@ class Follower:
         if jump is not None:
             return jump
         if self._may_touch_before(fold):
-            point = fold.point
-            held = self.edges.field(point.gaps, fold.d)
-            branch.trail.append(Point(fold.d, held, point.rate, math.nan))
+            branch.trail.append(self.edges.hold(fold.point, fold.d))
             jump = self._nucleation_jump(branch, target)
             if jump is not None:
-                return replace(jump, states=(self.states.of_point(point), *jump.states))
+                return replace(jump, states=(self.states.of_point(fold.point), *jump.states))
         last = history.states[-1] if history.states else None
         jump = self._fold_jump(last, fold, target, branch.finest)
         if jump is None:
@@ -181,10 +141,9 @@ class Follower:
 
     def _may_touch_before(self, fold: Fold) -> bool:
         """Return whether surfaces may touch on the last step to a fold, the edges being held."""
-        point = fold.point
-        way = abs(fold.d - point.d)
+        point, way = fold.point, abs(fold.d - fold.point.d)
         if not self.edges.is_fixed:
-            way *= max(1.0, abs(self.edges.response_before_fold(point).separation))
+            way *= max(1.0, abs(self.edges.solve_finer(point).by_prescribed()[1]))
         # the mean gap closes by the gaps alone, the faster the less of the period they take
         closing = way * 2 * math.pi / lengths_of(point.gaps)[0].sum()
         return bool(self.nucleation.minimum(point.field)[0] <= closing)
@@ -201,10 +160,10 @@ class Follower:
         fold, beyond = branch.fold_ahead
         for _ in range(MOST_OPENINGS):
             finest = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
-            touched = locate(self.nucleation, self._between, trail, finest)
+            touched = locate(self.nucleation, self.edges, trail, finest)
             opened = None
             if self.cracks.is_possible:
-                opened = locate(self.cracks, self._between, trail, self.resolution.finest)
+                opened = locate(self.cracks, self.edges, trail, self.resolution.finest)
             if opened is not None and (
                 touched is None or abs(opened.point.d - start) < abs(touched.point.d - start)
             ):
@@ -220,19 +179,24 @@ class Follower:
                 return jump
         raise NoState("contact nucleates, and goes back in turn", trail[-1].d)
 
-    def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
-        direction = -1.0 if target.branch == "loading" else 1.0
-        return direction * (self.states.prescribed_of(state) - jump.d) < 0
-
     def _opening_at(self, history: History, point: Point, target: Target) -> ComputedJump | None:
-        """Compute the jump at the start of a branch where patches open at once; else None."""
+        """Compute the jump at the start of a branch where patches open at once; else None.
+
+        Raises
+        ------
+        NoState
+            If patches open and close without end.
+        """
         if not self.cracks.is_possible:
             return None
         least, found = self.cracks.minimum(point.field)
         if least > 0:
             return None
         jump = self._opening_jump(Located(point, self.cracks.choose_seeds(found), 0.0), target)
-        self._check_openings(history, jump)
+        last = history.jumps[-MOST_OPENINGS:]
+        here = jump.jump.separation
+        if len(last) == MOST_OPENINGS and all(one.separation == here for one in last):
+            raise NoState("patches open and close in turn", jump.d)
         return jump
 
     def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
@@ -249,15 +213,7 @@ class Follower:
         )
         if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
             raise NoState("a crack that grows at both tips closes again", point.d)
-        late = self.states.work(before, jump.states[-1], opened.late)
-        return replace(jump, states=(before, *jump.states), misplaced=late)
-
-    def _check_openings(self, history: History, jump: ComputedJump) -> None:
-        """Raise where patches open and close without end."""
-        last = history.jumps[-MOST_OPENINGS:]
-        here = jump.jump.separation
-        if len(last) == MOST_OPENINGS and all(one.separation == here for one in last):
-            raise NoState("patches open and close in turn", jump.d)
+        return replace(jump, misplaced=self.states.work(before, jump.states[-1], opened.late))
 
     def _touch_jump(
         self, touched: Located[Touch], beyond: float | None, target: Target
@@ -281,8 +237,7 @@ class Follower:
             return None
         # they hold from somewhere since they last did not, where no energy is lost
         late, since = (self.states.work(before, jump.states[-1], x) for x in (touched.late, since))
-        misplaced = late + min(since, abs(jump.jump.energy_drop))
-        return replace(jump, states=(before, *jump.states), misplaced=misplaced)
+        return replace(jump, misplaced=late + min(since, abs(jump.jump.energy_drop)))
 
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float
@@ -292,10 +247,8 @@ class Follower:
         way = abs(fold.d - point.d)
         states: tuple[ContactState, ...] = ()
         if last is None or last.internal.gaps is not point.field.gaps:
-            last = self.states.of_point(point)
-            states = (last,)
-        response = self.edges.response_before_fold(point)
-        before = self.states.at_fixed_edges(last, point.field, response, fold.d)
+            states = (self.states.of_point(point),)
+        before = self.states.of_point(point, held=(fold.d, self.edges.solve_finer(point)))
         start, event_orders = self._start_at_fold(fold)
         jump = self.jumps.compute(
             before, start, fold.d, target.branch, known=point, event_orders=event_orders
@@ -310,7 +263,7 @@ class Follower:
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
-        return replace(jump, states=(*states, before, after), misplaced=misplaced)
+        return replace(jump, states=states + jump.states, misplaced=misplaced)
 
     def _orders_of_folds(self, fold: Fold) -> EventOrders | None:
         """Return starts from which either of two folds comes first, if both may."""
@@ -322,8 +275,7 @@ class Follower:
             return None
         furthest = max(fold.d, two.beyond) if fold.d > point.d else min(fold.d, two.beyond)
         longest = self.edges.longest_step
-        ahead = zip(two.edges, two.ways, strict=True)
-        starts = tuple(self._moved_on(point.gaps, edge, way * longest) for edge, way in ahead)
+        starts = tuple(self._moved_on(point.gaps, edge, way * longest) for edge, way in two.ahead)
         return EventOrders(furthest, starts)
 
     def _start_at_fold(self, fold: Fold) -> tuple[Array, EventOrders | None]:

@@ -11,7 +11,7 @@ import numpy as np
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
@@ -25,11 +25,8 @@ class ComputedJump:
 
     Attributes
     ----------
-    d : float
-        Of the jump.
     states : tuple of ContactState
-        States before it that the path does not hold yet, and the one after it.
-    jump : Jump
+        The state before it and the one after it; before these states that led there.
     point : Point or None
         The stable point after it; None if no contact is left.
     misplaced : float
@@ -45,26 +42,18 @@ class ComputedJump:
 
 @dataclass
 class History:
-    """States and jumps of a path.
-
-    Attributes
-    ----------
-    states : list of ContactState
-    jumps : list of Jump
-    misplaced : float
-        Work in J/m² of nominal area by which the loss may be wrong because jumps were not found at
-        their exact places.
-    """
+    """States and jumps of a path, and the sum of the works by which these may be wrong."""
 
     states: list[ContactState] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
     misplaced: float = 0.0
 
-    def commit(self, computed: ComputedJump) -> None:
-        """Append a jump and its states."""
+    def commit(self, computed: ComputedJump) -> Point | None:
+        """Append a jump and its states, and return the point after it."""
         self.states += computed.states
         self.jumps.append(computed.jump)
         self.misplaced += computed.misplaced
+        return computed.point
 
 
 @dataclass(frozen=True)
@@ -88,14 +77,7 @@ Rival = Point | None | FullContact | NoState
 
 
 class Jumps:
-    """Jumps of one problem.
-
-    Parameters
-    ----------
-    edges : EdgeMechanics
-    nucleation : Nucleation
-    states : States
-    """
+    """Jumps of one problem."""
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
@@ -131,7 +113,7 @@ class Jumps:
             return False
         d = 0.0 if self.edges.is_load else separation
         try:
-            point, _ = self._relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), d)
+            point, _ = self.edges.relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), d)
         except FullContact:
             return True
         return point is not None and self.states.of_point(point).potential < 0
@@ -178,7 +160,7 @@ class Jumps:
         if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
             at_stake = 0.0
         jump = self.states.jump(before, after, branch, at_stake, barrier)
-        return ComputedJump(d, (after,), jump, point)
+        return ComputedJump(d, (before, after), jump, point)
 
     def _at_stake_beyond(
         self, before: ContactState, point: Point | None, event_orders: EventOrders
@@ -187,7 +169,7 @@ class Jumps:
         d = event_orders.beyond
 
         def end(start: Array) -> Point | None:
-            return self._end_of(self._relax(start, d)[0], d)
+            return self._end_of(self.edges.relax(start, d)[0], d)
 
         both = None if point is None else end(point.gaps)
         differences = [self._at_stake(before, both, end(start), d) for start in event_orders.starts]
@@ -215,7 +197,7 @@ class Jumps:
 
         def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
             gaps = self.nucleation.insert_seeds(gaps, touching)
-            return self._relax(gaps, d, equal_speeds=equal_speeds)[0]
+            return self.edges.relax(gaps, d, equal_speeds=equal_speeds)[0]
 
         return self._nucleate_until_clear(point, d, relaxed)
 
@@ -290,16 +272,16 @@ class Jumps:
         """
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
-        point, raced = self._relax(gaps, d)
+        point, raced = self.edges.relax(gaps, d)
         if not (raced and self._may_race):
             return point
         others: list[Rival] = []
         try:
-            others.append(self._relax(gaps, d, equal_speeds=True)[0])
+            others.append(self.edges.relax(gaps, d, equal_speeds=True)[0])
         except (FullContact, NoState) as unknown:
             others.append(unknown)
         with suppress(NoState, FullContact):
-            finer, _ = self._relax(gaps, d, share=FINER_STEPS)
+            finer, _ = self.edges.relax(gaps, d, share=FINER_STEPS)
             if point and finer and not self._is_same_minimum(point, finer):
                 end, other = (self.states.of_point(one).potential for one in (finer, point))
                 if end < other:
@@ -319,19 +301,6 @@ class Jumps:
             return False
         return not self._is_same_minimum(other, point)
 
-    def _relax(
-        self, gaps: Array, d: float, *, equal_speeds: bool = False, share: float = 1.0
-    ) -> tuple[Point | None, bool]:
-        """Descend until nothing vanishes; returns also whether edges may have raced."""
-        reach, races = self.edges.longest_step, False
-        while len(gaps):
-            found, raced = self.edges.relax(gaps, d, reach, equal_speeds=equal_speeds, share=share)
-            races = races or raced
-            if isinstance(found, Point):
-                return found, races
-            gaps = found
-        return None, races
-
 
 class MirrorCheck:
     """Finds jumps by which a mirror-symmetric state loses its symmetry.
@@ -339,11 +308,7 @@ class MirrorCheck:
     The mirror image of their end is another end with the same energy: which of the two is reached
     is a convention (docs/methods.md, rule 7).
 
-    Parameters
-    ----------
-    edges : EdgeMechanics
-    axes : array, shape (axes,)
-        About which the profile is its own mirror image, in θ.
+    ``axes`` are those about which the profile is its own mirror image, in θ.
     """
 
     def __init__(self, edges: EdgeMechanics, axes: Array) -> None:

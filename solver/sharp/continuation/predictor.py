@@ -15,7 +15,7 @@ import numpy as np
 
 from adhesis.solver._kernels import PREDICTION_TRUSTED, OtherFold, TwoPoints
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.tolerances import (
     BEYOND_FOLD,
     LEFT_BEFORE_FOLD,
@@ -34,6 +34,8 @@ class Predictor:
     ----------
     fastest : float
         Largest |dn/dd| of an edge at ``point``.
+    leading : LeadingEdge
+        The edge that leads to the fold that is seen; only with a point before.
     fold_distance : float
         Distance in d of the fold beyond ``point``; inf if none is seen.
     """
@@ -47,19 +49,14 @@ class Predictor:
             return
         self.way = point.d - earlier.d
         self._points = TwoPoints(point.gaps, rate, earlier.gaps, earlier.rate, self.way)
-        self._leading = leading = self._points.leading_edge()
+        self.leading = leading = self._points.leading_edge()
         self.fastest, self.fold_distance = leading.fastest, leading.fold_distance
-
-    @property
-    def leading_edge(self) -> int:
-        """Edge that leads to the fold that is seen."""
-        return self._leading.edge
 
     def other_fold(self) -> OtherFold:
         """Predict the nearest fold in which other gaps lead; at infinity if none is seen."""
         if math.isinf(self.fold_distance):
             return OtherFold()
-        return self._points.other_fold(self._leading.edge)
+        return self._points.other_fold(self.leading.edge)
 
     def gaps(self, d: float) -> Array:
         """Gaps that are expected at ``d``."""
@@ -67,7 +64,7 @@ class Predictor:
         on = d - point.d
         if not (on * self.way > 0 and abs(on) < PREDICTION_TRUSTED * abs(self.way)):
             return point.extrapolate(d)
-        return self._points.predict_gaps(on, self._leading)
+        return self._points.predict_gaps(on, self.leading)
 
     def reach(self, most: float, finest: float) -> float:
         """Step along which the edge that leads is expected to move no further than ``most``.
@@ -79,7 +76,7 @@ class Predictor:
             return straight
         if self.fold_distance < 0.7 * finest:
             return self.across(finest)
-        leading = self._leading
+        leading = self.leading
         most = most / abs(leading.gone)
         if math.isfinite(leading.here) and most < leading.fold:
             polynomial = leading.here + most * (leading.square + most * leading.cube)

@@ -52,24 +52,6 @@ def check_definite(solution: Field) -> None:
         raise FloatingPointError("the matrix of the gaps is not positive definite")
 
 
-class FixedEdgeResponse(NamedTuple):
-    """Derivatives by the prescribed quantity d at fixed edges.
-
-    Attributes
-    ----------
-    pressure : float
-        ∂p/∂d; negative.
-    separation : float
-        ∂(q0 s)/∂d.
-    opening : array, shape (2L,)
-        ∂C/∂d.
-    """
-
-    pressure: float
-    separation: float
-    opening: Array
-
-
 class GapOpening(NamedTuple):
     """Opening of one gap at its fine sine nodes, θ increasing.
 
@@ -81,12 +63,6 @@ class GapOpening(NamedTuple):
     opening: Array
     weight: Array
     modes: Array
-
-
-def respond_at_fixed_edges(solution: Field) -> FixedEdgeResponse:
-    """Differentiate a solution by d, at fixed edges; FloatingPointError if there is none."""
-    check_definite(solution)
-    return FixedEdgeResponse(*solution.by_prescribed())
 
 
 class GapField:

@@ -15,13 +15,16 @@ any output grid: it is exact to rounding.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from adhesis.solver._kernels import sum_pull
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Array, Profile
-from adhesis.solver.peaks import parabola_vertex
+from adhesis.solver.model.profile import Array
+from adhesis.solver.peaks import highest_peaks, parabola_vertex
 from adhesis.solver.sharp.field.gap_field import GapField, GapOpening
+from adhesis.solver.sharp.tolerances import MOST_MAXIMA
 
 _COARSE = 4.0  # sine nodes per shortest wave of the openings at nodes; the verification has more
 _POINTS = 17  # points between the neighbours of a node at which its maximum is refined
@@ -31,17 +34,14 @@ _MOVES = 2  # steps of a node by which the maximum may lie beside the candidate
 class RefinedTension:
     """Tension of one field at any position inside its patches."""
 
-    def __init__(self, field: GapField, openings: list[GapOpening]) -> None:
+    def __init__(self, field: GapField, openings: list[GapOpening] | None = None) -> None:
+        if openings is None:
+            openings = [field.fine_opening(k) for k in range(len(field.gaps))]
         self._source, self._pressure = field.source, field.pressure
         theta = np.concatenate([opening.theta for opening in openings])
         self._sine, self._cosine = np.sin(0.5 * theta), np.cos(0.5 * theta)
         self._source_weight = np.concatenate([o.opening * o.weight for o in openings])
         self._gaps = field.gaps
-
-    @classmethod
-    def of(cls, field: GapField) -> RefinedTension:
-        """Evaluate the openings of all gaps of a field."""
-        return cls(field, [field.fine_opening(k) for k in range(len(field.gaps))])
 
     def at(self, theta: Array) -> Array:
         """Compute the tension at some positions on the contact."""
@@ -74,41 +74,43 @@ class RefinedTension:
         return None
 
 
-def nodal_tension(problem: Problem) -> NodalTension:
-    """Return the nodes on which maxima of tension are searched.
+class TensionMaximum(NamedTuple):
+    """A local maximum of tension inside a patch."""
 
-    A strength may be a small part of the stress that flattens the profile. Parabolas on eight nodes
-    to a wave miss a maximum by 1e-2 of that stress, on 32 by 4e-5.
-    """
-    return NodalTension(problem.profile, 32 if problem.opens_by_roughness else 8)
+    theta: float
+    tension: float
+    edge_distance: float
 
 
-class NodalTension:
-    """Tension at equally spaced nodes, for the fields of one profile.
+class InnerTension:
+    """Local maxima of tension inside patches, for the fields of one problem.
 
-    Parameters
-    ----------
-    profile : Profile
-    per_wave : int
-        Nodes per shortest wave, at least.
-
-    Attributes
-    ----------
-    step : float
-        Distance of the nodes in θ; the first lies at θ = 0.
+    They are searched on equally spaced nodes. A strength may be a small part of the stress that
+    flattens the profile: parabolas on eight nodes to a wave miss a maximum by 1e-2 of that stress,
+    on 32 by 4e-5.
     """
 
-    def __init__(self, profile: Profile, per_wave: int) -> None:
+    def __init__(self, problem: Problem) -> None:
+        profile, per_wave = problem.profile, 32 if problem.opens_by_roughness else 8
         self._n = n = 1 << int(np.ceil(np.log2(per_wave * profile.highest_harmonic)))
-        self.step = 2 * np.pi / n
+        self._step = 2 * np.pi / n
         self._harmonic = harmonic = np.arange(n // 2 + 1)
         self._full = np.zeros(n // 2 + 1, dtype=np.complex128)  # S_full
         size = profile.highest_harmonic + 1
         self._full[:size] = harmonic[:size] * profile.coefficients[:size] * (profile.q0 * n)
 
-    def of(self, field: GapField) -> Array:
+    def maxima(self, field: GapField, least: float) -> list[TensionMaximum]:
+        """Find the maxima of a field above ``least``; of many the largest ones."""
+        nodes = highest_peaks(self._at_nodes(field), MOST_MAXIMA, least)
+        if not nodes:
+            return []
+        refined = RefinedTension(field)
+        found = (refined.maximum(node * self._step, self._step) for node in nodes)
+        return [TensionMaximum(*one, refined.edge_distance(one[0])) for one in found if one]
+
+    def _at_nodes(self, field: GapField) -> Array:
         """Compute the tension at the nodes, NaN outside contact."""
-        n, step = self._n, self.step
+        n, step = self._n, self._step
         opening = np.zeros(n)
         free = []
         for k, (left, right) in enumerate(field.gaps):

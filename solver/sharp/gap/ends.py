@@ -8,8 +8,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from adhesis.solver._kernels import CLOSING_SHARE
 from adhesis.solver.model.profile import Array
 
 
@@ -19,6 +19,19 @@ def lengths_of(gaps: Array) -> tuple[Array, Array]:
     patch[:-1] = gaps[1:, 0]
     patch[-1] = gaps[0, 0] + 2 * np.pi
     return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
+
+
+def positions(gaps: Array, origin: float) -> Array:
+    """Measure the distance of every edge to the right of ``origin``, in [0, 2π)."""
+    return np.asarray((gaps.ravel() - origin) % (2 * np.pi))
+
+
+def step_limits(gaps: Array, longest: float) -> Array:
+    """Limit the step of each edge: ``longest``, or a share of the gap or patch it may close."""
+    length, patch = lengths_of(gaps)
+    beside = np.stack([np.roll(patch, 1), patch], axis=1)
+    closing = CLOSING_SHARE * np.minimum(length[:, None], beside)
+    return np.minimum(longest, closing).ravel()
 
 
 @cache
@@ -32,18 +45,6 @@ def signs_of(count: int) -> Array:
 def move_edges(gaps: Array, step: Array) -> Array:
     """Move the contact outwards by ``step`` at every edge."""
     return np.asarray(gaps + (signs_of(len(gaps)) * step).reshape(-1, 2))
-
-
-def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
-    """Drop the patches that ``keep`` (one value for the patch right of each gap) excludes."""
-    if not keep.any():
-        return np.empty((0, 2))
-    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
-    lefts = gaps[np.roll(keep, 1), 0]
-    rights = gaps[keep, 1]
-    first = lefts[0]
-    rights = np.sort(np.where(rights <= first, rights + 2 * np.pi, rights))
-    return np.stack([lefts, rights], axis=1)
 
 
 def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
@@ -104,6 +105,12 @@ def without_small(gaps: Array, smallest: float) -> Array | None:
         keep = length >= smallest
         keep[int(np.argmax(length))] = True  # the last gap never closes
         return gaps[keep]  # the patches beside a closed gap merge
-    if patch.min() < smallest:
-        return without_patches(gaps, patch >= smallest)
-    return None
+    if not patch.min() < smallest:
+        return None
+    keep = patch >= smallest
+    if not keep.any():
+        return np.empty((0, 2))
+    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
+    lefts, rights = gaps[np.roll(keep, 1), 0], gaps[keep, 1]
+    rights = np.sort(np.where(rights <= lefts[0], rights + 2 * np.pi, rights))
+    return np.stack([lefts, rights], axis=1)

@@ -36,15 +36,8 @@ _HALF_PLANE_NODES = 8
 class StressSource:
     """Full-contact stress S = 2σ_full/E* and its derivative on a tree of panels over [0, 2π).
 
-    Parameters
-    ----------
-    profile : Profile
-    tolerance : float
-        Wanted accuracy of moments and values, relative to the stress of the shortest waves.
-    measure : {"arc", "flat"}
-        Length on which adhesion acts.
-    pattern : AdhesionPattern, optional
-        Variation of γ along the profile.
+    Moments and values are as accurate as ``tolerance``, relative to the stress of the shortest
+    waves.
 
     Attributes
     ----------
@@ -58,7 +51,6 @@ class StressSource:
         Largest |h''|, in units of q0.
     highest : float
         θ of the highest crest.
-    panels : Panels
     """
 
     def __init__(

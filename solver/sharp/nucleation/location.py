@@ -8,21 +8,16 @@ inside patches.
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import BISECTION_AFTER
 
 Seed = TypeVar("Seed")
-
-Solve = Callable[[Point, Point, float], Point | None]
-"""Solves the point at a d between a clear point and a hit; None if there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,31 +53,9 @@ class Criterion(Protocol[Seed]):
         ...
 
 
-def equilibrium_between(edges: EdgeMechanics) -> Solve:
-    """Return a function that solves the equilibrium between two points of a branch.
-
-    Of two that have the same edges, as at a fold, these are held.
-    """
-    reach = edges.longest_step
-
-    def solve(clear: Point, hit: Point, d: float) -> Point | None:
-        if clear.gaps is hit.gaps:
-            return Point(d, edges.field(clear.gaps, d), clear.rate, math.nan)
-        share = (d - clear.d) / (hit.d - clear.d)
-        gaps = clear.gaps + share * (hit.gaps - clear.gaps)
-        point = edges.equilibrium(gaps, d, reach, memory=clear.gaps)
-        near = abs(d - clear.d) < abs(hit.d - d)
-        for start in (clear, hit) if near else (hit, clear):
-            if point is None:
-                point = edges.equilibrium(start.extrapolate(d), d, reach, memory=clear.gaps)
-        return point
-
-    return solve
-
-
 def locate(
     criterion: Criterion[Seed],
-    solve: Solve,
+    edges: EdgeMechanics,
     trail: list[Point],
     resolution: float,
 ) -> Located[Seed] | None:
@@ -115,7 +88,7 @@ def locate(
         trial = clear.d + (hit.d - clear.d) * share
         if trial in (clear.d, hit.d):  # there its value differs by the error of the field
             return Located(clear, criterion.choose_seeds(hit_candidates), 0.0)
-        between = solve(clear, hit, trial)
+        between = edges.equilibrium_between(clear, hit, trial)
         if between is None:
             break
         value, candidates = criterion.minimum(between.field)

@@ -1,17 +1,11 @@
-"""Locate contact that nucleates inside gaps, and insert seed patches.
+"""Locate contact that nucleates inside gaps, and insert seeds (docs/methods.md, rules 4 and 11).
 
-Contact nucleates where the opening has closed to zero. With adhesion a touching point grows at
-once, along a path on which the energy only falls, to its first equilibrium; on the parabola κx²/2
-that is (16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width, but
-no longer than ``LONGEST_STEP``, is put at the touching point; the descent does the rest. Without
-adhesion a patch has no width at first touch: its seed is put when the overlap is large enough for
-the narrowest patch that is followed.
-
-Surfaces of a finite range of adhesion δ jump together from there on. In a minimum in which the
-opening has closed to δ, and which is not in the range of an edge already, a seed is put that grows:
-G stays below γ by a tenth at both edges. With edges of zero range the energy rises up to some
-width, so that another width may be needed; where none grows, the opening goes on closing until one
-does, at the latest at zero. What such a touch leads to must have less energy than the state before.
+With adhesion a touching point grows at once to its first equilibrium; on the parabola κx²/2 that is
+(16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width, but no longer
+than ``LONGEST_STEP``, is put there; the descent does the rest. Without adhesion a patch has no
+width at first touch: its seed is put when the overlap is large enough for the narrowest patch that
+is followed. With a finite range of adhesion a seed is put that grows: G stays below γ by a tenth at
+both edges.
 """
 
 from __future__ import annotations
@@ -27,19 +21,17 @@ from adhesis.solver._kernels import (
     SearchLengths,
     search,
 )
-from adhesis.solver.crack import (
-    GROWTH,
-    IN_PATCH,
-    LONGEST_TRIAL_HALF_LENGTH,
-)
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
+    GROWTH,
     HEALED_OPENING,
     HEALED_PLACE,
+    IN_PATCH,
+    LONGEST_TRIAL_HALF_LENGTH,
     OVERLAP,
     TRIAL_WIDTHS,
 )

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from adhesis.solver._kernels import LoadingDevice, SearchedGaps
+from adhesis.solver._kernels import Field, LoadingDevice, SearchedGaps
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.field.gap_field import FixedEdgeResponse, GapField
+from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
+from adhesis.solver.sharp.edge_problem import EdgeProblem
 from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import patches_between
-from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.values import with_values
 
 
@@ -61,9 +61,8 @@ class States:
         self._half = problem.half_space.modulus / 2
         per = self._half * self.q0
         self._tangent_unit = 1 / per if problem.control.is_load else per  # dY/dx at dY/dd = 1
-        m = np.arange(profile.coefficients.size)
-        h = np.abs(profile.coefficients * self.q0) ** 2
-        self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
+        full = problem.full_contact_energy * profile.period
+        self._full_energy = full * self.q0**2 / self._half  # ½∫S_full h~
 
     def to_field_units(self, prescribed: float) -> float:
         """Convert the prescribed value to d: q0 (s - p̄/k) at a stiffness k, -2p̄/E* of a load."""
@@ -96,34 +95,34 @@ class States:
 
         Under a load the loop is closed at the separation of the loss (``model.control``).
         """
-        if self.problem.control.is_load:
-            return self.detached(before.separation * self.q0)
-        return self.detached(d)
+        return self.detached(before.separation * self.q0 if self.problem.control.is_load else d)
 
-    def _hold_energy(self, separation: float, mean_stress: float) -> float:
-        """Compute the contribution of the control to the potential, in J/m."""
-        profile, control = self.problem.profile, self.problem.control
-        return control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
-
-    def of_point(self, point: Point, separation: float | None = None) -> ContactState:
-        """Make the state of a point; ``separation`` (m) if it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation)
-
-    def of_field(
+    def of_point(
         self,
-        gap_field: GapField,
-        slope: float = float("nan"),
+        point: Point,
         separation: float | None = None,
+        held: tuple[float, Field] | None = None,
     ) -> ContactState:
-        """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
+        """Make the state of a point, or of its edges ``held`` at another d.
+
+        That is given with a field that knows derivatives; ``separation`` (m) if it is known without
+        rounding.
+        """
         self.count.energies += 1
-        half, gaps, solution = self._half, gap_field.gaps, gap_field.solution
-        q0_s, pressure = solution.separation, solution.pressure
+        half, gaps, solution = self._half, point.gaps, point.field.solution
+        q0_s, pressure, slope = solution.separation, solution.pressure, point.slope
+        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * q0_s * pressure
+        if held is not None:  # p is linear in d, and the energy quadratic
+            (p_rate, s_rate, _), way = held[1].by_prescribed(), held[0] - point.d
+            elastic -= np.pi * s_rate * way * (2 * pressure + p_rate * way)
+            pressure, slope = pressure + p_rate * way, math.nan
+            q0_s = held[0] if self.problem.control.is_fixed else q0_s + s_rate * way
         if separation is None:
             separation = q0_s / self.q0
         mean_stress = pressure * half
         patches, closed = patches_between(gaps), self.adhesion.contact_work(gaps)
-        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * q0_s * pressure
+        control, profile = self.problem.control, self.problem.profile
+        hold = control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
         return ContactState(
             separation=separation,
             edges=patches / self.q0,
@@ -132,29 +131,8 @@ class States:
             adhesion_energy=-self.problem.work_of_adhesion * closed / self.q0,
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             tangent=slope * self._tangent_unit,
-            hold_energy=self._hold_energy(separation, mean_stress),
+            hold_energy=hold,
             internal=ContinuationData(gaps),
-        )
-
-    def at_fixed_edges(
-        self, state: ContactState, gap_field: GapField, response: FixedEdgeResponse, d: float
-    ) -> ContactState:
-        """Move a state to ``d`` at fixed edges: p is linear in s, U quadratic."""
-        way = d - gap_field.prescribed
-        pressure = gap_field.pressure + response.pressure * way
-        q0_s = d
-        if not self.problem.control.is_fixed:
-            q0_s = gap_field.separation + response.separation * way
-        work = -np.pi * (q0_s - gap_field.separation) * (gap_field.pressure + pressure)
-        separation, mean_stress = q0_s / self.q0, pressure * self._half
-        return with_values(
-            state,
-            separation=separation,
-            mean_stress=mean_stress,
-            elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
-            tangent=float("nan"),
-            hold_energy=self._hold_energy(separation, mean_stress),
-            internal=ContinuationData(gap_field.gaps),
         )
 
     def with_friction(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:

@@ -40,22 +40,14 @@ class Counters:
 
 
 class EdgeProblem:
-    """Material law, tolerances and counters of one problem.
+    """Material law (by default that of one work of adhesion), tolerances and counters of a problem.
 
-    Parameters
+    Attributes
     ----------
-    source : StressSource
     critical : float
         4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece where γ(x) = γ.
     tolerance : float
         Relative accuracy of the field.
-    device : LoadingDevice
-        What prescribes the quantity d.
-    adhesion : Adhesion, optional
-        Law of the edges (``kernels/edge_law.hpp``); by default that of one work of adhesion.
-
-    Attributes
-    ----------
     wave : float
         λ_min in θ.
     newton_tolerance, field_error : float
@@ -65,9 +57,6 @@ class EdgeProblem:
         Narrower patches and gaps are removed.
     surface : float
         Γ = 2γ q0/E* where adhesion is weakest.
-    law : EdgeLaw
-    model : FieldModel
-    count : Counters
     """
 
     def __init__(

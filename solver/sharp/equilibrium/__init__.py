@@ -1,1 +1,0 @@
-"""Points of a branch, the balance of the edges, and steps off a saddle."""
