@@ -9,7 +9,6 @@ import numpy as np
 
 from adhesis.solver._kernels import (
     CLOSING_SHARE,
-    Descent,
     DescentEvent,
     EdgeLaw,
     Equilibrium,
@@ -17,7 +16,7 @@ from adhesis.solver._kernels import (
     FieldModel,
     solve_field,
 )
-from adhesis.solver.model.profile import Array, Integers
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.branch_point import PinnedEdges, Point
 from adhesis.solver.sharp.equilibrium.griffith import (
     imbalance,
@@ -38,7 +37,6 @@ from adhesis.solver.sharp.tolerances import (
     ENDLESS,
     EQUAL,
     FIELD_ACCURACY,
-    RESPONSE_TRIALS,
     RESTS,
 )
 
@@ -103,7 +101,6 @@ class EdgeMechanics(EdgeProblem):
         gaps: Array,
         prescribed: float,
         reach: float,
-        orders: Integers | None = None,
         *,
         strict: bool = True,
         memory: Array | None = None,
@@ -111,30 +108,26 @@ class EdgeMechanics(EdgeProblem):
         """Return the equilibrium near these gaps, a stable one if ``strict``, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
-        equilibrium is not stable. ``orders`` are the least orders of the gaps. Unless
-        ``strict``, gaps that are nearly in equilibrium are taken as they are, stable or not: a
-        minimum next to a fold, or a saddle. ``memory`` is where
+        equilibrium is not stable. Unless ``strict``, gaps that are nearly in equilibrium are taken
+        as they are, stable or not: a minimum next to a fold, or a saddle. ``memory`` is where
         the edges were in the state before, which matters with two works of adhesion; here if not
         given.
         """
         reach = max(reach, self.newton_tolerance)
         law = self.law_at(gaps if memory is None else memory)
-        for _ in range(RESPONSE_TRIALS):
-            near = self.kept.near(gaps, prescribed, orders)
-            if near is None:
-                break
-            found = near.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
-            self.count.newton_steps += found.corrections
-            self.count.fields += found.corrections
-            if found.found:
-                point = self._point(prescribed, found)
-                self.kept.settled = point.gaps
-                return point
-            if not found.is_outgrown:
-                break
-            gaps = found.gaps
-            self.kept.forget()
-        return None
+        near = self.kept.near(gaps, prescribed)
+        if near is None:
+            return None
+        found = near.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
+        self.count.newton_steps += found.corrections
+        self.count.fields += found.corrections
+        if not found.found:
+            if math.isnan(found.pressure):
+                self.kept.forget()
+            return None
+        point = self._point(prescribed, found)
+        self.kept.settled = point.gaps
+        return point
 
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
         """Make the point of an equilibrium."""
@@ -182,13 +175,17 @@ class EdgeMechanics(EdgeProblem):
         law = EdgeLaw(self.law_at(gaps))
         law.longest_step *= share
         left, rests, raced = ENDLESS, 0, False
-        orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            end, orders, left = self._descend(
-                gaps, prescribed, left, orders, law, equal_speeds, start
-            )
-            if end is None or end.event == DescentEvent.NO_FIELD:
+            near = self.kept.near(gaps, prescribed)
+            if near is None:
+                raise NoState("there is no field of these edges", prescribed)
+            end = near.descend(gaps, start, prescribed, left, equal_speeds, law, self.model)
+            left -= end.steps
+            self.count.descent_steps += end.steps
+            self.count.fields += end.steps
+            if end.event == DescentEvent.NO_FIELD:
+                self.kept.forget()
                 raise NoState("there is no field of these edges", prescribed)
             gaps, raced = end.gaps, raced or end.raced
             if end.event == DescentEvent.VANISHED:
@@ -209,7 +206,7 @@ class EdgeMechanics(EdgeProblem):
                 rested = gaps
                 strict = rests <= RESTS
                 point = self.equilibrium(
-                    gaps, prescribed, reach, orders, strict=strict, memory=law.memory
+                    gaps, prescribed, reach, strict=strict, memory=law.memory
                 )
                 if point is not None:
                     return point, raced
@@ -219,28 +216,6 @@ class EdgeMechanics(EdgeProblem):
                 elif not strict and rests <= 2 * RESTS:
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
-
-    def _descend(
-        self,
-        gaps: Array,
-        prescribed: float,
-        most: int,
-        orders: Integers | None,
-        law: EdgeLaw,
-        equal_speeds: bool,
-        start: Array,
-    ) -> tuple[Descent | None, Integers | None, int]:
-        """Descend on the linear response; returns its orders at the end and the steps left, too.
-
-        None if the edges have no field.
-        """
-        near = self.kept.near(gaps, prescribed, orders)
-        if near is None:
-            return None, orders, most
-        end = near.descend(gaps, start, prescribed, most, equal_speeds, law, self.model)
-        self.count.descent_steps += end.steps
-        self.count.fields += end.steps + end.set_ups
-        return end, near.orders, most - end.steps
 
     def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.

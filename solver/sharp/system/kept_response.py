@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from adhesis.solver._kernels import LinearResponse, set_up_response, shortest_length
-from adhesis.solver.model.profile import Array, Integers
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
-from adhesis.solver.sharp.tolerances import RESPONSE_TRIALS
 
 
 class KeptResponse:
@@ -22,22 +21,19 @@ class KeptResponse:
         self.forget()
 
     def forget(self) -> None:
-        """Forget it: results depend on it within the error of the field, or it is outgrown."""
+        """Forget it: results depend on it within the error of the field, or it has none."""
         self._response: LinearResponse | None = None
         self.settled: Array | None = None
 
-    def near(self, gaps: Array, prescribed: float, least: Integers | None) -> LinearResponse | None:
-        """Return a response of as many gaps, which is to change.
-
-        ``least`` are the least orders of the gaps, if there are such. None if these have no field.
-        """
+    def near(self, gaps: Array, prescribed: float) -> LinearResponse | None:
+        """Return a response of as many gaps, which is to change; None if these have no field."""
         if not shortest_length(gaps) > 0:
             return None
         problem, self.settled = self._problem, None
         if self._response is None or self._response.gap_count != len(gaps):
             problem.count.fields += 1
             law, model = problem.law_at(gaps), problem.model
-            self._response = set_up_response(gaps, prescribed, least, law, model)
+            self._response = set_up_response(gaps, prescribed, law, model)
         return self._response
 
     def at(self, gaps: Array, prescribed: float) -> LinearResponse | None:
@@ -45,12 +41,11 @@ class KeptResponse:
         problem = self._problem
         if self.settled is gaps:
             return self._response
-        for _ in range(RESPONSE_TRIALS):
-            response = self.near(gaps, prescribed, None)
-            if response is None:
-                return None
-            if response.settle(gaps, prescribed, problem.law_at(gaps), problem.model):
-                self.settled = gaps
-                return response
+        response = self.near(gaps, prescribed)
+        if response is None:
+            return None
+        if not response.settle(gaps, prescribed, problem.law_at(gaps), problem.model):
             self.forget()
-        return None
+            return None
+        self.settled = gaps
+        return response
