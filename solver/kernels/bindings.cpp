@@ -341,8 +341,9 @@ void bind_field(nb::module_& m) {
       "solve_field",
       [](const Vector& gaps, double prescribed, const Model& model,
          const std::optional<Integers>& orders) {
-        const Integers own = orders ? *orders : choose_orders(map_gaps(gaps), model.digits);
-        return solve_field(gaps, prescribed, own, 1, model).field;
+        Integers own;
+        for (const Gap& gap : map_gaps(gaps)) own.push_back(choose_order(gap, model.digits));
+        return solve_field(gaps, prescribed, orders.value_or(own), 1, model).field;
       },
       "gaps"_a, "prescribed"_a, "model"_a, "orders"_a = nb::none(), Unlocked(),
       "Solve the field of gaps, shape (L, 2); `orders` are those of their rules.");
@@ -355,7 +356,6 @@ void bind_response(nb::module_& m) {
       .def_ro("stable", &ResponseSolution::stable);
   nb::class_<Equilibrium>(m, "Equilibrium")
       .def_ro("found", &Equilibrium::found)
-      .def_ro("is_outgrown", &Equilibrium::is_outgrown)
       .def_ro("corrections", &Equilibrium::corrections)
       .def_prop_ro(
           "gaps", [](const Equilibrium& e) { return pairs_of(e.ends); }, new_array)
@@ -382,7 +382,6 @@ void bind_response(nb::module_& m) {
       .def_prop_ro(
           "gaps", [](const Descent& d) { return pairs_of(d.ends); }, new_array)
       .def_ro("steps", &Descent::steps)
-      .def_ro("set_ups", &Descent::set_ups)
       .def_ro("raced", &Descent::raced);
   nb::class_<LinearResponse>(m, "LinearResponse")
       .def_prop_ro("gap_count", &LinearResponse::gap_count)
@@ -408,8 +407,12 @@ void bind_response(nb::module_& m) {
            "law"_a, "model"_a, Unlocked())
       .def("descend", &descend, "gaps"_a, "start"_a, "prescribed"_a, "most"_a, "equal_speeds"_a,
            "law"_a, "model"_a, Unlocked());
-  m.def("set_up_response", &set_up_response, "gaps"_a, "prescribed"_a, "least"_a.none(), "law"_a,
-        "model"_a, Unlocked());
+  m.def(
+      "set_up_response",
+      [](const Vector& gaps, double prescribed, const EdgeLaw& law, const Model& model) {
+        return set_up_response(gaps, prescribed, {}, law, model);
+      },
+      "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked());
 }
 
 void bind_nucleation(nb::module_& m) {

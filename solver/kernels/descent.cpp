@@ -1,8 +1,6 @@
 #include "descent.hpp"
 
 #include <algorithm>
-#include <optional>
-#include <utility>
 
 namespace adhesis {
 
@@ -173,21 +171,19 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
   Matrix tangent;
   double pressure = response.pressure_at(prescribed, device), strongest = 0;
   bool moved = true, judges = false;
-  std::optional<LinearResponse> outgrown;  // by the last step
-  bool is_first = true;                    // whether no step has been judged yet
+  bool is_first = true;  // whether no step has been judged yet
   while (out.steps < most_steps) {
     check_signals();
-    if (moved && !move_references(response, ends, states, pressure, prescribed, law, model)) {
-      auto anew = set_up_response(ends, prescribed, response.nodes.orders, law, model);
-      if (!anew) {
+    if (moved) {
+      // Next to a fold the error of a finer field may show a minimum: the first step is judged by
+      // the field that it began with. Later forces are large, and what finer fields end is not.
+      const bool raises = !(judges && is_first);
+      const Integers orders = response.nodes.orders;
+      if (!move_references(response, ends, states, pressure, prescribed, law, model, raises)) {
         out.event = DescentEvent::no_field;
         break;
       }
-      ++out.set_ups;
-      outgrown = std::exchange(response, std::move(*anew));
-      judges = judges && is_first;  // minima next to a fold are shallow; later forces are large
-      hold_edges(response, ends, states);
-      condense_gaps(response, Flags(response.gap_count(), true));
+      judges = judges && response.nodes.orders == orders;
     }
     if (run_unbalanced(runs, response, law)) {
       states = held_edges(runs, ends, law);
@@ -216,12 +212,6 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       if (error > 1 && length > 1.5 * MODEL_SHORT_STEP) {
         ends = before;
         moved = true;
-        // back to the same field: the error of a finer one may show a minimum here
-        if (outgrown && in_order(outgrown->nodes.gaps)) {
-          response = std::move(*outgrown);
-          moved = false;
-        }
-        outgrown.reset();
         continue;
       }
     }
@@ -253,7 +243,6 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
     judges = !edges.empty();
     moved = true;
     before = ends;
-    outgrown.reset();
     ends = move_edges(ends, way);
     if (shortest_length(ends) < law.smallest) {
       out.event = DescentEvent::vanished;

@@ -5,8 +5,8 @@
 // stable and follow; of the held ones the tangent is condensed. With it their flow is integrated
 // through a model of their openings, over several shortest waves where they run, and over a
 // fraction of one near equilibria and saddles, where a gap closes or a patch vanishes. The field at
-// the end of each step shows how wrong the model was; where a step has led to gaps that need more
-// nodes, it is asked of the first one only, next to a fold.
+// the end of each step shows how wrong the model was, unless a step has led to gaps that need more
+// nodes.
 #pragma once
 
 #include "edge_model.hpp"
@@ -24,8 +24,7 @@ enum class DescentEvent {
 struct Descent {
   DescentEvent event = DescentEvent::step_limit;
   Vector ends;
-  int steps = 0;    // solutions of the linear response
-  int set_ups = 0;  // of the response, where some gap came to need more nodes
+  int steps = 0;  // solutions of the linear response
   // Whether the order in which the edges ran may have decided where they ended: some took so much
   // force from others. Edges that increase each other's force end alike in any order.
   bool raced = false;

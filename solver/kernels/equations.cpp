@@ -60,15 +60,22 @@ void fill_block(const Gap& gap, const double* inset, const double* weight, const
 
 }  // namespace
 
-Nodes::Nodes(std::vector<Gap> given, Integers orders_given)
+Nodes::Nodes(std::vector<Gap> given, Integers orders_given, double room)
     : gaps(std::move(given)), orders(std::move(orders_given)), offset{0}, square{0},
       slope(gaps.size()) {
   for (int order : orders) {
-    const int m = gauss_rules()[order].count;
+    const int m = int(room * gauss_rules()[order].count);
     offset.push_back(offset.back() + m);
     square.push_back(square.back() + m * m);
   }
   for (Vector* values : {&theta, &inset, &weight, &sine, &cosine}) values->resize(offset.back());
+}
+
+bool Nodes::raise(int k, int order) {
+  if (order <= orders[k]) return true;
+  if (gauss_rules()[order].count > offset[k + 1] - offset[k]) return false;
+  orders[k] = order;
+  return true;
 }
 
 Equations allocate_equations(const Nodes& nodes) {

@@ -8,23 +8,27 @@
 
 namespace adhesis {
 
-// Gaps and their Gauss-Chebyshev nodes, N of all L gaps together.
+// Gaps and their Gauss-Chebyshev nodes, N of all L gaps together. Behind the nodes of a gap there may
+// be room for those that it comes to need; they count nothing.
 struct Nodes {
   std::vector<Gap> gaps;
   Integers orders;       // of each gap's rule
-  Integers offset;       // first node of each gap, and N
-  Integers square;       // first element of the M×M matrix of each gap, and of all
+  Integers offset;       // first node of each gap, and the end of all
+  Integers square;       // first element of the M×M matrix of each gap, and the end of all
   Vector theta, weight;  // θ and X
   Vector inset;          // distances from the nearer end of the gap
   Vector sine, cosine;   // of θ/2
   std::vector<std::array<double, 2>> slope;  // dη/dθ at both ends of each gap
 
   Nodes() = default;
-  Nodes(std::vector<Gap> gaps, Integers orders);
+  Nodes(std::vector<Gap> gaps, Integers orders, double room = 1);
 
   int gap_count() const { return int(gaps.size()); }
   int size() const { return int(theta.size()); }
-  int size_of(int k) const { return offset[k + 1] - offset[k]; }
+  int size_of(int k) const { return gauss_rules()[orders[k]].count; }
+
+  // Raise the order of a gap to this one; returns whether there is room.
+  bool raise(int k, int order);
 };
 
 // Of S and S': a value for each end of a gap.

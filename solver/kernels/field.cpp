@@ -1,6 +1,7 @@
 #include "field.hpp"
 
 #include "cholesky.hpp"
+#include "tolerances.hpp"
 
 namespace adhesis {
 
@@ -14,8 +15,8 @@ void weigh_inverse(const double* inverse, const GaussRule& rule, double* respons
       response[i * m + j] = rule.weights[i] * inverse[i * m + j] * rule.weights[j];
 }
 
-Tree build_tree(const Nodes& nodes, double digits) {
-  Tree tree(nodes, digits);
+Tree build_tree(const Nodes& nodes, double digits, double room) {
+  Tree tree(nodes, digits, room);
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     for (int i = 0; i < nodes.size_of(k); ++i) {
@@ -83,7 +84,8 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
   }
   SolvedField out{Field(model), {}};
   Field& field = out.field;
-  field.nodes = Nodes(gaps, orders);
+  const double room = fields == 2 ? ROOM : 1;
+  field.nodes = Nodes(gaps, orders, room);
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
   const int n = nodes.size();
@@ -94,7 +96,7 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
     solvable &=
         invert_definite(&field.equations.blocks[at], nodes.size_of(k), &out.factored.inverse[at]);
   }
-  out.factored.tree = build_tree(nodes, model.digits);
+  out.factored.tree = build_tree(nodes, model.digits, room);
   Tree& tree = out.factored.tree;
   Vector weights(n);
   for (int k = 0; k < count; ++k) {

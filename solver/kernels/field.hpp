@@ -36,7 +36,8 @@ struct SolvedField {
   FactoredGaps factored;
 };
 
-// Solve the field of gaps with these ends; with two fields the loads of S' are computed, too.
+// Solve the field of gaps with these ends; with two fields the loads of S' are computed, too, and
+// there is room for more nodes.
 SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders, int fields,
                         const Model& model);
 

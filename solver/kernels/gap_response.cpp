@@ -35,7 +35,7 @@ WIDE void add_near_potential(const Nodes& nodes, const Vector& opening, int k, S
   double* __restrict near = space.near.data(), * __restrict slope = space.near_slope.data();
   for (int side = 0; side < std::min(2, count - 1); ++side) {
     const int other = (k - 1 + 2 * side + count) % count;
-    for (int j = nodes.offset[other]; j < nodes.offset[other + 1]; ++j) {
+    for (int j = nodes.offset[other], end = j + nodes.size_of(other); j < end; ++j) {
       const double charge = nodes.weight[j] * opening[j] / (4 * pi);
       const double sj = nodes.sine[j], cj = nodes.cosine[j];
       for (int i = 0; i < m; ++i) {

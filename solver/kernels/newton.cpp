@@ -64,7 +64,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     check_signals();
     ++out.corrections;
     if (!move_references(response, ends, states, pressure, prescribed, law, model)) {
-      out.is_outgrown = true;
+      out.at = {};
       break;
     }
     out.at = response.solve(prescribed, law, model.device);

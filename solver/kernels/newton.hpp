@@ -6,11 +6,10 @@
 namespace adhesis {
 
 struct Equilibrium {
-  bool found = false;        // whether one was found within reach, stable if strict
-  bool is_outgrown = false;  // whether a gap or run needs more nodes than the response has
+  bool found = false;  // whether one was found within reach, stable if strict
   Vector ends;
-  Vector potential;  // of the other gaps at the reference nodes, as G
-  ResponseSolution at;
+  Vector potential;     // of the other gaps at the reference nodes, as G
+  ResponseSolution at;  // its pressure is NaN if the edges have no field
   int corrections = 0;
   std::vector<Gap> references;  // of the gaps, and the orders of their rules
   Integers orders;

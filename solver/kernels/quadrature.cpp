@@ -36,16 +36,12 @@ const std::vector<GaussRule>& gauss_rules() {
   return rules;
 }
 
-Integers choose_orders(const std::vector<Gap>& gaps, double digits) {
+int choose_order(const Gap& gap, double digits) {
   const std::vector<GaussRule>& rules = gauss_rules();
-  Integers orders;
-  for (const Gap& gap : gaps) {
-    const double wanted = digits / convergence_rate(gap);
-    int order = 0;
-    while (order < int(rules.size()) - 1 && rules[order].count < wanted) ++order;
-    orders.push_back(order);
-  }
-  return orders;
+  const double wanted = digits / convergence_rate(gap);
+  int order = 0;
+  while (order < int(rules.size()) - 1 && rules[order].count < wanted) ++order;
+  return order;
 }
 
 }  // namespace adhesis

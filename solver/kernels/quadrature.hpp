@@ -22,7 +22,7 @@ struct GaussRule {
 // The rules that a gap may have, by rising numbers of nodes; a gap's order is the index of its own.
 const std::vector<GaussRule>& gauss_rules();
 
-// Choose the order of each gap whose modes leave an error of exp(-digits), or the largest.
-Integers choose_orders(const std::vector<Gap>& gaps, double digits);
+// Choose the order with which the modes of a gap leave an error of exp(-digits), or the largest.
+int choose_order(const Gap& gap, double digits);
 
 }  // namespace adhesis

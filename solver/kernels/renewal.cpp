@@ -6,26 +6,27 @@ namespace adhesis {
 
 namespace {
 
-// Move the reference of a gap, filled in already, with the potential there; `old` is where it was.
-// Returns whether it has a field.
-bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
-               const EdgeLaw& law) {
+// Move the reference of a gap, filled in already, with the potential there; `old` is where it was,
+// with nodes of `old_rule`. Returns whether it has a field.
+bool renew_gap(LinearResponse& response, int k, const Gap& old, const GaussRule& old_rule,
+               double pressure, const EdgeLaw& law) {
   const Nodes& nodes = response.nodes;
   Tree& tree = response.tree;
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int first = nodes.offset[k], m = rule.count;
   response.about_pressure[k] = pressure;
-  Vector known(m);
-  for (int i = 0; i < m; ++i)
+  Vector known(old_rule.count);
+  for (int i = 0; i < old_rule.count; ++i)
     known[i] = response.potential[0][first + i] + pressure * response.potential[1][first + i];
   for (int i = 0; i < m; ++i) {
     const int node = first + i;
     tree.theta[node] = nodes.theta[node];
     tree.stretch[node] = nodes.weight[node] / rule.weights[i];
     response.about[node] =
-        tree.stretch[node] * interpolate_potential(old, rule, known.data(), nodes.theta[node]);
+        tree.stretch[node] * interpolate_potential(old, old_rule, known.data(), nodes.theta[node]);
   }
   tree.runs[k].interval = nodes.gaps[k];
+  tree.runs[k].rank = m;
   const int square = nodes.square[k];
   if (!invert_definite(&response.equations.blocks[square], m, &response.inverse[square]))
     return false;
@@ -33,7 +34,7 @@ bool renew_gap(LinearResponse& response, int k, const Gap& old, double pressure,
   return true;
 }
 
-// Place the runs anew whose halves have moved; returns whether they have enough charges.
+// Place the runs anew whose halves have moved; returns whether there is room for their charges.
 bool replace_runs(LinearResponse& response, const Flags& changed, const Model& model) {
   Tree& tree = response.tree;
   Flags moved(changed);
@@ -86,25 +87,24 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 }
 
 bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
-                     double pressure, double prescribed, const EdgeLaw& law, const Model& model) {
+                     double pressure, double prescribed, const EdgeLaw& law, const Model& model,
+                     bool raises) {
   const std::vector<Gap> gaps = map_gaps(ends);
-  const std::vector<GaussRule>& rules = gauss_rules();
   Nodes& nodes = response.nodes;
+  const std::vector<Gap> before = nodes.gaps;
+  const Integers orders = nodes.orders;
   const int count = nodes.gap_count();
   Flags changed(count), far(count);
+  bool has_room = true;
   for (int k = 0; k < count; ++k) {
-    Outdated outdated = is_outdated(response, k, gaps[k], law);
-    changed[k] = outdated.changed;
+    const Outdated outdated = is_outdated(response, k, gaps[k], law);
+    const int order = raises ? choose_order(gaps[k], model.digits) : 0;
     far[k] = outdated.far;
+    changed[k] = outdated.changed || order > orders[k];
+    if (!changed[k]) continue;
+    nodes.gaps[k] = gaps[k];
+    has_room = nodes.raise(k, order) && has_room;
   }
-  for (int k = 0; k < count; ++k) {
-    const int order = nodes.orders[k];
-    const double wanted = model.digits / convergence_rate(gaps[k]);
-    if (changed[k] && rules[order].count < wanted && order < int(rules.size()) - 1) return false;
-  }
-  const std::vector<Gap> before = nodes.gaps;
-  for (int k = 0; k < count; ++k)
-    if (changed[k]) nodes.gaps[k] = gaps[k];
   EdgeStates both(states);
   for (int e = 0; e < 2 * count; ++e)
     if (far[e / 2]) both.held[e] = true;
@@ -114,22 +114,25 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
     return true;
   }
   for (int k = 0; k < count; ++k)
-    if (changed[k]) fill_gap(k, 2, nodes, response.equations, model);
-  bool renewed = true;
+    if (changed[k] && has_room) fill_gap(k, 2, nodes, response.equations, model);
+  bool renewed = has_room;
   Flags again(changed);
   for (int k = 0; k < count; ++k) {
     if (changed[k] && renewed) {
-      renewed = renew_gap(response, k, before[k], pressure, law);
+      renewed = renew_gap(response, k, before[k], gauss_rules()[orders[k]], pressure, law);
     } else if (others[k]) {
       response.condense(k);
       again[k] = true;
     }
   }
   if (!(renewed && replace_runs(response, changed, model))) {
-    const double nan = not_a_number;
-    for (int k = 0; k < count; ++k)  // they serve for no other response
-      if (changed[k]) nodes.gaps[k] = {{nan, nan}, {nan, nan}, nan};
-    return false;
+    // While edges move towards one state, a gap must not lose modes again, or the field's error
+    // would drive them to and fro.
+    auto anew = set_up_response(ends, prescribed, nodes.orders, law, model);
+    if (!anew) return false;
+    response = std::move(*anew);
+    condense_gaps(response, hold_edges(response, ends, states));
+    return true;
   }
   response.factor_runs(again);
   if (any(far)) {
@@ -175,13 +178,12 @@ bool settle_response(LinearResponse& response, const Vector& ends, double prescr
 }
 
 std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed,
-                                              const std::optional<Integers>& least,
-                                              const EdgeLaw& law, const Model& model) {
-  Integers orders = choose_orders(map_gaps(ends), model.digits);
-  // While edges move towards one state, a gap must not lose modes again, or the field's error would
-  // drive them to and fro.
-  if (least && least->size() == orders.size())
-    for (size_t k = 0; k < orders.size(); ++k) orders[k] = std::max(orders[k], (*least)[k]);
+                                              Integers orders, const EdgeLaw& law,
+                                              const Model& model) {
+  const std::vector<Gap> gaps = map_gaps(ends);
+  orders.resize(gaps.size());
+  for (size_t k = 0; k < gaps.size(); ++k)
+    orders[k] = std::max(orders[k], choose_order(gaps[k], model.digits));
   auto [field, factored] = solve_field(ends, prescribed, orders, 2, model);
   if (!std::isfinite(field.pressure)) return std::nullopt;
   LinearResponse out(std::move(field.nodes), std::move(field.equations), std::move(factored.tree));

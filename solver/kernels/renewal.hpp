@@ -3,7 +3,8 @@
 // A gap whose edge leaves its reference is linearised anew where it is now, in the potential of the
 // last solution, and the runs of the tree that hold the gap are computed anew. So a state next to a
 // known one costs the changed gaps and one pass through the tree. Where a patch comes or goes the
-// response is set up anew: taking over the other gaps saves time beyond some 150 of them only.
+// response is set up anew: taking over the other gaps saves time beyond some 150 of them only. It
+// is, too, where a gap or run needs more nodes than there is room for.
 #pragma once
 
 #include "field.hpp"
@@ -26,10 +27,11 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 // Move the references of gaps to these edges where they have departed from them.
 //
 // `states` are those of the edges from now on. `pressure` is p, with which the last solution
-// gives the potentials. Returns false where a gap or run needs more nodes than it has: then
-// another response is to be set up.
+// gives the potentials. A gap that needs more nodes gets them, where it `raises` orders. Returns
+// false if the edges have no field: then the response serves for no others.
 bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
-                     double pressure, double prescribed, const EdgeLaw& law, const Model& model);
+                     double pressure, double prescribed, const EdgeLaw& law, const Model& model,
+                     bool raises = true);
 
 // Hold some edges where they are, and no others, and note which of all recede; marks the gaps that
 // are to be condensed.
@@ -43,9 +45,9 @@ bool settle_response(LinearResponse& response, const Vector& ends, double prescr
                      const EdgeLaw& law, const Model& model);
 
 // Solve the field of these gaps, if they have one, and linearise about it; `least` are the least
-// orders of the gaps.
+// orders of the gaps, or none.
 std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed,
-                                              const std::optional<Integers>& least,
-                                              const EdgeLaw& law, const Model& model);
+                                              Integers least, const EdgeLaw& law,
+                                              const Model& model);
 
 }  // namespace adhesis

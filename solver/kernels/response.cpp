@@ -95,8 +95,10 @@ double LinearResponse::pressure_at(double prescribed, const Device& device) cons
 }
 
 Vector LinearResponse::potential_at(double pressure) const {
-  Vector out(potential[0].begin(), potential[0].begin() + nodes.size());
-  add_scaled(pressure, potential[1].data(), out.data(), nodes.size());
+  Vector out;
+  for (int k = 0; k < gap_count(); ++k)
+    for (int i = nodes.offset[k], end = i + nodes.size_of(k); i < end; ++i)
+      out.push_back(potential[0][i] + pressure * potential[1][i]);
   return out;
 }
 

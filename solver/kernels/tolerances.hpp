@@ -76,6 +76,10 @@ inline constexpr double REFERENCE_FAR = 0.1;
 // it rates after some gaps had been moved by 0.1 λ_min and back were wrong by 1.2e-3.
 inline constexpr double REFERENCE_PATCH = 0.2;
 
+// Times as many nodes and charges as are needed: so many there is room for, until a response is set
+// up anew.
+inline constexpr double ROOM = 1.5;
+
 // ---------------------------------------------------------------- sizes of steps
 
 // Largest growth from one step to the next, along a branch and of the reach of a descent.

@@ -263,7 +263,7 @@ WIDE NegativeCount count_negative(double* h, double* r, int n) {
   return out;
 }
 
-Tree::Tree(const Nodes& nodes, double digits) : count(nodes.gap_count()) {
+Tree::Tree(const Nodes& nodes, double digits, double room) : count(nodes.gap_count()) {
   const auto halves = pair_runs(count);
   runs.resize(halves.size());
   Run end;  // of all runs so far
@@ -271,28 +271,28 @@ Tree::Tree(const Nodes& nodes, double digits) : count(nodes.gap_count()) {
     Run& run = runs[i];
     run = end;
     run.half = halves[i];
-    run.count = {};
     int one = 0, two = 0;
     if (i < count) {
       run.range = {i, i};
       run.interval = nodes.gaps[i];
       run.rank = nodes.size_of(i);
+      run.room = nodes.offset[i + 1] - nodes.offset[i];
     } else {
       const Run &left = runs[run.half[0]], &right = runs[run.half[1]];
-      one = left.rank;
-      two = right.rank;
+      one = left.room;
+      two = right.room;
       run.range = {left.range[0], right.range[1]};
-      run.rank = 0;
       if (i < run_count() - 1) {  // outside the whole there is nothing
         run.interval = interval(nodes.gaps, run.range[0], run.range[1]);
         run.rank = wanted_rank(run.interval, digits);
+        run.room = std::min(int(room * run.rank), MOST_CHARGES);
       }
     }
-    end.node += run.rank;
-    end.response += run.rank * run.rank;
+    end.node += run.room;
+    end.response += run.room * run.room;
     end.inverse += one * one;
     end.kernel += one * two;
-    end.interpolation += (one + two) * run.rank;
+    end.interpolation += (one + two) * run.room;
   }
   theta.resize(end.node);
   stretch.resize(end.node);
@@ -304,9 +304,13 @@ Tree::Tree(const Nodes& nodes, double digits) : count(nodes.gap_count()) {
 }
 
 WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {
-  const Run& run = runs[index];
+  Run& run = runs[index];
+  const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
   const int rank = run.rank;
   const auto& [node, share] = chebyshev_rule(rank);
+  const std::array<int, 2> ranks = {one.rank, two.rank};
+  own = own || run.placed != ranks;
+  run.placed = ranks;
   for (int i = 0; own && i < rank; ++i) {
     Place place = theta_at(run.interval, node[i]);
     theta[run.node + i] = place.theta;
@@ -320,7 +324,6 @@ WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {
                          child.rank, out);
     out += child.rank * rank;
   }
-  const Run &one = runs[run.half[0]], &two = runs[run.half[1]];
   fill_kernel(&theta[one.node], &stretch[one.node], one.rank, &theta[two.node], &stretch[two.node],
               two.rank, &kernel[run.kernel]);
 }
@@ -332,8 +335,12 @@ bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits, Flags
     const Gap before = run.interval;
     run.interval = interval(gaps, run.range[0], run.range[1]);
     moved[index] = run.interval.end != before.end || run.interval.patch != before.patch;
-    // one charge fewer than required: CHARGE_MARGIN covers it
-    if (wanted_rank(run.interval, digits) > run.rank + 1) return false;
+    const int wanted = wanted_rank(run.interval, digits);
+    if (wanted > run.room) return false;
+    if (wanted > run.rank + 1) {  // one charge fewer than required: CHARGE_MARGIN covers it
+      run.rank = wanted;
+      moved[index] = true;
+    }
   }
   place_charges(index, moved[index], {bool(moved[one]), bool(moved[two])});
   return true;

@@ -35,7 +35,8 @@ struct Run {
   std::array<int, 2> half = {-1, -1};  // of a gap none
   std::array<int, 2> range;            // first and last gap
   Gap interval;                        // not used of a whole period
-  int rank = 0;                        // number of charges
+  int rank = 0, room = 0;              // number of charges, and of those that there is room for
+  std::array<int, 2> placed = {};      // ranks of its halves, for which it was placed
   NegativeCount count;                 // of its eigenvalues
 
   // Where the run's numbers begin in the arrays of the tree.
@@ -63,8 +64,8 @@ struct Tree {
 
   Tree() = default;
 
-  // Allocate the tree of gaps.
-  Tree(const Nodes& nodes, double digits);
+  // Allocate the tree of gaps, with room for so many times the charges.
+  Tree(const Nodes& nodes, double digits, double room);
 
   int size() const { return int(theta.size()); }
   int run_count() const { return int(runs.size()); }
@@ -74,8 +75,8 @@ struct Tree {
   void place_charges(int run, bool own = true, std::array<bool, 2> halves = {true, true});
 
   // Place the charges of a run anew, as those of halves have moved, and mark whether they have
-  // moved themselves: the interval of a run does not change by gaps inside. Returns whether it has
-  // enough.
+  // moved themselves: the interval of a run does not change by gaps inside. Returns whether there is
+  // room for as many as it needs.
   bool replace(int run, const std::vector<Gap>& gaps, double digits, Flags& moved);
 
   // Compute the response of a run from those of its halves.

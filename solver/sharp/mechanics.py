@@ -19,7 +19,7 @@ from adhesis.solver._kernels import (
     shortest_length,
     solve_field,
 )
-from adhesis.solver.model.profile import Array, Integers
+from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.threads import one_thread
 from adhesis.solver.sharp.branch_point import PinnedEdges, Point
 from adhesis.solver.sharp.edge_problem import EdgeProblem
@@ -36,7 +36,6 @@ from adhesis.solver.sharp.tolerances import (
     ENDLESS,
     EQUAL,
     FIELD_ACCURACY,
-    RESPONSE_TRIALS,
     RESTS,
 )
 
@@ -56,28 +55,22 @@ class EdgeMechanics(EdgeProblem):
         """Forget the response: results depend on it within the error of the field."""
         self._response: LinearResponse | None = None
 
-    def response_near(
-        self, gaps: Array, prescribed: float, orders: Integers | None = None
-    ) -> LinearResponse | None:
-        """Return a response of as many gaps; None if these have no field.
-
-        ``orders`` are the least orders of the gaps, for one that is set up.
-        """
+    def response_near(self, gaps: Array, prescribed: float) -> LinearResponse | None:
+        """Return a response of as many gaps; None if these have no field."""
         if not shortest_length(gaps) > 0:
             return None
         if self._response is None or self._response.gap_count != len(gaps):
             self.count.fields += 1
             law = self.law_at(gaps)
-            self._response = set_up_response(gaps, prescribed, orders, law, self.model)
+            self._response = set_up_response(gaps, prescribed, law, self.model)
         return self._response
 
     def response_at(self, gaps: Array, prescribed: float) -> LinearResponse | None:
         """Return the response about these gaps; None if they have no field."""
-        for _ in range(RESPONSE_TRIALS):
-            response = self.response_near(gaps, prescribed)
-            if response is None or response.settle(gaps, prescribed, self.law_at(gaps), self.model):
-                return response
-            self.forget()
+        response = self.response_near(gaps, prescribed)
+        if response is None or response.settle(gaps, prescribed, self.law_at(gaps), self.model):
+            return response
+        self.forget()
         return None
 
     def solution(self, gaps: Array, prescribed: float, share: float = 1.0) -> Field:
@@ -127,7 +120,6 @@ class EdgeMechanics(EdgeProblem):
         gaps: Array,
         prescribed: float,
         reach: float,
-        orders: Integers | None = None,
         *,
         strict: bool = True,
         memory: Array | None = None,
@@ -135,28 +127,24 @@ class EdgeMechanics(EdgeProblem):
         """Return the equilibrium near these gaps, a stable one if ``strict``, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
-        equilibrium is not stable. ``orders`` are the least orders of the gaps. Unless
-        ``strict``, gaps that are nearly in equilibrium are taken as they are, stable or not: a
-        minimum next to a fold, or a saddle. ``memory`` is where
+        equilibrium is not stable. Unless ``strict``, gaps that are nearly in equilibrium are taken
+        as they are, stable or not: a minimum next to a fold, or a saddle. ``memory`` is where
         the edges were in the state before, which matters with two works of adhesion; here if not
         given.
         """
         reach = max(reach, self.newton_tolerance)
         law = self.law_at(gaps if memory is None else memory)
-        for _ in range(RESPONSE_TRIALS):
-            near = self.response_near(gaps, prescribed, orders)
-            if near is None:
-                break
-            found = near.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
-            self.count.newton_steps += found.corrections
-            self.count.fields += found.corrections
-            if found.found:
-                return self._point(prescribed, found)
-            if not found.is_outgrown:
-                break
-            gaps = found.gaps
-            self.forget()
-        return None
+        near = self.response_near(gaps, prescribed)
+        if near is None:
+            return None
+        found = near.find_equilibrium(gaps, prescribed, reach, strict, law, self.model)
+        self.count.newton_steps += found.corrections
+        self.count.fields += found.corrections
+        if not found.found:
+            if math.isnan(found.pressure):
+                self.forget()
+            return None
+        return self._point(prescribed, found)
 
     def equilibrium_between(self, clear: Point, hit: Point, d: float) -> Point | None:
         """Return the equilibrium between two points of a branch; None if it is not found.
@@ -220,19 +208,19 @@ class EdgeMechanics(EdgeProblem):
         law = EdgeLaw(self.law_at(gaps))
         law.longest_step *= share
         left, rests, raced = ENDLESS, 0, False
-        orders: Integers | None = None
         rested, start = np.empty((0, 2)), gaps
         while left > 0 and rests <= 2 * RESTS:
-            near = self.response_near(gaps, prescribed, orders)
+            near = self.response_near(gaps, prescribed)
             if near is None:
                 raise NoState("there is no field of these edges", prescribed)
             end = near.descend(gaps, start, prescribed, left, equal_speeds, law, self.model)
+            left -= end.steps
             self.count.descent_steps += end.steps
-            self.count.fields += end.steps + end.set_ups
+            self.count.fields += end.steps
             if end.event == DescentEvent.NO_FIELD:
+                self.forget()
                 raise NoState("there is no field of these edges", prescribed)
-            gaps, orders, left = end.gaps, near.orders, left - end.steps
-            raced = raced or end.raced
+            gaps, raced = end.gaps, raced or end.raced
             if end.event == DescentEvent.VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
@@ -251,7 +239,7 @@ class EdgeMechanics(EdgeProblem):
                 rested = gaps
                 strict = rests <= RESTS
                 point = self.equilibrium(
-                    gaps, prescribed, self.longest_step, orders, strict=strict, memory=law.memory
+                    gaps, prescribed, self.longest_step, strict=strict, memory=law.memory
                 )
                 if point is not None:
                     return point, raced

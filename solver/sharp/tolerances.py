@@ -22,11 +22,6 @@ SMALLEST_LENGTH = 0.005
 SMALLEST_OF_SEED = 0.05
 """Likewise, of the width at which a patch on the sharpest crest first comes to rest."""
 
-# ---------------------------------------------------------------- linear response of the gaps
-
-RESPONSE_TRIALS = 4
-"""Times that a response is set up for one equilibrium, where gaps need more and more nodes."""
-
 # ---------------------------------------------------------------- descent in energy
 
 LONGEST_STEP = 0.05
