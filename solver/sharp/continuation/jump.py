@@ -268,7 +268,7 @@ class Jumps:
 
         Where edges may have raced, finer steps decide, if they end with less energy: more may be
         that of a minimum on the way that the field's error shows. A minimum that equal speeds or
-        the first steps lead to instead is added to ``rivals``, unless there is one.
+        steps of the other length lead to instead is added to ``rivals``, unless there is one.
         """
         if touches:
             gaps = self.nucleation.insert_seeds(gaps, touches)
@@ -285,8 +285,8 @@ class Jumps:
             if point and finer and not self._is_same_minimum(point, finer):
                 end, other = (self.states.of_point(one).potential for one in (finer, point))
                 if end < other:
-                    others.append(point)
-                    point = finer
+                    point, finer = finer, point
+                others.append(finer)
         for rival in others:
             if not rivals and self._is_rival(rival, gaps, point):
                 rivals.append(rival)
