@@ -398,11 +398,6 @@ class EquilibriumPath(ByValue, ResultViews):
             f"largest contact fraction {self.contact_fraction.max():.4g}, most patches "
             f"{self.patches.max()}"
         )
-        friction, opens = "", problem.work_of_adhesion_open
-        if opens is not None:
-            varies = problem.pattern is not None
-            friction = friction_text(opens, self.lost, self.friction, varies=varies)
-        energies = problem.full_contact_energy, problem.work_of_adhesion
         rows = [
             (
                 "profile",
@@ -415,8 +410,8 @@ class EquilibriumPath(ByValue, ResultViews):
                 f"work of adhesion {problem.adhesion_text}",
             ),
             *self._rows_of_way(contact),
-            ("friction", friction),
-            ("sticking", sticking_text(*energies, self.largest_contact_fraction)),
+            ("friction", self.friction_summary()),
+            ("sticking", self.sticking_note),
             ("range", self.range_summary()),
             ("audit", self._audit_text()),
             (
@@ -450,6 +445,19 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return the loss or work in works of adhesion, and its note, each to follow it."""
         share = in_works_of_adhesion(lost, self.problem.work_of_adhesion)
         return share, f"; {self.loss_note}" if self.loss_note else ""
+
+    def friction_summary(self) -> str:
+        """Return in one line what is friction of edges; empty with one work of adhesion."""
+        gamma, pattern = self.problem.work_of_adhesion_open, self.problem.pattern
+        if gamma is None:
+            return ""
+        return friction_text(gamma, self.lost, self.friction, varies=pattern is not None)
+
+    @property
+    def sticking_note(self) -> str:
+        """Return a clause where adhesion makes the contact nearly full; else empty."""
+        energies = self.problem.full_contact_energy, self.problem.work_of_adhesion
+        return sticking_text(*energies, self.largest_contact_fraction)
 
     def range_summary(self) -> str:
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""

@@ -201,28 +201,33 @@ class LoopResult(EquilibriumPath):
         return [("pull-off", f"mean tension {self.pull_off_stress + 0.0:.6g} Pa")]
 
     @property
+    def turning_text(self) -> str:
+        """Return how the loop turned, for a terminal: at which preload, stress or penetration."""
+        where = self._where
+        if self.preload is None:
+            return where
+        preload = stress_text(self.preload)
+        if not self.preload_reached:
+            return f"{where}, before the preload of {preload} is reached"
+        if self._turned_after_jump:
+            beyond = stress_text(self.turning_stress)
+            return f"{where}, the end of a jump from below the preload of {preload} to {beyond}"
+        return f"the preload of {preload}, at {where}"
+
+    @property
     def _way(self) -> str:
-        """Where it turned, for the summary: at which preload, stress or penetration."""
+        """Where it turned, for the summary."""
         control, point = self.problem.control, self.turning_point
         held, depth = "", ""
         if not (control.is_fixed or control.is_load):
             held = f"held by {control.stiffness:.4g} Pa/m, "
             depth = f" (penetration {self.max_penetration:.4g} h_max)"
-        if self.preload is None:
-            if control.is_load:
-                return f"under a load to {point:g} Pa"
-            if control.is_fixed:
-                return f"to penetration {point:g} h_max"
-            return f"{held}far side to {point:g} h_max{depth}"
-        preload, where = stress_text(self.preload), self._where
-        if not self.preload_reached:
-            turning = f"{where}, before the preload of {preload} is reached"
-        elif self._turned_after_jump:
-            beyond = stress_text(self.turning_stress)
-            turning = f"{where}, the end of a jump from below the preload of {preload} to {beyond}"
-        else:
-            turning = f"the preload of {preload}, at {where}"
-        return f"{held}turning at {turning}{depth}"
+        if self.preload is not None:
+            return f"{held}turning at {self.turning_text}{depth}"
+        if control.is_load:
+            return f"under a load to {point:g} Pa"
+        way = f"{held}far side to" if held else "to penetration"
+        return f"{way} {point:g} h_max{depth}"
 
     def on_axis(self, branch: Branch, values: Array) -> Array:
         """Return values of one branch at every load step, interpolated at skipped ones.

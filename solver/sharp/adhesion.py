@@ -43,25 +43,23 @@ def check_adhesion(adhesion: Adhesion, problem: Problem, source: StressSource) -
             np.array([adhesion.work(at, recedes)[0] for at in theta + way])
             for way in (step, -step, 2 * np.pi)
         )
-        rise = [
-            adhesion.work_up_to(at + step, recedes) - adhesion.work_up_to(at - step, recedes)
-            for at in theta
-        ]
+        ahead, behind = (
+            np.array([adhesion.work_up_to(at + way, recedes) for at in theta])
+            for way in (step, -step)
+        )
         near = _AGREE * np.abs(work).max()
-        for fails, rule in (
-            (~(work > 0), "must be positive"),
-            (~(np.abs(next_period - work) < near), "must have the period 2π"),
+        as_returned = np.abs((later - before) / (2 * step) - slope) < near * source.top
+        for holds, rule in (
+            (work > 0, "must be positive"),
+            (np.abs(next_period - work) < near, "must have the period 2π"),
+            (as_returned, "must have the slope that work returns with it"),
             (
-                ~(np.abs((later - before) / (2 * step) - slope) < near * source.top),
-                "must have the slope that work returns with it",
-            ),
-            (
-                ~(np.abs(np.array(rise) / (2 * step) - work) < near),
+                np.abs((ahead - behind) / (2 * step) - work) < near,
                 "must be the derivative of work_up_to",
             ),
         ):
-            if fails.any():
-                at = theta[fails][0]
+            if not holds.all():
+                at = theta[~holds][0]
                 raise ValueError(
                     f"the law of adhesion at θ = {at:.6g}, of an edge that {how}: w {rule}"
                 )

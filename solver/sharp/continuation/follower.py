@@ -288,7 +288,7 @@ class Follower:
         profile; if they help each other, they go together all the same.
         """
         point = fold.point
-        if not self.jumps.mirror.is_symmetric(point.gaps):
+        if not self.jumps.mirror.are_images(point.gaps, point.gaps):
             return point.gaps, self._orders_of_folds(fold)
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)

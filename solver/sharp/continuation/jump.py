@@ -314,10 +314,6 @@ class MirrorCheck:
     def __init__(self, edges: EdgeMechanics, axes: Array) -> None:
         self._near, self._axes = OTHER_MINIMUM * edges.wave, axes
 
-    def is_symmetric(self, gaps: Array) -> bool:
-        """Whether these gaps are their own mirror image."""
-        return self.are_images(gaps, gaps)
-
     def are_images(self, one: Array, other: Array) -> bool:
         """Whether two states are mirror images of each other."""
         return one.shape == other.shape and any(

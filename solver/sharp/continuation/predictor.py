@@ -23,12 +23,7 @@ from adhesis.solver.sharp.tolerances import (
 
 
 class Predictor:
-    """Predict a branch beyond two of its points; beyond one point alone it is straight.
-
-    Parameters
-    ----------
-    point : Point
-        With the point before it, if that is known.
+    """Predict a branch beyond a point and the one before it; beyond one alone it is straight.
 
     Attributes
     ----------
