@@ -134,7 +134,7 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     """Descend on a single wave of amplitude 1 µm, at a separation in amplitudes."""
     edges, ends = method.edges, np.array(gaps, dtype=float)
     prescribed = separation * 2 * np.pi * 1e-3
-    near = edges.kept.near(ends, prescribed, None)
+    near = edges.kept.near(ends, prescribed)
     assert near is not None
     return near.descend(ends, ends, prescribed, most, False, edges.law, edges.model)
 
