@@ -67,7 +67,7 @@ def main() -> None:
         gaps = random_gaps(count, given.contact)
         solve_field(gaps, separation, model)
         time, of = _best(partial(solve_field, gaps, separation, model), given.repetitions)
-        new = partial(set_up_response, gaps, separation, None, law, model)
+        new = partial(set_up_response, gaps, separation, law, model)
         set_up, response = _best(new, given.repetitions)
         step, _ = _best(partial(response.solve, separation, law, model), given.repetitions)
         exponent = ""

@@ -4,21 +4,42 @@ namespace adhesis {
 
 namespace {
 
+// What edges do that are pushed; it may serve for one push after the other.
 struct Push {
   Vector motion;     // of all edges
   Vector potential;  // at all charges
+  Charges charges;
+  Flags loaded;  // the runs that hold a pushed edge
+
+  explicit Push(const Tree& tree)
+      : potential(tree.size()), charges(tree.size()), loaded(tree.run_count()) {}
+
+  // Clear the charges, zero but for those of loaded runs.
+  void clear(const Tree& tree) {
+    for (int index = 0; index < tree.run_count(); ++index) {
+      if (!loaded[index]) continue;
+      const Run& run = tree.runs[index];
+      std::fill_n(&charges.isolated[run.node], run.rank, 0.0);
+      for (int half : run.half)
+        if (half >= 0)
+          std::fill_n(&charges.potential_of_sibling[tree.runs[half].node], tree.runs[half].rank,
+                      0.0);
+      loaded[index] = false;
+    }
+  }
 };
 
 // Compute the motions of all edges at fixed p by those of some that are held, and the potentials.
 // Of the gaps that are not wanted they are not computed.
-Push push_edges(const LinearResponse& response, const Integers& edges, const Vector& motion,
-                const Flags& wanted_gaps) {
+void push_edges(const LinearResponse& response, const Integers& edges, const Vector& motion,
+                const Flags& wanted_gaps, Push& out) {
   const Tree& tree = response.tree;
   const Nodes& nodes = response.nodes;
   const int count = response.gap_count();
-  Charges charges(tree.size());
-  Push out{Vector(2 * count), Vector(tree.size())};
-  Flags loaded(tree.run_count());
+  out.clear(tree);
+  out.motion.assign(2 * count, 0);
+  Charges& charges = out.charges;
+  Flags& loaded = out.loaded;
   for (int c = 0; c < int(edges.size()); ++c) {
     const int e = edges[c], beside = e ^ 1;  // the other end of the gap
     loaded[e / 2] = true;
@@ -46,7 +67,6 @@ Push push_edges(const LinearResponse& response, const Integers& edges, const Vec
     if (wanted[e / 2])
       out.motion[e] += dot(&response.motion_by_potential[e % 2][nodes.offset[e / 2]],
                            &out.potential[nodes.offset[e / 2]], nodes.size_of(e / 2));
-  return out;
 }
 
 // Compute the change of C_e - C_c by motions of the gap's edges and potentials there.
@@ -100,8 +120,9 @@ Matrix HeldEdges::tangent() const {
   for (int e : edges_) wanted[e / 2] = true;
   const Vector closing = closing_by_pressure(), more = pressure_by_motion(closing);
   Matrix out(n);
+  Push push(response_.tree);
   for (int c = 0; c < n; ++c) {
-    const Push push = push_edges(response_, {edges_[c]}, {1.0}, wanted);
+    push_edges(response_, {edges_[c]}, {1.0}, wanted, push);
     for (int f = 0; f < n; ++f)
       out(f, c) = opening_change(response_, edges_[f], push.motion,
                                  &push.potential[response_.nodes.offset[edges_[f] / 2]]) -
@@ -114,7 +135,8 @@ Vector HeldEdges::follow(const Vector& motion, double& pressure) {
   const Vector by_motion = pressure_by_motion(closing_by_pressure());
   double more = 0;
   for (size_t c = 0; c < edges_.size(); ++c) more += by_motion[c] * motion[c];
-  Push push = push_edges(response_, edges_, motion, Flags(response_.gap_count(), true));
+  Push push(response_.tree);
+  push_edges(response_, edges_, motion, Flags(response_.gap_count(), true), push);
   for (int e = 0; e < int(push.motion.size()); ++e)
     push.motion[e] += now_.motion[e] + now_.by_pressure[e] * more;
   add_scaled(1, push.potential.data(), response_.potential[0].data(), int(push.potential.size()));

@@ -8,8 +8,8 @@
 
 namespace adhesis {
 
-// Gaps and their Gauss-Chebyshev nodes, N of all L gaps together. Behind the nodes of a gap there may
-// be room for those that it comes to need; they count nothing.
+// Gaps and their Gauss-Chebyshev nodes, N of all L gaps together. Behind the nodes of a gap there
+// may be room for those that it comes to need; they count nothing.
 struct Nodes {
   std::vector<Gap> gaps;
   Integers orders;       // of each gap's rule

@@ -46,8 +46,7 @@ bool settle_response(LinearResponse& response, const Vector& ends, double prescr
 
 // Solve the field of these gaps, if they have one, and linearise about it; `least` are the least
 // orders of the gaps, or none.
-std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed,
-                                              Integers least, const EdgeLaw& law,
-                                              const Model& model);
+std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed, Integers least,
+                                              const EdgeLaw& law, const Model& model);
 
 }  // namespace adhesis

@@ -122,23 +122,17 @@ template <int rows>
   for (int i = 0; i < rows; ++i) store_four(sum[i], out + i * columns);
 }
 
-// Compute out = base + a b by tiles, of at least four columns; the last tile of a row overlaps the
-// one before, where it computes the same again.
+// Compute out = base + a b by tiles, of at least four rows and columns; the last tiles overlap
+// those before, where they compute the same again.
 [[gnu::always_inline]] inline void multiply_by_tiles(const double* a, int row_step, int inner_step,
                                                      const double* b, int rows, int inner,
                                                      int columns, const double* base, double* out) {
   for (int j = 0; j < columns; j += 4) {
     const int column = std::min(j, columns - 4);
-    for (int i = 0; i < rows;) {
-      const int at = i * columns + column;
-      const double *from = a + i * row_step, *add = base ? base + at : nullptr;
-      if (i + 4 <= rows) {
-        multiply_tile<4>(from, row_step, inner_step, b + column, inner, columns, add, out + at);
-        i += 4;
-      } else {
-        multiply_tile<1>(from, row_step, inner_step, b + column, inner, columns, add, out + at);
-        i += 1;
-      }
+    for (int i = 0; i < rows; i += 4) {
+      const int row = std::min(i, rows - 4), at = row * columns + column;
+      multiply_tile<4>(a + row * row_step, row_step, inner_step, b + column, inner, columns,
+                       base ? base + at : nullptr, out + at);
     }
   }
 }

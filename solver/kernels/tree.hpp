@@ -75,8 +75,8 @@ struct Tree {
   void place_charges(int run, bool own = true, std::array<bool, 2> halves = {true, true});
 
   // Place the charges of a run anew, as those of halves have moved, and mark whether they have
-  // moved themselves: the interval of a run does not change by gaps inside. Returns whether there is
-  // room for as many as it needs.
+  // moved themselves: the interval of a run does not change by gaps inside. Returns whether there
+  // is room for as many as it needs.
   bool replace(int run, const std::vector<Gap>& gaps, double digits, Flags& moved);
 
   // Compute the response of a run from those of its halves.

@@ -56,7 +56,7 @@ def test_a_signal_that_comes_in_a_long_kernel_ends_it(alarm):
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, seed=1, h_rms=1e-6)
     edges = SharpMethod(Problem(profile, HALF_SPACE, 0.01)).edges
     ends = np.linspace(0.1, 6.2, 800).reshape(-1, 2)
-    response = set_up_response(ends, 1e-3, None, edges.law, edges.model)
+    response = set_up_response(ends, 1e-3, edges.law, edges.model)
     ended = threading.Event()
 
     def descend() -> None:

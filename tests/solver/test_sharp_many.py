@@ -59,7 +59,7 @@ def test_work_grows_as_the_number_of_gaps(profile):
     edges = mechanics(profile, 1.0, 1e-5)
     share = []
     for count in (100, 3200):
-        response = set_up_response(random_gaps(count, 0.3, 0.7), 1e-3, None, edges.law, edges.model)
+        response = set_up_response(random_gaps(count, 0.3, 0.7), 1e-3, edges.law, edges.model)
         charges = response.charges.astype(float)
         share.append([charges.sum() / count, (charges**3).sum() / count])
     # once the tree is deep its upper levels, with their few more charges, hold few runs
@@ -87,7 +87,7 @@ def test_newton_step_and_stability_equal_the_dense_ones(profile):
         step = np.linalg.solve(tangent, -dense_residual(gaps, separation, edges))
         by_edge = solution.opening[:, None] * tangent
         stable = bool(np.linalg.eigvalsh(by_edge + by_edge.T)[0] > 0)
-        response = set_up_response(gaps, separation, None, edges.law, edges.model)
+        response = set_up_response(gaps, separation, edges.law, edges.model)
         found = response.solve(separation, edges.law, edges.model)
         assert np.abs(found.motion - step).max() < 1e-3 * np.abs(step).max()
         assert found.stable == stable
@@ -102,7 +102,7 @@ def test_the_tangent_of_some_edges_is_the_dense_one_of_all_condensed(profile, de
     edges.model = FieldModel(device, edges.model.digits, edges.model.panels)
     gaps = random_gaps(9, 0.5, 0.3, 3)
     separation = 3 * profile.h_max * profile.q0
-    response = set_up_response(gaps, separation, None, edges.law, edges.model)
+    response = set_up_response(gaps, separation, edges.law, edges.model)
     whole = dense_tangent(gaps, separation, edges)
     for some in (np.array([3]), np.array([2, 3, 11]), np.arange(5, 9), np.arange(gaps.size)):
         found = response.tangent_between(gaps, some, separation, edges.law, edges.model)
@@ -162,6 +162,25 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     assert back.pressure == pytest.approx(anew.pressure, rel=1e-6)
     scale = np.abs(anew.field.opening).max()
     assert np.abs(back.field.opening - anew.field.opening).max() < 1e-5 * scale
+
+
+def test_gaps_that_come_to_need_more_nodes_take_them_in_the_response_that_is_known(many_gaps):
+    """A patch narrows to a third, and widens again: with more nodes, to the same state."""
+    edges, point = many_gaps
+    gaps, d = point.gaps, point.d
+    edges.forget()
+    anew = edges.equilibrium(gaps, d, edges.wave)
+    known = edges.response_at(gaps, d)
+    orders, narrowed = known.orders, gaps.copy()
+    left, right = gaps[2, 1], gaps[3, 0]
+    middle = 0.5 * (left + right)
+    narrowed[2, 1], narrowed[3, 0] = np.array([left, right]) + 0.7 * (middle - [left, right])
+    assert edges.response_at(narrowed, d) is known
+    assert np.flatnonzero(known.orders > orders).tolist() == [3]
+    back = edges.equilibrium(gaps, d, edges.wave)
+    assert edges.response_at(back.gaps, d) is known
+    assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.field_error
+    assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
 
 
 def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):

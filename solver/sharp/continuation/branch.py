@@ -17,7 +17,7 @@ from adhesis.solver.sharp.gap.ends import signs_of, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
-    LONGEST_STEP,
+    FIRST_MOTION,
     ORDER_RESOLVED,
     PREDICTED_MOTION,
     QUIET_STRESS,
@@ -218,7 +218,7 @@ class StableBranch:
         A step that leads across a fold may be shorter than the finest.
         """
         predictor = self._predictor
-        motion = LONGEST_STEP if predictor.way == 0 else PREDICTED_MOTION
+        motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
         size = min(self._longest, predictor.reach(motion * self._edges.wave, self.finest))
         if not predictor.fold_distance < self.finest:
             size = max(size, self.finest)
