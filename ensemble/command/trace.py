@@ -113,7 +113,7 @@ def _progress(loops: Loops | None, seconds: float, load: bool) -> str:
         return "starting"
     running = ", ".join(
         f"{name} ({branch}, {drive_text(drive, load)})"
-        for name, (_, branch, drive) in loops.running.items()
+        for name, (branch, drive) in loops.running.items()
     )
     parts = [f"{len(loops.done)} of {loops.count} loops"]
     parts += [f"running {running}"] if running else []

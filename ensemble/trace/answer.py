@@ -421,14 +421,12 @@ def make_cycle(
     cycle = Cycle(half_space, tuple(given), (), *settings, **named)
     checks.choice("method", cycle.method, METHOD_NAMES)
     checks.real("accuracy", cycle.accuracy, checks.ACCURACY)
-    control = cycle.control
     if cycle.work_of_adhesion_open is not None and len(given) > 1:
         raise ValueError(
             f"work_of_adhesion_open is {cycle.work_of_adhesion_open!r} beside {len(given)} works "
             "of adhesion: give one of each (in the table both keep their ratio)"
         )
-    turning = "max_stress" if control.is_load else "max_penetration"
-    turning = "preload" if cycle.at_preload else turning
+    control, turning = cycle.control, cycle.turning.parameter
     gammas, turns = default_tables(given, _several(turning, turning_points))
     for name, values in (("work_of_adhesion", gammas), (turning, turns)):
         if not values:
@@ -613,7 +611,6 @@ def document(answer: Answer) -> dict[str, Any]:
     """Return every number of the answer as one JSON document, in SI units."""
     prepared, trace, cycle, plan = answer.prepared, answer.prepared.trace, answer.cycle, answer.plan
     spectrum = prepared.spectrum
-    at_stress = cycle.at_preload or cycle.control.is_load
     return {
         "file": trace.source,
         "read": {
@@ -635,7 +632,7 @@ def document(answer: Answer) -> dict[str, Any]:
             "floor": spectrum.floor,
         },
         **{name: answer.main[name] for name in _CONTACT},
-        "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
+        "max_penetration": cycle.latest if cycle.turning.has_unit else cycle.turning_points[0],
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
         "preload": cycle.turning_points[0] if cycle.at_preload else None,
         "load_steps": cycle.load_steps,

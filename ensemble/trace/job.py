@@ -22,6 +22,23 @@ MAX_PENETRATION = 0.9
 
 
 @dataclass(frozen=True)
+class Turning:
+    """What the turning points of a cycle are."""
+
+    parameter: str
+    sign: str  # with a unit if they have one
+    short: str
+    symbol: str  # in figures
+    has_unit: bool = False  # whether they are stresses in Pa
+
+
+_PRELOAD = Turning("preload", "preload, Pa", "preload", "preload", has_unit=True)
+_LOAD = Turning("max_stress", "p̄, Pa", "p̄", r"$\bar p$", has_unit=True)
+_FIXED = Turning("max_penetration", "Δ/h_max", "Δ", r"$\Delta/h_{\max}$")
+_FAR_SIDE = Turning("max_penetration", "u_tot/h_max", "u", r"$u_\mathrm{tot}/h_{\max}$")
+
+
+@dataclass(frozen=True)
 class Cycle:
     """Contact and cycle in SI units; the answer has the first value of each tuple.
 
@@ -46,13 +63,13 @@ class Cycle:
     pattern: AdhesionPattern | None = None
 
     @property
-    def turn_sign(self) -> str:
-        """Return the sign of the turning points, with their unit if they have one."""
+    def turning(self) -> Turning:
+        """Return what the turning points are."""
         if self.at_preload:
-            return "preload, Pa"
+            return _PRELOAD
         if self.control.is_load:
-            return "p̄, Pa"
-        return "Δ/h_max" if self.control.is_fixed else "u_tot/h_max"
+            return _LOAD
+        return _FIXED if self.control.is_fixed else _FAR_SIDE
 
     def turn(self, point: float) -> str:
         """Describe a turning point: "Δ/h_max = 0.9"."""
@@ -63,7 +80,7 @@ class Cycle:
             return f"a preload of {stress_text(point, 4)} at {held}"
         if self.control.is_load:
             return f"p̄ = {stress_text(point, 4)}"
-        return f"{self.turn_sign} = {point:g}" + ("" if is_fixed else f" of {held}")
+        return f"{self.turning.sign} = {point:g}" + ("" if is_fixed else f" of {held}")
 
     def problem(self, profile: Profile, work_of_adhesion: float) -> Problem:
         """Make the problem of a profile and a work of adhesion in J/m² (TypeError, ValueError).

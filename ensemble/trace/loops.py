@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
@@ -21,18 +21,9 @@ Watch = Callable[["Loops"], None]
 _REPORT_INTERVAL = 1.0  # s
 
 
-@dataclass(frozen=True)
-class _Computing:
-    """``compute`` of :mod:`adhesis.ensemble.run.dispatch`, for jobs."""
-
-    jobs: tuple[Job, ...]
-
-    def __call__(self, task: int, check: StopCheck) -> Result:
-        started = time.monotonic()
-        return run(
-            self.jobs[task],
-            lambda branch, drive, _: check((time.monotonic() - started, branch, drive)),
-        )
+def _compute(jobs: Sequence[Job], task: int, check: StopCheck) -> Result:
+    """Run a job as the hand-out asks for it."""
+    return run(jobs[task], lambda branch, drive, _: check((branch, drive)))
 
 
 class Loops:
@@ -50,13 +41,11 @@ class Loops:
         self.processes = min(processes, self.count)
         self.done: dict[str, Result | str] = {}
         self.pids: list[int] = []
-        expected = seconds or {}
-        tasks = range(self.count)
-        self._groups = {task: task for task in tasks}
-        priors: dict[Hashable, float] = {
-            task: expected.get(self._jobs[task].name, 1.0) for task in tasks
-        }
-        self._schedule = Schedule(tasks, self._groups, priors, dict.fromkeys(tasks, 0))
+        expected = [(seconds or {}).get(job.name, 1.0) for job in self._jobs]
+        priors: dict[Hashable, float] = dict(enumerate(expected))
+        self._groups = {task: task for task in range(self.count)}
+        rounds = dict.fromkeys(self._groups, 0)
+        self._schedule = Schedule(self._groups, self._groups, priors, rounds)
         self._master: Master | None = None
 
     @property
@@ -66,18 +55,16 @@ class Loops:
         return self._schedule.seconds_left(in_flight, max(self.processes, 1))
 
     @property
-    def running(self) -> dict[str, tuple[float, str, float]]:
-        """By job name: seconds so far, and the branch and prescribed value reached."""
-        if self._master is None:
-            return {}
-        notes = dict(self._master.notes)  # another thread may ask
-        return {self._jobs[k].name: note or (0.0, "loading", 0.0) for k, note in notes.items()}
+    def running(self) -> dict[str, tuple[str, float]]:
+        """By job name: the branch and prescribed value reached."""
+        notes = {} if self._master is None else dict(self._master.notes)  # another thread may ask
+        return {self._jobs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
 
     def run(
         self, watch: Watch | None = None, every: float = _REPORT_INTERVAL
     ) -> dict[str, Result | str]:
         """Run all jobs; ``watch`` is called at this interval (s), and when a loop is done."""
-        computing, last = _Computing(self._jobs), -math.inf
+        computing, last = partial(_compute, self._jobs), -math.inf
 
         def tick() -> None:
             nonlocal last

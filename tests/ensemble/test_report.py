@@ -132,7 +132,7 @@ def test_losses_csv_holds_the_averages_with_units(report, data):
         assert float(row["m2_mean"]) == pytest.approx(cell.values["m2"][0])
         tension = 2 * cell.values["pull_off_stress"] / (1e6 / 0.75 * 1000 * cell.values["h_max"])
         assert float(row["pull_off_stress_dimensionless_mean"]) == pytest.approx(tension.mean())
-        value = paper.table_1(cell.hurst, cell.work_of_adhesion)
+        value = paper.TABLE_1.get((cell.hurst, cell.work_of_adhesion))
         assert row["loss_dimensionless_paper"] == ("" if value is None else str(value))
         assert float(row["loss_dimensionless_error_numerical"]) == pytest.approx(
             1e-4 * cell.values["loss_dimensionless"].mean()
@@ -140,7 +140,7 @@ def test_losses_csv_holds_the_averages_with_units(report, data):
 
 
 def test_the_papers_table_has_eight_numbers_and_a_dash():
-    table = [[paper.table_1(h, g) for g in GAMMAS] for h in (0.7, 0.8, 0.9)]
+    table = [[paper.TABLE_1.get((h, g)) for g in GAMMAS] for h in (0.7, 0.8, 0.9)]
     assert table == [[None, 26.6, 42.83], [3.44, 19.36, 49.25], [2.59, 17.91, 28.15]]
     assert len(paper.TABLE_1) == 8
     assert (paper.m2(0.7), paper.m2(0.9), paper.m2(0.5)) == (5.1e-3, 1.5e-3, None)
@@ -286,7 +286,7 @@ def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data, drawn)
         ends = np.array(bars.get_segments())[:, :, 1]
         np.testing.assert_allclose(ends, [[e.low, e.high] for e in found], rtol=1e-12)
         stars = [line.get_xydata()[0] for line in axes.lines if line.get_label() == "paper"]
-        quoted = [(h, paper.table_1(h, gamma)) for h in (0.7, 0.8)]
+        quoted = [(h, paper.TABLE_1.get((h, gamma))) for h in (0.7, 0.8)]
         assert [y for _, y in stars] == [value for _, value in quoted if value is not None]
         for (x, _), (hurst, _) in zip(stars, quoted[-len(stars) :], strict=True):
             assert hurst < x < hurst + 0.05
@@ -542,7 +542,7 @@ def test_findings_compare_with_the_paper(data):
     off = []
     for row in table.rows:
         loss = data.cell(*row[:2]).estimates["loss_dimensionless"]
-        value = paper.table_1(*row[:2])
+        value = paper.TABLE_1.get(row[:2])
         assert row[3:7] == (loss.mean, loss.low, loss.high, value)
         if value is None:
             assert row[7:] == (None, None)
@@ -629,7 +629,7 @@ def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
     assert sorted(names) == ["r.h5", "wider.h5"]  # other.h5 is no reading of the paper's
     found = [
         data.companions[0].like(data.cell(h, g)).estimates["loss_dimensionless"].mean
-        / paper.table_1(h, g)
+        / paper.TABLE_1[h, g]
         - 1
         for h, g in paper.TABLE_1
         if h < 0.9
