@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,7 +11,8 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
-from adhesis.ensemble.trace.job import MAX_PENETRATION, Cycle, Job
+from adhesis.ensemble.trace.loops import Cycle, Job
+from adhesis.ensemble.trace.options import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.checks import counted
@@ -224,15 +224,3 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
             f"{parameter('quick')} leaves the tables out and saves about {duration(saved)}"
         )
     return tuple(hints)
-
-
-def default_tables(
-    work_of_adhesion: Sequence[float], turning_points: Sequence[float]
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Complete a single γ by half and twice of it, a single turning point by one and two thirds."""
-    gammas, turns = tuple(work_of_adhesion), tuple(turning_points)
-    if len(gammas) == 1 and gammas[0] > 0:
-        gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
-    if len(turns) == 1:
-        turns = (turns[0], *(float(f"{share * turns[0]:.6g}") for share in (1 / 3, 2 / 3)))
-    return gammas, turns

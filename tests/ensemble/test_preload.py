@@ -26,9 +26,8 @@ from adhesis.ensemble.command.trace import _progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
-from adhesis.ensemble.trace.job import Cycle, Job
-from adhesis.ensemble.trace.job import run as compute_job
-from adhesis.ensemble.trace.loops import Loops
+from adhesis.ensemble.trace.loops import Cycle, Job, Loops
+from adhesis.ensemble.trace.loops import compute as compute_job
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.synthetic_results import campaign, rows, write
