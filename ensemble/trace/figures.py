@@ -188,11 +188,11 @@ def _cut_off(answer: Answer) -> tuple[Figure, str] | None:
 def _tables(answer: Answer) -> tuple[Figure, str] | None:
     cycle = answer.cycle
     gammas, turns = answer.works_of_adhesion, answer.turning_points
-    label = cycle.turning.symbol
+    turning_point = cycle.turning.symbol
     if cycle.turning.has_unit:
         unit, size = shown_unit("preload", cycle.turning_points[0])
         turns = [(turn / size, row) for turn, row in turns]
-        label = f"{label} ({unit})"
+        turning_point = f"{turning_point} ({unit})"
     if len(gammas) + len(turns) < 4:
         return None
     figure = style.new_figure(3, 2, style.TWO_COLUMNS, 4.4, sharex="col")
@@ -216,7 +216,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             axes.set_ylim(0, top)
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    panels[2, 1].set_xlabel(f"turning point: {label}")
+    panels[2, 1].set_xlabel(f"turning point: {turning_point}")
     return figure, (
         "Bars: the relative uncertainty of the answer; at the other points it is assumed to be "
         "the same."
