@@ -139,13 +139,6 @@ class Aggregate:
         cells = (cell for cell in self.cells if cell.done and cell.hurst in hursts)
         return [cell for cell in cells if cell.work_of_adhesion in works_of_adhesion]
 
-    def cell(self, hurst: float, work_of_adhesion: float) -> AveragedCell | None:
-        """Return the first cell of (H, γ), None if the campaign lacks it; see :attr:`shown`."""
-        for cell in self.cells:
-            if (cell.hurst, cell.work_of_adhesion) == (hurst, work_of_adhesion):
-                return cell
-        return None
-
 
 def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     """Average a results file over realisations; ``beside`` are files to compare with it.

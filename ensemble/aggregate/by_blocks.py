@@ -24,13 +24,8 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _AVERAGED = ("psd_height", "height_density", "psd_displacement", "gap_density")
 _OF_SHAPE = ("field_height", "field_displacement")
 BINS_PER_DECADE = 2
-# Energy drops outside these bounds (J/m²) are counted in the outermost bin.
-SMALLEST, LARGEST = 1e-16, 1e2
-BIN_EDGES: Array = np.logspace(
-    np.log10(SMALLEST),
-    np.log10(LARGEST),
-    1 + BINS_PER_DECADE * round(np.log10(LARGEST / SMALLEST)),
-)
+# From 1e-16 to 100 J/m²; energy drops beyond are counted in the outermost bin.
+BIN_EDGES: Array = np.logspace(-16, 2, 1 + 18 * BINS_PER_DECADE)
 SMALL = np.array([kind in SMALL_SCALE for kind in JUMP_KINDS])
 """Whether jumps of a kind only move edges inside existing patches, shape (kinds,)."""
 

@@ -30,12 +30,9 @@ Rows = NDArray[np.intp]
 _PER_TASK = tuple(dataset.name for dataset in (*TIMES, *NUMBERS, JUMP_COUNT))
 # Of these the least or the largest of a cell counts, as a range or a strength may be infinite; or
 # they belong to the place of one tension.
-_NOT_AVERAGED = frozenset(
-    (
-        *RANGES,
-        "opening_strength",
-        *("largest_interior_tension", "interior_tension_position", "interior_tension_penetration"),
-    )
+_NOT_AVERAGED = (
+    *(*RANGES, "opening_strength", "largest_interior_tension"),
+    *("interior_tension_position", "interior_tension_penetration"),
 )
 # Energies that are also given per largest contact area, in J/m² of contact.
 _PER_CONTACT = {

@@ -226,22 +226,16 @@ def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def _failure_lines(failures: list[dict[str, Any]], path: str) -> list[str]:
+def _failure_lines(failures: Sequence[Mapping[str, Any]], path: str) -> list[str]:
+    """Return the failures as lines for people, and what is to be done."""
     errors = [f["error"] for f in failures]
-    return [
-        *(f"failed {count}×: {error}" for error, count in Counter(errors).most_common(5)),
-        *_listed(failures, lambda row: f", after {row['seconds']:.3g} s" if row["seconds"] else ""),
-        advice_on_failures(errors, path),
-    ]
-
-
-def advice_on_failures(errors: Sequence[str], path: str) -> str:
-    """Return what to do about failed tasks: those that the solver refused fail again."""
-    recurring = sum(error.startswith("PathError") for error in errors)
-    if not recurring:
-        return f"again: adhesis run CAMPAIGN.toml --out {shlex.quote(path)} --redo failed"
-    which = "they fail" if recurring == len(errors) else f"{recurring} of them fail"
-    return (
-        f"{which} again if they are computed again: follow the reason given, in a campaign with "
-        "other values"
+    lines = [f"failed {count}×: {error}" for error, count in Counter(errors).most_common(5)]
+    lines += _listed(
+        failures, lambda row: f", after {row['seconds']:.3g} s" if row["seconds"] else ""
     )
+    refused = sum(error.startswith("PathError") for error in errors)  # by the solver: fail again
+    if not refused:
+        return [*lines, f"again: adhesis run CAMPAIGN.toml --out {shlex.quote(path)} --redo failed"]
+    which = "they fail" if refused == len(errors) else f"{refused} of them fail"
+    again = "again if they are computed again: follow the reason given, in a campaign with other"
+    return [*lines, f"{which} {again} values"]

@@ -27,8 +27,7 @@ from adhesis.ensemble.trace.answer import (
     make_cycle,
     run_plan,
 )
-from adhesis.ensemble.trace.job import Cycle
-from adhesis.ensemble.trace.loops import Loops
+from adhesis.ensemble.trace.loops import Cycle, Loops
 from adhesis.ensemble.trace.options import pattern_of, prepared_of, trace_of, what_was_read
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Plan, make_plan
@@ -113,7 +112,7 @@ def _progress(loops: Loops | None, seconds: float, load: bool) -> str:
         return "starting"
     running = ", ".join(
         f"{name} ({branch}, {drive_text(drive, load)})"
-        for name, (_, branch, drive) in loops.running.items()
+        for name, (branch, drive) in loops.running.items()
     )
     parts = [f"{len(loops.done)} of {loops.count} loops"]
     parts += [f"running {running}"] if running else []

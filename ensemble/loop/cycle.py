@@ -10,8 +10,7 @@ from typing import Any
 
 from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.quantities import STRESS, read_words, words_of
-from adhesis.ensemble.trace.job import MAX_PENETRATION
-from adhesis.ensemble.trace.options import given
+from adhesis.ensemble.trace.options import MAX_PENETRATION, given
 from adhesis.solver.loading.cycle import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control

@@ -10,6 +10,7 @@ from adhesis.ensemble.escape import code_span, fence, markdown, printable
 from adhesis.ensemble.quantities import in_one_unit
 from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import Illustration
+from adhesis.ensemble.report.figures.shapes_and_spectra import beside_paper
 from adhesis.ensemble.report.figures.style import left_out
 from adhesis.ensemble.report.further_axes import shown_cells
 from adhesis.ensemble.report.tables import loss_tables
@@ -99,7 +100,8 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
     if data.failures:
         failed = [f"row {row}: {text or 'no reason given'}" for row, text in data.failures]
         out += ["### Failed tasks", *_bullets(*failed)]
-    out += ["## The campaign", _toml(data.campaign.text), _origin(data)]
+    text = printable(data.campaign.text.replace("\r\n", "\n").strip())
+    out += ["## The campaign", f"{fence(text)}toml\n{text}\n{fence(text)}", _origin(data)]
     return "\n\n".join(part for part in out if part) + "\n"
 
 
@@ -136,11 +138,6 @@ def _origin(data: Aggregate) -> str:
     return f"Results file: {'; '.join(parts)}." if parts else ""
 
 
-def _toml(text: str) -> str:
-    text = printable(text.replace("\r\n", "\n").strip())
-    return f"{fence(text)}toml\n{text}\n{fence(text)}"
-
-
 def _bullets(*sentences: str) -> list[str]:
     return ["\n".join(f"- {markdown(sentence)}" for sentence in sentences)] if sentences else []
 
@@ -150,8 +147,10 @@ def _shown(item: Illustration, data: Aggregate, of_paper: bool, first_numbered: 
     caption = item.caption
     if item.at_stress and data.campaign.cycle.turns_at_stress:
         caption += f" {item.at_stress}"
-    if of_paper and item.beside_paper is not None:
-        caption += f" {item.beside_paper(data if item.whole else data.shown)}"
+    if of_paper and item.compared_with is not None:
+        caption += f" {beside_paper(data.shown, item.compared_with)}"
+    if of_paper and item.beside_paper:
+        caption += f" {item.beside_paper}"
     if first_numbered:
         caption += (
             " The number in the name of its file, as in fig3 or table1, is that of "

@@ -233,7 +233,7 @@ class CampaignResults:
     @cached_property
     def losses(self) -> pd.DataFrame:
         """``losses.csv``: mean losses with 95 % intervals and errors, one row for each cell."""
-        return _frame(loss_tables.losses(self.averages), self._cell)
+        return _frame(loss_tables.losses(self.averages), self.axes[:-1])
 
     @cached_property
     def growth(self) -> pd.DataFrame:
@@ -243,7 +243,7 @@ class CampaignResults:
     @cached_property
     def mechanisms(self) -> pd.DataFrame:
         """Jumps by kind, their number and share of the drops (``jumps.csv``)."""
-        return _frame(mechanisms.jumps(self.averages), (*self._cell, "kind"))
+        return _frame(mechanisms.jumps(self.averages), (*self.axes[:-1], "kind"))
 
     @cached_property
     def jumps(self) -> pd.DataFrame:
@@ -263,10 +263,6 @@ class CampaignResults:
         return with_units(pd.DataFrame(out))
 
     # ------------------------------------------------------------------ inside
-
-    @property
-    def _cell(self) -> tuple[str, ...]:
-        return self.axes[:-1]
 
     def _arranged(self, datasets: Sequence[Dataset]) -> xr.Dataset:
         """Datasets of one first dimension, which is spread over the axes of the campaign."""

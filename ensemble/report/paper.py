@@ -56,14 +56,19 @@ _TURNING_POINTS = (0.80, 0.93)
 _NEAR = 1e-3  # values are the paper's if they agree with its digits
 
 
-def table_1(hurst: float, work_of_adhesion: float) -> float | None:
-    """Loss of the paper's Table 1 at (H, γ in J/m²), None where it gives none."""
-    return TABLE_1.get((round(hurst, 9), round(work_of_adhesion, 9)))
+def table_1(cell: Cell) -> float | None:
+    """Loss of the paper's Table 1; None where it gives none, or the cell is not its own."""
+    return TABLE_1.get(_place(cell)) if is_cell_of(cell) else None
 
 
-def has_cell(hurst: float, work_of_adhesion: float) -> bool:
-    """Whether the paper's Table 1 has a place for (H, γ in J/m²), be it a dash."""
-    return m2(hurst) is not None and round(work_of_adhesion, 9) in {g for _, g in TABLE_1}
+def has_place(cell: Cell) -> bool:
+    """Whether the paper's Table 1 has a place for a cell, be it a dash."""
+    hurst, gamma = _place(cell)
+    return is_cell_of(cell) and hurst in M2 and gamma in {known for _, known in TABLE_1}
+
+
+def _place(cell: Cell) -> tuple[float, float]:
+    return round(cell.hurst, 9), round(cell.work_of_adhesion, 9)
 
 
 def m2(hurst: float) -> float | None:

@@ -17,10 +17,10 @@ from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
-from adhesis.ensemble.trace.job import MAX_PENETRATION, Cycle
-from adhesis.ensemble.trace.loops import Loops, Result, Watch
+from adhesis.ensemble.trace.loops import Cycle, Loops, Result, Watch
+from adhesis.ensemble.trace.options import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.variants import TABLES, Plan, Run, default_tables, make_plan
+from adhesis.ensemble.trace.variants import TABLES, Plan, Run, make_plan
 from adhesis.solver import checks, views
 from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
@@ -148,7 +148,7 @@ class Answer(ByValue):
     ----------
     loss, pull_off_stress, contact_fraction : Uncertain
     results : dict
-        Numbers of each loop by name (:func:`adhesis.ensemble.trace.job.run`); a text if it
+        Numbers of each loop by name (:func:`adhesis.ensemble.trace.loops.compute`); a text if it
         failed.
     warnings : tuple of str
     seconds : float
@@ -415,21 +415,24 @@ def make_cycle(
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables (TypeError, ValueError).
 
-    The settings are the fields of a Cycle from ``load_steps`` on.
+    The settings are the fields of a Cycle from ``load_steps`` on. A single γ is completed by half
+    and twice of it, a single turning point by one and two thirds.
     """
     given = _several("work_of_adhesion", work_of_adhesion)
-    cycle = Cycle(half_space, tuple(given), (), *settings, **named)
+    cycle = Cycle(half_space, given, (), *settings, **named)
     checks.choice("method", cycle.method, METHOD_NAMES)
     checks.real("accuracy", cycle.accuracy, checks.ACCURACY)
-    control = cycle.control
     if cycle.work_of_adhesion_open is not None and len(given) > 1:
         raise ValueError(
             f"work_of_adhesion_open is {cycle.work_of_adhesion_open!r} beside {len(given)} works "
             "of adhesion: give one of each (in the table both keep their ratio)"
         )
-    turning = "max_stress" if control.is_load else "max_penetration"
-    turning = "preload" if cycle.at_preload else turning
-    gammas, turns = default_tables(given, _several(turning, turning_points))
+    control, turning = cycle.control, cycle.turning.parameter
+    gammas, turns = given, _several(turning, turning_points)
+    if len(gammas) == 1 and gammas[0] > 0:
+        gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
+    if len(turns) == 1:
+        turns = (turns[0], *(float(f"{share * turns[0]:.6g}") for share in (1 / 3, 2 / 3)))
     for name, values in (("work_of_adhesion", gammas), (turning, turns)):
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
@@ -468,7 +471,7 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
     return replace(draft, warnings=warnings, seconds=time.monotonic() - started, **found)
 
 
-def _several(name: str, value: Several) -> Sequence[float]:
+def _several(name: str, value: Several) -> tuple[float, ...]:
     """Return one number as a row of one; its bounds are checked later."""
     if checks.number_of(value) is not None:
         return (checks.real(name, value),)
@@ -613,7 +616,6 @@ def document(answer: Answer) -> dict[str, Any]:
     """Return every number of the answer as one JSON document, in SI units."""
     prepared, trace, cycle, plan = answer.prepared, answer.prepared.trace, answer.cycle, answer.plan
     spectrum = prepared.spectrum
-    at_stress = cycle.at_preload or cycle.control.is_load
     return {
         "file": trace.source,
         "read": {
@@ -635,7 +637,7 @@ def document(answer: Answer) -> dict[str, Any]:
             "floor": spectrum.floor,
         },
         **{name: answer.main[name] for name in _CONTACT},
-        "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
+        "max_penetration": cycle.latest if cycle.turning.has_unit else cycle.turning_points[0],
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
         "preload": cycle.turning_points[0] if cycle.at_preload else None,
         "load_steps": cycle.load_steps,

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from adhesis.ensemble.quantities import shown_unit
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.trace.answer import FIGURES, Answer
-from adhesis.ensemble.trace.job import Cycle
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.model.measured_profile import trace_spectrum
@@ -178,26 +178,21 @@ def _cut_off(answer: Answer) -> tuple[Figure, str] | None:
     axes.invert_xaxis()
     axes.set(xlabel="shortest wave kept (µm)", ylabel="loss (mJ/m²)")
     axes.set_ylim(0, 1.1e3 * max(float(loss.max()), value.value + value.uncertainty))
-    _plain_log(axes)
-    axes.legend(loc="lower right")
-    return figure, "Finer to the right. A loss that still changes at the answer is not converged."
-
-
-def _plain_log(axes: Axes) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
     axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.legend(loc="lower right")
+    return figure, "Finer to the right. A loss that still changes at the answer is not converged."
 
 
 def _tables(answer: Answer) -> tuple[Figure, str] | None:
     cycle = answer.cycle
     gammas, turns = answer.works_of_adhesion, answer.turning_points
-    unit, size = "", 1.0
-    if cycle.at_preload or cycle.control.is_load:
+    turning_point = cycle.turning.symbol
+    if cycle.turning.has_unit:
         unit, size = shown_unit("preload", cycle.turning_points[0])
         turns = [(turn / size, row) for turn, row in turns]
+        turning_point = f"{turning_point} ({unit})"
     if len(gammas) + len(turns) < 4:
         return None
     figure = style.new_figure(3, 2, style.TWO_COLUMNS, 4.4, sharex="col")
@@ -221,16 +216,8 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             axes.set_ylim(0, top)
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    panels[2, 1].set_xlabel("turning point: " + _turn_label(cycle, unit))
+    panels[2, 1].set_xlabel(f"turning point: {turning_point}")
     return figure, (
         "Bars: the relative uncertainty of the answer; at the other points it is assumed to be "
         "the same."
     )
-
-
-def _turn_label(cycle: Cycle, unit: str) -> str:
-    if cycle.at_preload:
-        return f"preload ({unit})"
-    if cycle.control.is_load:
-        return rf"$\bar p$ ({unit})"
-    return r"$\Delta/h_{\max}$" if cycle.control.is_fixed else r"$u_\mathrm{tot}/h_{\max}$"

@@ -1,4 +1,4 @@
-"""Run the loops of a trace side by side, by the hand-out that campaigns have."""
+"""The loops of a trace: what each is, and how they run side by side, by campaigns' hand-out."""
 
 from __future__ import annotations
 
@@ -6,14 +6,24 @@ import math
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
+from adhesis.ensemble.quantities import stress_text
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
 from adhesis.ensemble.run.dispatch import Channel, Limits, Master, OwnWorker
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
-from adhesis.ensemble.trace.job import Job, run
+from adhesis.solver.loading.cycle import turn_arguments
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.loading.path_record import Progress
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.pattern import AdhesionPattern
+from adhesis.solver.model.problem import Measure, Problem
+from adhesis.solver.model.profile import Profile
+from adhesis.solver.registry import MethodName, make_method
 
 Result = dict[str, Any]
 Watch = Callable[["Loops"], None]
@@ -22,17 +32,123 @@ _REPORT_INTERVAL = 1.0  # s
 
 
 @dataclass(frozen=True)
-class _Computing:
-    """``compute`` of :mod:`adhesis.ensemble.run.dispatch`, for jobs."""
+class Turning:
+    """What the turning points of a cycle are."""
 
-    jobs: tuple[Job, ...]
+    parameter: str
+    sign: str  # with a unit if they have one
+    short: str
+    symbol: str  # in figures
+    has_unit: bool = False  # whether they are stresses in Pa
 
-    def __call__(self, task: int, check: StopCheck) -> Result:
-        started = time.monotonic()
-        return run(
-            self.jobs[task],
-            lambda branch, drive, _: check((time.monotonic() - started, branch, drive)),
+
+_PRELOAD = Turning("preload", "preload, Pa", "preload", "preload", has_unit=True)
+_LOAD = Turning("max_stress", "p̄, Pa", "p̄", r"$\bar p$", has_unit=True)
+_FIXED = Turning("max_penetration", "Δ/h_max", "Δ", r"$\Delta/h_{\max}$")
+_FAR_SIDE = Turning("max_penetration", "u_tot/h_max", "u", r"$u_\mathrm{tot}/h_{\max}$")
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Contact and cycle in SI units; the answer has the first value of each tuple.
+
+    Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load; preloads in Pa
+    if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload.
+    The waves of the pattern are counted in the answer's period.
+    """
+
+    half_space: HalfSpace
+    works_of_adhesion: tuple[float, ...]
+    turning_points: tuple[float, ...]
+    load_steps: int = 40
+    method: MethodName = "auto"
+    accuracy: float = 1e-3
+    control: Control = field(default_factory=Control)
+    adhesion_range: float | None = None
+    strength: float | None = None
+    at_preload: bool = False
+    latest: float | None = None
+    work_of_adhesion_open: float | None = None
+    measure: Measure = "arc"
+    pattern: AdhesionPattern | None = None
+
+    @property
+    def turning(self) -> Turning:
+        """Return what the turning points are."""
+        if self.at_preload:
+            return _PRELOAD
+        if self.control.is_load:
+            return _LOAD
+        return _FIXED if self.control.is_fixed else _FAR_SIDE
+
+    def turn(self, point: float) -> str:
+        """Describe a turning point: "Δ/h_max = 0.9"."""
+        is_fixed = self.control.is_fixed
+        held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
+        if self.at_preload:
+            held = "a fixed separation" if is_fixed else held
+            return f"a preload of {stress_text(point, 4)} at {held}"
+        if self.control.is_load:
+            return f"p̄ = {stress_text(point, 4)}"
+        return f"{self.turning.sign} = {point:g}" + ("" if is_fixed else f" of {held}")
+
+    def problem(self, profile: Profile, work_of_adhesion: float) -> Problem:
+        """Make the problem of a profile and a work of adhesion in J/m² (TypeError, ValueError).
+
+        The work of adhesion of receding edges is given for the answer; elsewhere both keep their
+        ratio.
+        """
+        first, opening = self.works_of_adhesion[0], self.work_of_adhesion_open
+        if opening is not None and work_of_adhesion != first:
+            opening = opening / first * work_of_adhesion
+        return Problem(
+            *(profile, self.half_space, work_of_adhesion, self.control),
+            strength=math.inf if self.strength is None else self.strength,
+            adhesion_range=self.adhesion_range,
+            work_of_adhesion_open=opening,
+            measure=self.measure,
+            pattern=self.pattern,
         )
+
+
+@dataclass(frozen=True)
+class Job:
+    """Arguments of one loop: of the cycle, its own work of adhesion and turning point."""
+
+    name: str
+    profile: Profile
+    cycle: Cycle
+    work_of_adhesion: float
+    turning_point: float
+
+
+def compute(job: Job, progress: Progress | None = None) -> Result:
+    """Run one loop and return its numbers, and its states as lists."""
+    cycle = job.cycle
+    problem = cycle.problem(job.profile, job.work_of_adhesion)
+    method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
+    turn = turn_arguments(cycle.control, job.turning_point, cycle.at_preload, cycle.latest)
+    loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
+    drops = loop.loss_from_drops - loop.closing_drop
+    return loop.numbers() | {
+        "range_warnings": loop.range_warnings(),
+        "strain_warnings": loop.strain_warnings(),
+        "preload_warnings": loop.preload_warnings,
+        "fall_warnings": loop.fall_warnings(),
+        "loss_note": loop.loss_note,
+        "range_summary": loop.range_summary(),
+        "contact_fraction": loop.largest_contact_fraction,
+        "patches": int(loop.patches.max()),
+        "jumps": len(loop.jumps),
+        "small_scale_share": loop.drops(small_scale=True) / drops if drops > 0 else 0.0,
+        "waves": job.profile.highest_harmonic,
+        "states": {name: values.tolist() for name, values in loop.columns().items()},
+    }
+
+
+def _compute(jobs: Sequence[Job], task: int, check: StopCheck) -> Result:
+    """Run a job as the hand-out asks for it."""
+    return compute(jobs[task], lambda branch, drive, _: check((branch, drive)))
 
 
 class Loops:
@@ -50,13 +166,11 @@ class Loops:
         self.processes = min(processes, self.count)
         self.done: dict[str, Result | str] = {}
         self.pids: list[int] = []
-        expected = seconds or {}
-        tasks = range(self.count)
-        self._groups = {task: task for task in tasks}
-        priors: dict[Hashable, float] = {
-            task: expected.get(self._jobs[task].name, 1.0) for task in tasks
-        }
-        self._schedule = Schedule(tasks, self._groups, priors, dict.fromkeys(tasks, 0))
+        expected = [(seconds or {}).get(job.name, 1.0) for job in self._jobs]
+        priors: dict[Hashable, float] = dict(enumerate(expected))
+        self._groups = {task: task for task in range(self.count)}
+        rounds = dict.fromkeys(self._groups, 0)
+        self._schedule = Schedule(self._groups, self._groups, priors, rounds)
         self._master: Master | None = None
 
     @property
@@ -66,18 +180,16 @@ class Loops:
         return self._schedule.seconds_left(in_flight, max(self.processes, 1))
 
     @property
-    def running(self) -> dict[str, tuple[float, str, float]]:
-        """By job name: seconds so far, and the branch and prescribed value reached."""
-        if self._master is None:
-            return {}
-        notes = dict(self._master.notes)  # another thread may ask
-        return {self._jobs[k].name: note or (0.0, "loading", 0.0) for k, note in notes.items()}
+    def running(self) -> dict[str, tuple[str, float]]:
+        """By job name: the branch and prescribed value reached."""
+        notes = {} if self._master is None else dict(self._master.notes)  # another thread may ask
+        return {self._jobs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
 
     def run(
         self, watch: Watch | None = None, every: float = _REPORT_INTERVAL
     ) -> dict[str, Result | str]:
         """Run all jobs; ``watch`` is called at this interval (s), and when a loop is done."""
-        computing, last = _Computing(self._jobs), -math.inf
+        computing, last = partial(_compute, self._jobs), -math.inf
 
         def tick() -> None:
             nonlocal last

@@ -13,6 +13,9 @@ from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.reading.printed_numbers import DELIMITERS
 from adhesis.solver.model.pattern import AdhesionPattern, stripes_of
 
+MAX_PENETRATION = 0.9
+"""Turning point Δ/h_max where none is given."""
+
 _OF_READING = ("unit", "step", "decimal", "row", "channel")
 _OF_PREPARING = ("degree", "cut_off", "tip_radius", "longest_gap", "keep_outliers", "invert")
 _NAMES = (*_OF_READING, "columns", "delimiter", *_OF_PREPARING, "exclude")

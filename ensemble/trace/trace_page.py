@@ -279,7 +279,7 @@ def _sweep_rows(answer: Answer) -> list[list[str]]:
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
     rows = [(g, point, numbers) for g, numbers in answer.works_of_adhesion]
     rows += [(gamma, d, numbers) for d, numbers in answer.turning_points if d != point]
-    head = ["γ, J/m²", cycle.turn_sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
+    head = ["γ, J/m²", cycle.turning.sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
     table = [head]
     for g, d, r in sorted(rows, key=lambda row: row[:2]):
         cells = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,12 +11,11 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
-from adhesis.ensemble.trace.job import MAX_PENETRATION, Cycle, Job
+from adhesis.ensemble.trace.loops import Cycle, Job
+from adhesis.ensemble.trace.options import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.checks import counted
-from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.profile import Profile
 from adhesis.solver.values import ByValue
 
 # Longer profiles are compared at a coarser cut-off when a doubt is measured.
@@ -108,7 +106,7 @@ def make_plan(
         jobs=tuple(jobs.values()),
         seconds=seconds,
         waves=base.highest_harmonic,
-        patches=round(patches_of(jobs["answer"])),
+        patches=round(expected_patches(jobs["answer"])),
         processes=processes,
         wall=wall + 2 * _START,
         hints=(),
@@ -158,14 +156,11 @@ def _doubts(prepared: Prepared) -> list[Run]:
 
 def _tables(cycle: Cycle) -> list[Run]:
     runs = []
-    gammas, turns = cycle.works_of_adhesion, cycle.turning_points
-    sign = "p̄" if cycle.control.is_load else "Δ" if cycle.control.is_fixed else "u"
-    sign = "preload" if cycle.at_preload else sign
-    for gamma in gammas[1:]:
+    for gamma in cycle.works_of_adhesion[1:]:
         name, described = f"γ {gamma:g}", f"γ = {gamma:g} J/m²"
         runs.append(Run(name, "work of adhesion", described, work_of_adhesion=gamma))
-    for point in turns[1:]:
-        name, described = f"{sign} {point:g}", f"turning at {cycle.turn(point)}"
+    for point in cycle.turning_points[1:]:
+        name, described = f"{cycle.turning.short} {point:g}", f"turning at {cycle.turn(point)}"
         runs.append(Run(name, "turning point", described, turning_point=point))
     return runs
 
@@ -173,45 +168,34 @@ def _tables(cycle: Cycle) -> list[Run]:
 # ---------------------------------------------------------------------- cost
 
 
-def expected_patches(profile: Profile, half_space: HalfSpace, work_of_adhesion: float) -> float:
-    """Estimate the largest number of patches at a time, by adhesion alone.
-
-    Waves up to the mean one stay apart as far as the energy of full contact, E*/2 Σ q|a|² per area,
-    exceeds the work of adhesion; the exponent is fitted to loops of self-affine profiles.
-    """
-    a = np.abs(profile.coefficients) ** 2
-    m = np.arange(a.size)
-    full = 0.5 * half_space.modulus * float(np.sum(m * profile.q0 * a))
-    longest = float(np.sum(m * a) / np.sum(a))
-    ratio = max(work_of_adhesion / full, 1e-3)
-    return float(np.clip(1.2 * longest * ratio**-0.7, 1.0, 4 * profile.highest_harmonic))
-
-
-def crests_reached(profile: Profile, penetration: float) -> int:
-    """Count the largest number of crests at a time that a plane cuts on its way to Δ/h_max."""
-    heights = profile.heights(max(4 * profile.highest_harmonic, 64))
-    highest, most = float(heights.max()), 1
-    for share in np.linspace(0.0, 1.0, _LEVELS + 1)[1:]:
-        above = heights > highest * (1 - share * penetration)
-        most = max(most, int(np.count_nonzero(above & ~np.roll(above, 1))))
-    return most
-
-
-def patches_of(job: Job) -> float:
+def expected_patches(job: Job) -> float:
     """Estimate the largest number of patches at a time of one loop.
 
-    It is limited by the number of crests that are reached. Where the separation at the turning
-    point is not known, those of the usual one count.
+    By adhesion alone, waves up to the mean one stay apart as far as the energy of full contact,
+    E*/2 Σ q|a|² per area, exceeds the work of adhesion; the exponent is fitted to loops of
+    self-affine profiles. There are no more than crests that a plane cuts at a time on its way to
+    the turning point; where its separation is not known, those of the usual one count.
     """
-    is_known = job.cycle.control.is_fixed and not job.cycle.at_preload
+    profile, cycle = job.profile, job.cycle
+    a = np.abs(profile.coefficients) ** 2
+    m = np.arange(a.size)
+    full = 0.5 * cycle.half_space.modulus * float(np.sum(m * profile.q0 * a))
+    longest = float(np.sum(m * a) / np.sum(a))
+    ratio = max(job.work_of_adhesion / full, 1e-3)
+    by_adhesion = np.clip(1.2 * longest * ratio**-0.7, 1.0, 4 * profile.highest_harmonic)
+    is_known = cycle.control.is_fixed and not cycle.at_preload
     penetration = job.turning_point if is_known else MAX_PENETRATION
-    by_adhesion = expected_patches(job.profile, job.cycle.half_space, job.work_of_adhesion)
-    return min(by_adhesion, float(crests_reached(job.profile, penetration)))
+    heights = profile.heights(max(4 * profile.highest_harmonic, 64))
+    crests = 1
+    for share in np.linspace(0.0, 1.0, _LEVELS + 1)[1:]:
+        above = heights > float(heights.max()) * (1 - share * penetration)
+        crests = max(crests, int(np.count_nonzero(above & ~np.roll(above, 1))))
+    return min(float(by_adhesion), float(crests))
 
 
 def expected_seconds(job: Job) -> float:
     """Estimate the CPU seconds of one loop."""
-    waves, patches = float(job.profile.highest_harmonic), patches_of(job)
+    waves, patches = float(job.profile.highest_harmonic), expected_patches(job)
     of_patches = _SECONDS_OF_PATCH * waves**_WAVES_POWER * patches**_PATCHES_POWER
     steps = max(job.cycle.load_steps / 40, 0.5)
     return float(_LEAST_SECONDS + _SECONDS_OF_WAVE * waves + of_patches) * steps
@@ -240,15 +224,3 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
             f"{parameter('quick')} leaves the tables out and saves about {duration(saved)}"
         )
     return tuple(hints)
-
-
-def default_tables(
-    work_of_adhesion: Sequence[float], turning_points: Sequence[float]
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Complete a single γ by half and twice of it, a single turning point by one and two thirds."""
-    gammas, turns = tuple(work_of_adhesion), tuple(turning_points)
-    if len(gammas) == 1 and gammas[0] > 0:
-        gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
-    if len(turns) == 1:
-        turns = (turns[0], *(float(f"{share * turns[0]:.6g}") for share in (1 / 3, 2 / 3)))
-    return gammas, turns

@@ -44,7 +44,7 @@ CELLS = [(0.7, 0.01, 4, 2, 0), (0.7, 0.04, 3, 0, 3), (0.8, 0.01, 6, 0, 0), (0.8,
 
 @pytest.mark.parametrize(("hurst", "gamma", "done", "failed", "pending"), CELLS)
 def test_scalars_are_the_means_of_the_raw_rows(file, hurst, gamma, done, failed, pending):
-    cell = aggregate(file).cell(hurst, gamma)
+    cell = aggregate(file).finished([hurst], [gamma])[0]
     assert (cell.done, cell.failed, cell.pending) == (done, failed, pending)
     data, mine = raw(file, hurst, gamma)
     for name in (
@@ -70,7 +70,7 @@ def test_scalars_are_the_means_of_the_raw_rows(file, hurst, gamma, done, failed,
 
 @pytest.mark.parametrize(("hurst", "gamma"), [cell[:2] for cell in CELLS])
 def test_curves_are_the_means_of_the_raw_rows(file, hurst, gamma):
-    cell = aggregate(file).cell(hurst, gamma)
+    cell = aggregate(file).finished([hurst], [gamma])[0]
     data, mine = raw(file, hurst, gamma)
     h_max, m2 = data["h_max"][:][mine], data["m2"][:][mine]
     for branch in ("loading", "unloading"):

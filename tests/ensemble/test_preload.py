@@ -26,9 +26,8 @@ from adhesis.ensemble.command.trace import _progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
-from adhesis.ensemble.trace.job import Cycle, Job
-from adhesis.ensemble.trace.job import run as compute_job
-from adhesis.ensemble.trace.loops import Loops
+from adhesis.ensemble.trace.loops import Cycle, Job, Loops
+from adhesis.ensemble.trace.loops import compute as compute_job
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.synthetic_results import campaign, rows, write
@@ -134,7 +133,7 @@ def test_a_mean_stress_that_the_loop_does_not_have_is_refused(tmp_path, monkeypa
 
 
 def test_the_way_of_a_trace_under_a_weight_has_a_unit(monkeypatch):
-    monkeypatch.setattr(Loops, "running", {"answer": (1.0, "unloading", -3.4e4)})
+    monkeypatch.setattr(Loops, "running", {"answer": ("unloading", -3.4e4)})
     for load, text in ((True, "p̄ -34 kPa);"), (False, "Δ/h_max -3.4e+04)")):
         assert f"(unloading, {text}" in _progress(Loops((), 1), 1.0, load)
 

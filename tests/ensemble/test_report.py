@@ -132,7 +132,7 @@ def test_losses_csv_holds_the_averages_with_units(report, data):
         assert float(row["m2_mean"]) == pytest.approx(cell.values["m2"][0])
         tension = 2 * cell.values["pull_off_stress"] / (1e6 / 0.75 * 1000 * cell.values["h_max"])
         assert float(row["pull_off_stress_dimensionless_mean"]) == pytest.approx(tension.mean())
-        value = paper.table_1(cell.hurst, cell.work_of_adhesion)
+        value = paper.TABLE_1.get((cell.hurst, cell.work_of_adhesion))
         assert row["loss_dimensionless_paper"] == ("" if value is None else str(value))
         assert float(row["loss_dimensionless_error_numerical"]) == pytest.approx(
             1e-4 * cell.values["loss_dimensionless"].mean()
@@ -140,7 +140,7 @@ def test_losses_csv_holds_the_averages_with_units(report, data):
 
 
 def test_the_papers_table_has_eight_numbers_and_a_dash():
-    table = [[paper.table_1(h, g) for g in GAMMAS] for h in (0.7, 0.8, 0.9)]
+    table = [[paper.TABLE_1.get((h, g)) for g in GAMMAS] for h in (0.7, 0.8, 0.9)]
     assert table == [[None, 26.6, 42.83], [3.44, 19.36, 49.25], [2.59, 17.91, 28.15]]
     assert len(paper.TABLE_1) == 8
     assert (paper.m2(0.7), paper.m2(0.9), paper.m2(0.5)) == (5.1e-3, 1.5e-3, None)
@@ -210,7 +210,9 @@ def test_curves_open_in_xarray_with_units(report, data):
         assert curves["loading_mean_stress_mean"].attrs["units"] == "Pa"
         one = curves["unloading_mean_stress_dimensionless_mean"]
         one = one.sel(hurst=0.8, work_of_adhesion=0.07)
-        expected = data.cell(0.8, 0.07).curves["unloading_mean_stress_dimensionless"].mean
+        expected = (
+            data.finished([0.8], [0.07])[0].curves["unloading_mean_stress_dimensionless"].mean
+        )
         np.testing.assert_array_equal(one, expected)
         assert curves["realisations"].values.tolist() == [[5] * 3] * 2
         quantiles = curves["loading_contact_fraction_quantiles"]
@@ -222,7 +224,7 @@ def test_contact_is_drawn_against_stress_over_slope(data, drawn):
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["H = 0.7", "H = 0.8"]
     lines = lines_of(figure.axes[1])
     assert len(lines) == 6
-    cell = data.cell(0.8, 0.04)
+    cell = data.finished([0.8], [0.04])[0]
     line = lines[r"$\gamma$ = 0.04 J/m², unloading"]
     sigma = (
         2
@@ -260,7 +262,7 @@ def test_loops_are_drawn_with_one_standard_deviation(data, drawn):
     for column in (figure.axes[::2], figure.axes[1::2]):  # one scale for all H
         assert len({axes.get_ylim() for axes in column}) == 1
     axes = figure.axes[2]
-    cell = data.cell(0.8, 0.01)
+    cell = data.finished([0.8], [0.01])[0]
     line = lines_of(axes)[r"$\gamma$ = 0.01 J/m², loading"]
     np.testing.assert_array_equal(line[:, 0], data.campaign.loading_penetration)
     np.testing.assert_array_equal(line[:, 1], cell.curves["loading_mean_stress_dimensionless"].mean)
@@ -277,7 +279,7 @@ def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data, drawn)
     figure = drawn["table1_losses"]
     for axes, gamma in zip(figure.axes, GAMMAS, strict=True):
         assert f"= {gamma:g} J" in axes.get_title(loc="left")
-        found = [data.cell(h, gamma).estimates["loss_dimensionless"] for h in (0.7, 0.8)]
+        found = [data.finished([h], [gamma])[0].estimates["loss_dimensionless"] for h in (0.7, 0.8)]
         (container,) = axes.containers
         line, _, (bars,) = container.lines
         np.testing.assert_array_equal(line.get_xdata(), [0.7, 0.8])
@@ -286,7 +288,7 @@ def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data, drawn)
         ends = np.array(bars.get_segments())[:, :, 1]
         np.testing.assert_allclose(ends, [[e.low, e.high] for e in found], rtol=1e-12)
         stars = [line.get_xydata()[0] for line in axes.lines if line.get_label() == "paper"]
-        quoted = [(h, paper.table_1(h, gamma)) for h in (0.7, 0.8)]
+        quoted = [(h, paper.TABLE_1.get((h, gamma))) for h in (0.7, 0.8)]
         assert [y for _, y in stars] == [value for _, value in quoted if value is not None]
         for (x, _), (hurst, _) in zip(stars, quoted[-len(stars) :], strict=True):
             assert hurst < x < hurst + 0.05
@@ -308,7 +310,7 @@ def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data, drawn):
 
 
 def test_jump_densities_integrate_to_the_number_of_jumps(data, drawn):
-    cell = data.cell(0.7, 0.01)
+    cell = data.finished([0.7], [0.01])[0]
     total = 0.0
     for axes in drawn["jump_energies"].axes[:2]:
         label = r"$\gamma$ = 0.01 J/m²"
@@ -349,7 +351,7 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
             assert f"H = 0.8, $\\gamma$ = {gamma} J/m²" in title
             assert title.endswith(f"= {drawn_at:.2f}")
             branches = lines_of(axes)
-            cell = data.cell(0.8, gamma)
+            cell = data.finished([0.8], [gamma])[0]
             state = int(np.argmin(np.abs(cell.plan.penetration - drawn_at)))
             for b, branch in enumerate(("loading", "unloading")):
                 spectrum = cell.fields.psd_displacement[b, state]
@@ -378,7 +380,7 @@ def test_shapes_show_the_surface_above_the_profile(data, drawn):
     """In the frame of the profile, so that branches of different separation can be compared."""
     figure = drawn["fig3_shapes"]
     assert len(figure.axes) == 6
-    cell = data.cell(0.8, 0.01)
+    cell = data.finished([0.8], [0.01])[0]
     shape = cell.fields.shape
     lines = lines_of(figure.axes[0])
     assert len(lines["rigid"]) == 4 * 255 + 1  # 256 nodes would be seen as a polygon
@@ -541,8 +543,8 @@ def test_findings_compare_with_the_paper(data):
     assert len(table.rows) == 6
     off = []
     for row in table.rows:
-        loss = data.cell(*row[:2]).estimates["loss_dimensionless"]
-        value = paper.table_1(*row[:2])
+        loss = data.finished(row[:1], row[1:2])[0].estimates["loss_dimensionless"]
+        value = paper.TABLE_1.get(row[:2])
         assert row[3:7] == (loss.mean, loss.low, loss.high, value)
         if value is None:
             assert row[7:] == (None, None)
@@ -600,7 +602,7 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     by_steps = names.index("loss_dimensionless_error_load_steps")
     by_grid = names.index("loss_dimensionless_error_resolution")
     for row in loss_tables.losses(both).rows:
-        cell = data.cell(*row[:2])
+        cell = data.finished(row[:1], row[1:2])[0]
         loss = cell.values["loss_dimensionless"]
         assert row[by_grid] == pytest.approx(0.02 * loss.mean())
         assert row[by_steps] == pytest.approx(0.01 * loss.mean())
@@ -620,7 +622,7 @@ def test_another_largest_penetration_is_compared_with(file, tmp_path, undrawn):
 
 
 def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
-    factor = 19 / aggregate(file).cell(0.8, 0.04).estimates["loss_dimensionless"].mean
+    factor = 19 / aggregate(file).finished([0.8], [0.04])[0].estimates["loss_dimensionless"].mean
     wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 100", "ratio = 200"))
     other = companion(tmp_path, "other.h5", factor, a=("ratio = 100", "ratio = 30"))
     data = aggregate(file, [wider, other])
@@ -628,8 +630,8 @@ def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
     names = re.findall(r"(\w+\.h5) [\d.]+ % \(5 values\)", sentence)
     assert sorted(names) == ["r.h5", "wider.h5"]  # other.h5 is no reading of the paper's
     found = [
-        data.companions[0].like(data.cell(h, g)).estimates["loss_dimensionless"].mean
-        / paper.table_1(h, g)
+        data.companions[0].like(data.finished([h], [g])[0]).estimates["loss_dimensionless"].mean
+        / paper.TABLE_1[h, g]
         - 1
         for h, g in paper.TABLE_1
         if h < 0.9

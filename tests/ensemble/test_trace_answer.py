@@ -9,6 +9,7 @@ import os
 import re
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,15 @@ from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import (
     COVERAGE,
+    QUANTITIES,
     Answer,
     NoAnswer,
+    Uncertain,
     make_cycle,
     run_plan,
 )
 from adhesis.ensemble.trace.answer import document as document_of
+from adhesis.ensemble.trace.figures import _tables as tables_of
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
@@ -205,6 +209,29 @@ def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
     plan = make_plan(prepared(), cycle, quick=True, processes=0)
     assert {job.cycle.control.stiffness for job in plan.jobs} == {1e9}
     assert cycle.turn(0.3) == "u_tot/h_max = 0.3 of a stiffness of 1e+09 Pa/m"
+
+
+@pytest.mark.parametrize(
+    ("control", "at_preload", "turn", "label"),
+    [
+        (Control(), False, 0.3, r"$\Delta/h_{\max}$"),
+        (Control(1e9), False, 0.3, r"$u_\mathrm{tot}/h_{\max}$"),
+        (Control(0.0), False, 2e4, r"$\bar p$ (kPa)"),
+        (Control(), True, 2e4, "preload (kPa)"),
+    ],
+)
+def test_the_figure_of_the_tables_says_what_turning_points_are(control, at_preload, turn, label):
+    cycle = make_cycle(HALF_SPACE, 0.04, turn, 4, "auto", 1e-3, control, at_preload=at_preload)
+    numbers = dict.fromkeys(QUANTITIES, 0.5)
+    found: Any = SimpleNamespace(
+        cycle=cycle,
+        works_of_adhesion=[(0.04, numbers)],
+        turning_points=[(point, numbers) for point in sorted(cycle.turning_points)],
+        **dict.fromkeys(QUANTITIES, Uncertain(0.5, 0.1, {})),
+    )
+    drawn = tables_of(found)
+    assert drawn is not None
+    assert drawn[0].axes[-1].get_xlabel() == f"turning point: {label}"
 
 
 def small_plan() -> tuple[Prepared, Any, Plan]:

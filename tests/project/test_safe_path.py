@@ -11,8 +11,7 @@ import pytest
 
 from adhesis.ensemble.doctor import examine
 from adhesis.ensemble.run import launch
-from adhesis.ensemble.trace.job import Cycle, Job
-from adhesis.ensemble.trace.loops import Loops
+from adhesis.ensemble.trace.loops import Cycle, Job, Loops
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import single_wave
 from tests.support.campaign_support import ROOT, environment, has_ended, wait_until

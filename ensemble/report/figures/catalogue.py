@@ -13,7 +13,6 @@ from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spec
 from adhesis.ensemble.report.figures.along import along, with_figure
 from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.shapes_and_spectra import (
-    beside_paper,
     cells_with_shape,
     has_fields,
     shown_penetrations,
@@ -32,9 +31,10 @@ class Illustration:
     caption: str  # what it shows, as a sentence or two
     draw: Callable[[Aggregate], PublishedFigure]
     of_paper: str = ""  # the figure or table of the paper that shows the same, if there is one
-    # Returns a sentence for the caption on what the paper shows there and the figure does not; used
-    # where the campaign is the paper's
-    beside_paper: Callable[[Aggregate], str] | None = None
+    # compared_with, beside_paper: where the campaign is the paper's, its figure that the caption
+    # compares this one with, and a sentence on what it shows
+    compared_with: PaperFigure | None = None
+    beside_paper: str = ""
     at_stress: str = ""  # a further sentence for the caption where loops turn at a mean stress
     whole: bool = False  # whether it draws all cells, and not those of :attr:`Aggregate.shown`
     # Returns whether there is something to see: more than one point, or fields
@@ -56,11 +56,6 @@ def _several(name: str) -> Callable[[Aggregate], bool]:
 
 def _with_fields(data: Aggregate) -> bool:
     return any(map(has_fields, data.cells))
-
-
-def _compared_with(figure: PaperFigure, addition: str = "") -> Callable[[Aggregate], str]:
-    """Return the function that compares what is drawn with a figure of the paper."""
-    return lambda data: f"{beside_paper(data, figure)}{addition}"
 
 
 _ENDS = (
@@ -96,7 +91,7 @@ LOSSES = (
         f"Means with 95 % intervals, a panel for each γ. {_BELOW}",
         loss_figures.loss_against_hurst,
         "Table 1",
-        lambda data: "Stars: the paper's values, which have no error.",
+        beside_paper="Stars: the paper's values, which have no error.",
         is_worth=_several("hurst"),
     ),
     Illustration(
@@ -104,7 +99,7 @@ LOSSES = (
         "Loss against mean square slope",
         f"Means with 95 % intervals, a panel for each γ, a point for each H. {_BELOW}",
         loss_figures.loss_against_slope,
-        beside_paper=lambda data: "Stars: the paper's values, at the m2 that it quotes.",
+        beside_paper="Stars: the paper's values, at the m2 that it quotes.",
         is_worth=_several("hurst"),
     ),
 )
@@ -118,11 +113,9 @@ FIELDS = (
         "the end of the period where it lies near one.",
         shapes_and_spectra.shapes,
         "Fig. 3",
-        _compared_with(
-            paper.FIGURE_3,
-            " Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
-            "h_rms = 1 µm, so the states here are those that the campaign kept.",
-        ),
+        paper.FIGURE_3,
+        "Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
+        "h_rms = 1 µm, so the states here are those that the campaign kept.",
         is_worth=lambda data: bool(shown_penetrations(data, 1) and cells_with_shape(data)),
     ),
     Illustration(
@@ -133,7 +126,7 @@ FIELDS = (
         "highest wave number only the edges of contact have power.",
         shapes_and_spectra.spectra_of_branches,
         "Fig. 4",
-        _compared_with(paper.FIGURE_4),
+        paper.FIGURE_4,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -142,7 +135,7 @@ FIELDS = (
         "As before, at several penetrations.",
         shapes_and_spectra.spectra_on_loading,
         "Fig. 5(a)",
-        _compared_with(paper.FIGURE_5),
+        paper.FIGURE_5,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -151,7 +144,7 @@ FIELDS = (
         "As on loading. At the largest penetration both branches are one state.",
         shapes_and_spectra.spectra_on_unloading,
         "Fig. 5(b)",
-        _compared_with(paper.FIGURE_5),
+        paper.FIGURE_5,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -165,7 +158,7 @@ FIELDS = (
         "are not shown.",
         shapes_and_spectra.gap_density,
         "Fig. 8",
-        _compared_with(paper.FIGURE_8),
+        paper.FIGURE_8,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -174,7 +167,7 @@ FIELDS = (
         "Rigid profiles, mean over realisations, with the Gaussian of the same variance.",
         shapes_and_spectra.height_density,
         "Fig. 9",
-        lambda data: "The paper's figure is at H = 0.8, with heights in units of h_max.",
+        beside_paper="The paper's figure is at H = 0.8, with heights in units of h_max.",
     ),
 )
 MECHANISMS = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -77,7 +79,13 @@ def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
         for axes, name in zip(row, ("mean_stress_dimensionless", "contact_fraction"), strict=True):
             for k, cell in _curves_of(data, hurst):
                 for branch in BRANCHES:
-                    _with_spread(axes, cell, branch, name, k)
+                    part = _in_contact(cell, branch)
+                    depth, curve = cell.penetration[branch][part], cell.curves[f"{branch}_{name}"]
+                    mean, std = curve.mean[part], curve.std[part]
+                    _plot(axes, depth, mean, cell, branch, k)
+                    if cell.done > 1:
+                        band: Any = {"color": style.colour(k), "alpha": 0.18, "linewidth": 0}
+                        axes.fill_between(depth, mean - std, mean + std, **band)
             style.label_panel(axes, f"H = {hurst:g}")
         row[0].axhline(0, color="0.5", linewidth=0.5)
         row[1].set_ylim(bottom=0)
@@ -115,18 +123,6 @@ def _plot(axes: Axes, x: Array, y: Array, cell: AveragedCell, branch: str, k: in
         label=f"{style.gamma_label(cell.work_of_adhesion)}, {branch}",
         **style.look(k),
     )
-
-
-def _with_spread(axes: Axes, cell: AveragedCell, branch: str, name: str, k: int) -> None:
-    part = _in_contact(cell, branch)
-    axis = cell.penetration[branch][part]
-    curve = cell.curves[f"{branch}_{name}"]
-    mean, std = curve.mean[part], curve.std[part]
-    _plot(axes, axis, mean, cell, branch, k)
-    if cell.done > 1:
-        axes.fill_between(
-            axis, mean - std, mean + std, color=style.colour(k), alpha=0.18, linewidth=0
-        )
 
 
 def _legend(data: Aggregate, figure: style.PublishedFigure, columns: int) -> None:

@@ -17,7 +17,6 @@ from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.tables.loss_tables import papers_loss
 from adhesis.solver.model.profile import Array
 
 _FEWEST_BARS = 4  # for which there is room
@@ -62,7 +61,7 @@ def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
         cells = data.finished(hursts, [gamma])
         x = np.array([cell.hurst for cell in cells])
         errorbar(axes, x, cells, name, unit, k, "_")
-        _stars(axes, [(cell.hurst + aside, papers_loss(cell), style.colour(k)) for cell in cells])
+        _stars(axes, [(cell.hurst + aside, paper.table_1(cell), style.colour(k)) for cell in cells])
         style.label_panel(axes, style.gamma_label(gamma))
     for axes in figure.panels[len(shown) :]:
         axes.set_axis_off()
@@ -89,7 +88,7 @@ def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
             cells = data.finished([hurst], [gamma])
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
             errorbar(axes, m2, cells, name, unit, k, f"H = {hurst:g}")
-            _stars(axes, [(paper.m2(c.hurst), papers_loss(c), style.colour(k)) for c in cells])
+            _stars(axes, [(paper.m2(c.hurst), paper.table_1(c), style.colour(k)) for c in cells])
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
         style.label_panel(axes, style.gamma_label(gamma))
     figure.label("mean square slope $m_2$", label)
@@ -108,7 +107,7 @@ def _stars(axes: Axes, values: list[tuple[float | None, float | None, str]]) -> 
 
 def _star_handle(data: Aggregate) -> list[Line2D]:
     """The entry of the paper's values in a legend, if any are drawn."""
-    if all(papers_loss(cell) is None for cell in data.cells if cell.done):
+    if all(paper.table_1(cell) is None for cell in data.cells if cell.done):
         return []
     return [style.key("paper", **_STAR)]
 
@@ -131,14 +130,8 @@ def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
         mean, low, bars = _in_unit(found, 1e-3)
         edge: Any = {"edgecolor": "black", "linewidth": 0.5}
         axes.bar(place, mean, bottom=bottom, color=face, hatch=hatch, label=label, **edge)
-        line: Any = {
-            "fmt": "none",
-            "ecolor": "black",
-            "elinewidth": 0.8,
-            "label": "_",
-            "capsize": style.CAP,
-        }
-        axes.errorbar(place + aside, bottom + mean, yerr=bars, **line)
+        line: Any = {"fmt": "none", "ecolor": "black", "elinewidth": 0.8, "capsize": style.CAP}
+        axes.errorbar(place + aside, bottom + mean, yerr=bars, label="_", **line)
         mark_below_zero(axes, (place + aside)[bottom + low < 0], "black")
         bottom = bottom + mean
     above = 1e3 * np.nan_to_num([found.high - found.mean for found in small])

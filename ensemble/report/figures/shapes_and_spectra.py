@@ -5,7 +5,7 @@ Each shows the (H, γ) and the Δ/h_max of the paper's figure, or the nearest th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,10 @@ from adhesis.ensemble.report.paper import PaperFigure
 from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, FieldPlan, field_plan
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
+
+Places = NDArray[np.intp]
+# Of spectra: the cell, a text behind its name, and branch, state, label and look of each line.
+Panel = tuple[AveragedCell | None, str, Sequence[tuple[int, int, str, dict[str, Any]]]]
 
 _LEAST_DENSITY = 1e-6
 # Shapes on fewer nodes are interpolated, with so many nodes beyond the ends of a part.
@@ -53,15 +57,20 @@ def shapes(data: Aggregate) -> style.PublishedFigure:
     figure = style.new_figure(
         len(chosen), 2, style.TWO_COLUMNS, height, sharex="col", gridspec_kw=ratios
     )
-    everywhere = np.arange(cell.plan.position.size)
-    window = _window(cell, shape)
+    nodes, top = cell.plan.position.size, int(np.argmax(shape.height))
+    # one and a half of the longest waves around the highest point, across the ends
+    half = min(max(4, round(0.75 * nodes / cell.campaign.profile.n0)), nodes // 2)
+    parts = (np.arange(nodes), np.arange(top - half, top + half))
     for (whole, detail), k in zip(figure.rows, chosen, strict=True):
-        for axes, part in ((whole, everywhere), (detail, window)):
-            _draw_shape(axes, cell.plan.position, shape, k, part)
+        # in contact v = h - s, elsewhere v > h - s
+        separation = np.max(shape.height - shape.displacement[:, k], axis=-1)
+        for axes, part in zip((whole, detail), parts, strict=True):
+            _draw_shape(axes, cell.plan.position, shape, k, separation, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
-        depth, separations = _depth(data, cell, k), _separations(shape, k)
-        style.label_panel(whole, f"{_cell_label(cell)}, {depth}, $s$ = {separations}")
+        texts = dict.fromkeys(f"{1e6 * s:.2f}" for s in separation if np.isfinite(s))
+        state = f"{_depth(data, cell, k)}, $s$ = {' and '.join(texts)} µm"
+        style.label_panel(whole, f"{_cell_label(cell)}, {state}")
         style.label_panel(detail, "detail")
     figure.label("position $x$ (mm)", "height (µm)")
     handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h$")]
@@ -72,27 +81,22 @@ def shapes(data: Aggregate) -> style.PublishedFigure:
 
 def spectra_of_branches(data: Aggregate) -> style.PublishedFigure:
     """Fig. 4: spectral density of profile and deformed surface on both branches at one state."""
-    cells = cells_of(data, paper.FIGURE_4)
-    figure = style.new_figure(
-        len(cells), 1, style.ONE_COLUMN, (16 + 52 * len(cells)) * style.MM, sharex=True
-    )
-    for (axes,), cell in zip(figure.rows, cells, strict=True):
+    panels: list[Panel] = []
+    for cell in cells_of(data, paper.FIGURE_4):
         k = state_of(cell.plan, paper.FIGURE_4)
-        for b, branch in enumerate(BRANCHES):
-            _spectrum(axes, cell, b, k, label=branch, **_look_of(branch))
-        _finish_spectra(axes, cell, f", {_depth(data, cell, k)}")
-    _label_spectra(figure, [style.key(b, **_look_of(b)) for b in BRANCHES])
-    return figure
+        lines = [(b, k, branch, _look_of(branch)) for b, branch in enumerate(BRANCHES)]
+        panels.append((cell, f", {_depth(data, cell, k)}", lines))
+    return _spectra(panels, [style.key(b, **_look_of(b)) for b in BRANCHES])
 
 
 def spectra_on_loading(data: Aggregate) -> style.PublishedFigure:
     """Fig. 5(a): spectral density of profile and deformed surface on loading, state by state."""
-    return _spectra(data, 0)
+    return _spectra_of_branch(data, 0)
 
 
 def spectra_on_unloading(data: Aggregate) -> style.PublishedFigure:
     """Fig. 5(b): the same on unloading."""
-    return _spectra(data, 1)
+    return _spectra_of_branch(data, 1)
 
 
 def gap_density(data: Aggregate) -> style.PublishedFigure:
@@ -153,24 +157,17 @@ def shown_penetrations(data: Aggregate, most: int) -> list[int]:
     return style.spread_out(range(data.cells[0].plan.penetration.size)[::-1], most)
 
 
-def _spectra(data: Aggregate, b: int) -> style.PublishedFigure:
-    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
-    figure = style.new_figure(
-        len(hursts), 1, style.ONE_COLUMN, (16 + 52 * len(hursts)) * style.MM, sharex=True
-    )
+def _spectra_of_branch(data: Aggregate, b: int) -> style.PublishedFigure:
+    """Spectral densities on one branch, a panel for each H."""
     chosen = shown_penetrations(data, 3)
-    for (axes,), hurst in zip(figure.rows, hursts, strict=True):
+    looks = [{**style.look(n), "linestyle": style.LINES[n]} for n in range(len(chosen))]
+    panels: list[Panel] = []
+    for hurst in style.spread_out(data.hursts, style.MOST_PANELS):
         cell = cell_of_hurst(data, hurst, paper.FIGURE_5)
-        if cell is None:
-            continue
-        for place, k in enumerate(chosen):
-            label = f"{cell.plan.penetration[k]:.2f}"
-            _spectrum(
-                axes, cell, b, k, label=label, linestyle=style.LINES[place], **style.look(place)
-            )
-        _finish_spectra(axes, cell)
-    _label_spectra(figure, _penetration_handles(data, chosen))
-    return figure
+        depths = [] if cell is None else [f"{cell.plan.penetration[k]:.2f}" for k in chosen]
+        lines = [(b, *line) for line in zip(chosen, depths, looks, strict=False)]
+        panels.append((cell, "", lines))
+    return _spectra(panels, _penetration_handles(data, chosen))
 
 
 def _look_of(branch: str) -> dict[str, Any]:
@@ -178,95 +175,59 @@ def _look_of(branch: str) -> dict[str, Any]:
     return {"color": _COLOUR_OF_BRANCH[branch], "linestyle": style.LINE_OF_BRANCH[branch]}
 
 
-def _spectrum(axes: Axes, cell: AveragedCell, b: int, k: int, **options: Any) -> None:
-    """Draw the spectrum of one state, unless no realisation is in contact there."""
-    values = cell.fields.psd_displacement[b, k]
-    if np.any(values > 0):
-        y = np.where(values > 0, values, np.nan)
-        axes.loglog(cell.plan.wave_number, y, markersize=2, markevery=4, **options)
-
-
-def _finish_spectra(axes: Axes, cell: AveragedCell, state: str = "") -> None:
-    """Add the rigid profile and the reference slopes to a panel, and its labels."""
-    present = cell.plan.filled
-    rigid = cell.fields.psd_height[present]
-    q = cell.plan.wave_number[present]
-    axes.loglog(q, rigid, color="0.55", linewidth=2, label="rigid", zorder=1.5)
-    # q^-(2H+1) below and q^-(2+H) above the data, over the profile's own wave numbers
-    ends = np.array([q[0], q[-1]])
-    for exponent, factor, line in ((2 * cell.hurst + 1, 0.2, ":"), (2 + cell.hurst, 5.0, "-.")):
-        slope = factor * rigid[0] * (ends / q[0]) ** -exponent
-        axes.loglog(ends, slope, linestyle=line, label=f"slope {-exponent:.1f}", **_SLOPE)
-    style.label_panel(axes, f"{_cell_label(cell)}{state}")
-
-
-def _label_spectra(figure: style.PublishedFigure, handles: list[Line2D]) -> None:
+def _spectra(panels: Sequence[Panel], handles: list[Line2D]) -> style.PublishedFigure:
+    """Draw states over the rigid profile and the reference slopes; nothing without a cell."""
+    height = (16 + 52 * len(panels)) * style.MM
+    figure = style.new_figure(len(panels), 1, style.ONE_COLUMN, height, sharex=True)
+    for axes, (cell, state, lines) in zip(figure.panels, panels, strict=True):
+        if cell is None:
+            continue
+        for b, k, label, look in lines:
+            values = cell.fields.psd_displacement[b, k]
+            if np.any(values > 0):  # else no realisation is in contact
+                y = np.where(values > 0, values, np.nan)
+                options = {"markersize": 2, "markevery": 4, "label": label}
+                axes.loglog(cell.plan.wave_number, y, **options, **look)
+        present = cell.plan.filled
+        q, rigid = cell.plan.wave_number[present], cell.fields.psd_height[present]
+        axes.loglog(q, rigid, color="0.55", linewidth=2, label="rigid", zorder=1.5)
+        # q^-(2H+1) below and q^-(2+H) above the data, over the profile's own wave numbers
+        ends = np.array([q[0], q[-1]])
+        for exponent, factor, line in ((2 * cell.hurst + 1, 0.2, ":"), (2 + cell.hurst, 5.0, "-.")):
+            slope = factor * rigid[0] * (ends / q[0]) ** -exponent
+            axes.loglog(ends, slope, linestyle=line, label=f"slope {-exponent:.1f}", **_SLOPE)
+        style.label_panel(axes, f"{_cell_label(cell)}{state}")
     style.plain_decades(figure.panels)
     figure.label("wave number $q$ (rad/m)", r"spectral density $C(q)$ (m³)")
-    slopes = [
-        style.key("$q^{-(2H+1)}$", ls=":", **_SLOPE),
-        style.key("$q^{-(2+H)}$", ls="-.", **_SLOPE),
-    ]
-    figure.legend_above(
-        [style.key("rigid profile", color="0.55", linewidth=2), *handles, *slopes], 3
-    )
+    profile = style.key("rigid profile", color="0.55", linewidth=2)
+    slopes = {"$q^{-(2H+1)}$": ":", "$q^{-(2+H)}$": "-."}
+    keys = [style.key(name, ls=line, **_SLOPE) for name, line in slopes.items()]
+    figure.legend_above([profile, *handles, *keys], 3)
+    return figure
 
 
 def _draw_shape(
-    axes: Axes, position: Array, shape: DeformedShape, k: int, part: NDArray[np.intp]
+    axes: Axes, position: Array, shape: DeformedShape, k: int, separation: Array, part: Places
 ) -> None:
     """Draw the nodes ``part``, counted on beyond the period where they exceed it.
 
-    Each surface stands above the profile by its own gap.
+    Each surface stands above the profile by its own gap. Few nodes, which would show as a polygon,
+    are interpolated.
     """
-    factor = -(-_FEWEST_NODES // position.size)
-    x = 1e3 * _between(part, factor) * (position[1] - position[0])
-    rigid = 1e6 * _refined(CubicSpline, shape.height, part, factor)
+    wide = np.arange(part[0] - _BEYOND, part[-1] + _BEYOND + 1)
+    inside, fine = wide % position.size, -(-_FEWEST_NODES // position.size)
+    nodes = np.linspace(part[0], part[-1], fine * (part.size - 1) + 1)
+    x = 1e3 * nodes * (position[1] - position[0])
+    rigid = 1e6 * CubicSpline(wide, shape.height[inside])(nodes)
     axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
     axes.plot(x, rigid, color="0.4", linewidth=0.5, label="rigid")
     for b, branch in enumerate(BRANCHES):
-        gap = shape.displacement[b, k] - shape.height + _separation(shape, b, k)
+        gap = shape.displacement[b, k] - shape.height + separation[b]
         if np.all(np.isfinite(gap)):
             # monotone between nodes: contact stays contact, and nothing overlaps
-            surface = rigid + 1e6 * _refined(PchipInterpolator, gap, part, factor)
+            surface = rigid + 1e6 * PchipInterpolator(wide, gap[inside])(nodes)
             axes.plot(x, surface, linewidth=0.9, label=branch, **_look_of(branch))
     axes.set_xlim(x[0], x[-1])
-
-
-def _separation(shape: DeformedShape, b: int, k: int) -> float:
-    """Return the separation s in m of a state in contact: there v = h - s, elsewhere v > h - s."""
-    return float(np.max(shape.height - shape.displacement[b, k]))
-
-
-def _separations(shape: DeformedShape, k: int) -> str:
-    """Return the separation of both branches, once if they are alike: "0.45 µm"."""
-    found = [_separation(shape, b, k) for b in range(len(BRANCHES))]
-    texts = [f"{1e6 * s:.2f}" for s in found if np.isfinite(s)]
-    return f"{' and '.join(dict.fromkeys(texts))} µm"
-
-
-def _between(part: NDArray[np.intp], factor: int) -> Array:
-    """Return ``factor`` places for each node of a part, in units of the spacing."""
-    return np.linspace(part[0], part[-1], factor * (part.size - 1) + 1)
-
-
-def _refined(
-    interpolator: Callable[[Array, Array], Callable[[Array], Array]],
-    values: Array,
-    part: NDArray[np.intp],
-    factor: int,
-) -> Array:
-    """Interpolate periodic values to :func:`_between`, where few nodes would show as a polygon."""
-    wide = np.arange(part[0] - _BEYOND, part[-1] + _BEYOND + 1)
-    return interpolator(wide.astype(float), values[wide % values.size])(_between(part, factor))
-
-
-def _window(cell: Cell, shape: DeformedShape) -> NDArray[np.intp]:
-    """Nodes of one and a half of the longest waves around the highest point, across the ends."""
-    nodes = cell.plan.position.size
-    half = min(max(4, round(0.75 * nodes / cell.campaign.profile.n0)), nodes // 2)
-    top = int(np.argmax(shape.height))
-    return np.arange(top - half, top + half, dtype=np.intp)
 
 
 def _penetration_handles(

@@ -77,7 +77,7 @@ def losses(data: Aggregate) -> Table:
             "beside it",
         ),
         TableColumn(
-            *("loss_dimensionless_paper", papers_loss, "paper", fixed(2)),
+            *("loss_dimensionless_paper", paper.table_1, "paper", fixed(2)),
             only_if_any=True,
             last=True,
             note=f"paper: {paper.REFERENCE}, Table 1, – where it gives none",
@@ -202,45 +202,32 @@ def precision(data: Aggregate) -> Table:
     return make_table("Precision of the mean ([stop])", columns, steered)
 
 
-def papers_loss(cell: Cell) -> float | None:
-    """Value of the paper's Table 1, None where it gives none or the cell is not its own."""
-    if not paper.is_cell_of(cell):
-        return None
-    return paper.table_1(cell.hurst, cell.work_of_adhesion)
-
-
 def beside_the_paper(data: Aggregate) -> Table:
     """The paper's Table 1, cell by cell; no rows for others than the paper's."""
     columns = [
         *key_columns(data),
         TableColumn("n", "done", "n"),
         *estimated("loss_dimensionless", "value ci_low ci_high", "W~"),
-        TableColumn("paper", papers_loss, "paper", fixed(2)),
+        TableColumn("paper", paper.table_1, "paper", fixed(2)),
         TableColumn(
             *("deviation", off_the_paper),
             *("W~ off the paper by", partial(rounded_percent, sign="+")),
         ),
         TableColumn("inside", inside_interval, "paper in the interval"),
     ]
-    cells = [
-        cell
-        for cell in data.cells
-        if cell.done
-        and paper.is_cell_of(cell)
-        and paper.has_cell(cell.hurst, cell.work_of_adhesion)
-    ]
+    cells = [cell for cell in data.cells if cell.done and paper.has_place(cell)]
     return make_table("Beside the paper's Table 1", columns, cells)
 
 
 def off_the_paper(cell: Cell) -> float | None:
     """Return the relative deviation of the mean loss from the paper's; None without either."""
-    value = papers_loss(cell) if cell.done else None
+    value = paper.table_1(cell) if cell.done else None
     return None if value is None else cell.estimates["loss_dimensionless"].mean / value - 1
 
 
 def inside_interval(cell: Cell) -> str | None:
     """Whether the paper's value lies in the interval of the mean; None if either is unknown."""
-    value, loss = papers_loss(cell), cell.estimates["loss_dimensionless"]
+    value, loss = paper.table_1(cell), cell.estimates["loss_dimensionless"]
     if value is None or np.isnan(loss.low):
         return None
     return "yes" if loss.low <= value <= loss.high else "no"
@@ -319,7 +306,7 @@ def companions(data: Aggregate) -> Table:
         *estimated("difference", _DIFFERENCE, "difference", number(3), of="loss.difference"),
         TableColumn(
             "loss_dimensionless_paper",
-            lambda row: papers_loss(row["cell"]) if paper.is_cell_of(row["other"]) else None,
+            lambda row: paper.table_1(row["cell"]) if paper.is_cell_of(row["other"]) else None,
             *("paper", fixed(2)),
             only_if_any=True,
         ),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -261,7 +261,10 @@ def step_of_header(
     """
     steps: list[float] = []
     for line in header:
-        *parts, whole = (_step(part, decimal, counts) for part in _parts(line, decimal))
+        line = line.replace('"', "")
+        statements = re.split(r"[;\t]|,\s|\s{2,}", line)
+        statements.append(re.sub(r"[;\t]" if decimal == "," else r"[;\t,]", " ", line))
+        *parts, whole = (_step(statement, decimal, counts) for statement in statements)
         for step in filter(None, parts if any(parts) else [whole]):
             if all(abs(step / known - 1) > 1e-9 for known in steps):
                 steps.append(step)
@@ -272,13 +275,6 @@ def step_of_header(
             "distance of two points"
         )
     return steps[0] if steps else None
-
-
-def _parts(line: str, decimal: str) -> Iterator[str]:
-    """Return statements of a line: between its delimiters, and all of it."""
-    line = line.replace('"', "")
-    yield from re.split(r"[;\t]|,\s|\s{2,}", line)
-    yield re.sub(r"[;\t]" if decimal == "," else r"[;\t,]", " ", line)
 
 
 def _step(text: str, decimal: str, counts: bool) -> float | None:

@@ -156,11 +156,16 @@ def _line(
             f"its rows, 0 to {rows - 1}, as the trace"
         )
     row = row or 0
-    if not 0 <= row < rows:
-        raise InputError(f"{parameter('row')} is {row}: {source} has the rows 0 to {rows - 1}")
+    check_row(str(source), row, rows)
     step = topography.physical_sizes[0] / points
     where = f", row {row} of {rows}" if rows > 1 else ""
     return step * np.arange(points), heights[:, row], where
+
+
+def check_row(name: str, row: int, rows: int) -> None:
+    """Refuse a row beyond those of a map (InputError)."""
+    if row >= rows:
+        raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {rows - 1}")
 
 
 def _tip_radius(topography: Any) -> float | None:

@@ -19,7 +19,7 @@ from adhesis.ensemble.trace.reading.header_units import (
     step_of_header,
     units_of_header,
 )
-from adhesis.ensemble.trace.reading.instrument import HINT, available, read_scan
+from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
 from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table
@@ -110,7 +110,18 @@ class Trace(ByValue):
             object.__setattr__(self, "step", step)
             if self.tip_radius is not None:
                 checks.real(parameter("tip_radius"), self.tip_radius, _TIP_RADIUS)
-        self._check()
+        good = self.heights[np.isfinite(self.heights)]
+        if good.size < MIN_POINTS:
+            raise InputError(f"{self.source} holds {good.size} heights: at least {MIN_POINTS}")
+        if np.ptp(good) == 0:
+            raise InputError(
+                f"{self.source}: every height is {good[0]:g} m: a flat trace has no loss"
+            )
+        if not _SHORTEST <= self.length <= _LONGEST:
+            raise InputError(
+                f"{self.source} would be {self.length:.3g} m long: is its unit right "
+                f"({parameter('unit')})?"
+            )
         super().__post_init__()
 
     def __repr__(self) -> str:
@@ -145,21 +156,6 @@ class Trace(ByValue):
     def height_range(self) -> float:
         """Highest less lowest height, in m."""
         return float(np.nanmax(self.heights) - np.nanmin(self.heights))
-
-    def _check(self) -> None:
-        """Raise unless it can be a trace of a rough surface, in m."""
-        good = self.heights[np.isfinite(self.heights)]
-        if good.size < MIN_POINTS:
-            raise InputError(f"{self.source} holds {good.size} heights: at least {MIN_POINTS}")
-        if np.ptp(good) == 0:
-            raise InputError(
-                f"{self.source}: every height is {good[0]:g} m: a flat trace has no loss"
-            )
-        if not _SHORTEST <= self.length <= _LONGEST:
-            raise InputError(
-                f"{self.source} would be {self.length:.3g} m long: is its unit right "
-                f"({parameter('unit')})?"
-            )
 
 
 def read_trace(
@@ -480,14 +476,9 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
                     f"the first {what} of {name} rises or falls throughout, as positions do: "
                     f"remove it, and give {parameter('step')}"
                 )
-    _check_row(name, row, table.columns.shape[1])
+    check_row(name, row, table.columns.shape[1])
     notes.append(f"row {row} of {table.columns.shape[1]}, of {len(table.filled)} heights each")
     return table.columns[list(table.filled), row].reshape(1, -1)
-
-
-def _check_row(name: str, row: int, rows: int) -> None:
-    if row >= rows:
-        raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {rows - 1}")
 
 
 def _scan_line(
@@ -512,7 +503,7 @@ def _scan_line(
             f"{parameter('row')} is {row}: {name} is no map, as its positions do not begin anew on "
             f"each line ({parameter('columns')} chooses columns)"
         )
-    _check_row(name, row, count)
+    check_row(name, row, count)
     notes.append(f"row {row} of {count}, of {points} points each")
     part = slice(row * points, (row + 1) * points)
     return columns[:, part], lines[part]
@@ -614,14 +605,10 @@ def _units(
         )
     if _sure_to_be_metres(columns, step):
         return ("m", "m"), "numbers"
-    x = columns[0]
-    size = (
-        f"positions from {np.nanmin(x):g} to {np.nanmax(x):g}"
-        if len(columns) > 1
-        else (f"heights from {np.nanmin(x):g} to {np.nanmax(x):g}")
-    )
+    low, high = np.nanmin(columns[0]), np.nanmax(columns[0])
     raise InputError(
-        f"{name} states no unit, and {size} need not be metres: give {parameter('unit')}, as in um"
+        f"{name} states no unit, and {_KINDS[2 - len(columns)]} from {low:g} to {high:g} need not "
+        f"be metres: give {parameter('unit')}, as in um"
     )
 
 
