@@ -87,8 +87,10 @@ def measure(run: Run) -> Measurement:
     return Measurement(**json.loads(child.stdout))
 
 
-def _measure_here(run: Run) -> Measurement:
-    """Run and measure in this process, and end it when ``run.seconds`` are over."""
+def main() -> None:
+    """Measure the run in the first argument in this process; end it when its seconds are over."""
+    fields = json.loads(sys.argv[1])
+    run = Run(**{**fields, "scene": Scene(**fields["scene"])})
     _limit(_START_LIMIT)
     setting, steps = _WARM_UP_SETTING[run.method], WARM_UP.load_steps
     _loop(replace(run, scene=WARM_UP, setting=setting, load_steps=steps))
@@ -96,13 +98,14 @@ def _measure_here(run: Run) -> Measurement:
     _limit(run.seconds)
     started = process_time()
     loop = _loop(run)
-    return Measurement(
+    measured = Measurement(
         *(process_time() - started, peak_megabytes(), before),
         *(loop.loss, loop.loss_dimensionless, loop.audit_residual),
         solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
         jumps=len(loop.jumps),
         patches=int(loop.patches.max()),
     )
+    print(json.dumps(asdict(measured)))
 
 
 def _loop(run: Run) -> LoopResult:
@@ -131,13 +134,6 @@ def peak_megabytes() -> float:
     except (OSError, StopIteration):
         unit = 1024**2 if sys.platform == "darwin" else 1024
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-
-
-def main() -> None:
-    """Measure the run in the first argument."""
-    fields = json.loads(sys.argv[1])
-    run = Run(**{**fields, "scene": Scene(**fields["scene"])})
-    print(json.dumps(asdict(_measure_here(run))))
 
 
 if __name__ == "__main__":

@@ -45,8 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
-    from adhesis.ensemble.bench.bench_page import COLUMNS, page
-    from adhesis.ensemble.bench.equal_error import benchmark, ratios
+    from adhesis.ensemble.bench.benchmark import COLUMNS, benchmark, page
     from adhesis.ensemble.bench.scenes import FULL, QUICK
     from adhesis.ensemble.report.tables.table import make_table
     from adhesis.ensemble.versions import processor
@@ -63,7 +62,7 @@ def execute(args: argparse.Namespace) -> int:
             show_run(None, None, f"{run.scene.title}: {run.method}, {run.described}")
     machine = f"one core of {processor()}, Python {platform.python_version()}"
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
-    text = page(lines, ratios(lines), f"`{command}` on {machine}")
+    text = page(lines, f"`{command}` on {machine}")
     print(text)
     from adhesis.ensemble.bench.bench_figure import draw  # matplotlib, when all is measured
     from adhesis.ensemble.report.figures.style import save
