@@ -17,7 +17,13 @@ from dataclasses import asdict, dataclass, replace
 from time import process_time
 
 from adhesis.ensemble.bench.scenes import WARM_UP, Scene
-from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
+from adhesis.ensemble.run.launch import (
+    ONE_THREAD,
+    end_with_parent,
+    peak_bytes,
+    python,
+    python_environment,
+)
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.registry import MethodName, make_method
@@ -29,6 +35,7 @@ _GRID_ACCURACY = 1e-3
 _WARM_UP_SETTING = {"grid": 8, "sharp": 1e-2}
 # CPU seconds for start and warm-up, before the limit of the run applies.
 _START_LIMIT = 300.0
+_MB = 2**20
 
 
 @dataclass(frozen=True)
@@ -94,12 +101,12 @@ def main() -> None:
     _limit(_START_LIMIT)
     setting, steps = _WARM_UP_SETTING[run.method], WARM_UP.load_steps
     _loop(replace(run, scene=WARM_UP, setting=setting, load_steps=steps))
-    before = peak_megabytes()
+    before = peak_bytes()
     _limit(run.seconds)
     started = process_time()
     loop = _loop(run)
     measured = Measurement(
-        *(process_time() - started, peak_megabytes(), before),
+        *(process_time() - started, peak_bytes() / _MB, before / _MB),
         *(loop.loss, loop.loss_dimensionless, loop.audit_residual),
         solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
         jumps=len(loop.jumps),
@@ -122,18 +129,6 @@ def _limit(seconds: float) -> None:
     """End this process after so many more seconds of CPU time (rounded up)."""
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(process_time() + seconds), hard))
-
-
-def peak_megabytes() -> float:
-    """Return the largest resident memory of this process so far, in MB (2²⁰ bytes)."""
-    try:
-        # getrusage also counts the memory of the parent when it started this process.
-        with open("/proc/self/status") as status:
-            peak = next(line for line in status if line.startswith("VmHWM:"))
-        return int(peak.split()[1]) / 1024
-    except (OSError, StopIteration):
-        unit = 1024**2 if sys.platform == "darwin" else 1024
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
 if __name__ == "__main__":

@@ -44,13 +44,15 @@ def compare(old: Campaign, new: Campaign) -> Changes:
     return Changes(tuple(grown), tuple(other))
 
 
-def growth(path: object, old: Campaign, new: Campaign) -> tuple[str, ...]:
+def growth(
+    path: object, old: Campaign, new: Campaign, here: object = "this campaign"
+) -> tuple[str, ...]:
     """Return the keys by which the campaign of a results file grew; InputError for another one."""
     changes = compare(old, new)
     if changes.other:
         raise InputError(
-            f"{path} holds another campaign: {'; '.join(changes.other)} "
-            "(here: this campaign, there: the file)"
+            f"{path} holds another campaign than {here}: {'; '.join(changes.other)} "
+            f"(here: {here}, there: {path})"
         )
     return changes.grown
 

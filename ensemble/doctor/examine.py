@@ -8,11 +8,11 @@ so that a broken MPI cannot hang the caller, and the caller's environment cannot
 from __future__ import annotations
 
 import json
-import socket
 import subprocess
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ class Diagnosis:
     mpirun: str
     mpirun_version: str
     versions: dict[str, str]
-    checks: list[Check] = field(default_factory=list)
+    checks: list[Check]
 
     @property
     def usable(self) -> bool:
@@ -63,13 +63,10 @@ class Diagnosis:
 
 def examine(directory: Path | str | None = None) -> Diagnosis:
     """Run all checks; ranks write a file in ``directory``, or where temporary files are."""
-    checks = [_loopback()]
     alone = _run_probe([], directory)
     found = alone.reports[0] if alone.reports else {}
     texts = found.get("versions") or installed()
-    checks.append(_libraries(alone, texts))
-    checks.append(kernels())
-
+    checks = [_libraries(alone, texts), _kernels()]
     mpi_loads = bool(found.get("mpi_loads"))
     mpirun = launcher()
     together: _Probe | None = None
@@ -90,12 +87,9 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     else:
         written = _writing(together)
         checks.append(written)
-        writer = "mpio" if written.ok else "rank 0"
-        why = (
-            "h5py has parallel HDF5, and ranks wrote a file together"
-            if written.ok
-            else written.text
-        )
+        writer, why = "rank 0", written.text
+        if written.ok:
+            writer, why = "mpio", "h5py has parallel HDF5, and ranks wrote a file together"
     return Diagnosis(
         versions=texts,
         cores=cores(),
@@ -132,8 +126,11 @@ def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
                 # of several processes, the first page has the reason, of one the last lines
                 lines = first_lines(output) if launch else last_lines(output)
                 failure = f"ended with {code}: {lines}"
-            reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
-            return _Probe([report for report in reports if report], failure)
+            reports = []
+            for path in sorted(Path(scratch).glob("report-*.json")):
+                with suppress(OSError, ValueError):  # the process ended while it wrote
+                    reports.append(json.loads(path.read_text()))
+            return _Probe(reports, failure)
     except (OSError, WriteError) as error:
         return _Probe([], f"cannot be started: {error}")
 
@@ -165,24 +162,6 @@ def _run(command: list[str]) -> tuple[int | None, str]:
     return process.returncode, output
 
 
-def _read_report(path: Path) -> dict[str, Any]:
-    try:
-        report: dict[str, Any] = json.loads(path.read_text())
-    except (OSError, ValueError):  # the process ended while it wrote
-        return {}
-    return report
-
-
-def _loopback() -> Check:
-    try:
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            socket.create_connection(server.getsockname(), timeout=5).close()
-    except OSError as error:
-        text = f"127.0.0.1 cannot be reached ({error}); launchers reach their ranks through it"
-        return Check("loopback", False, text, needed=False)
-    return Check("loopback", True, "up")
-
-
 def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
     if not probe.reports:
         return Check("libraries", False, f"a process that loads them {probe.failure}")
@@ -192,8 +171,7 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
     return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
 
 
-def kernels() -> Check:
-    """Check that the compiled kernels load, and report what made them."""
+def _kernels() -> Check:
     try:
         from adhesis.solver import _kernels
     except ImportError as error:

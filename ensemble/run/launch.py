@@ -73,6 +73,18 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def peak_bytes() -> int:
+    """Return the largest resident memory of this process so far."""
+    try:
+        # getrusage also counts the memory of the parent when it started this process.
+        with open("/proc/self/status") as status:
+            peak = next(line for line in status if line.startswith("VmHWM:"))
+        return 1024 * int(peak.split()[1])
+    except (OSError, StopIteration):
+        unit = 1 if sys.platform == "darwin" else 1024
+        return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
 def launcher() -> str | None:
     """Find this installation's ``mpirun``: ``$MPIRUN``, that of set-up, or the one in PATH."""
     recorded, beside = Path(sys.prefix, "mpirun"), Path(sys.executable).parent

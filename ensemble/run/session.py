@@ -90,7 +90,11 @@ def run_campaign(
             raise
         origins = [""] * size
         if plan.rows:
-            origins = _origins(comm, size)
+            # The last bits of a rank's rows depend on versions and processor. All ranks run one
+            # installation, on nodes that may differ; processes that this one starts have its own.
+            known = together(comm, versions)
+            processors = comm.allgather(processor()) * (size // comm.size)
+            origins = [origin_of(known | {"processor": name}) for name in processors]
         own_rows = comm.size > 1 and engine.all_write
         if own_rows and comm.rank > 0:
             lock.join()
@@ -102,17 +106,6 @@ def run_campaign(
         with engine.watch():
             stopped = session.run(comm, own_rows)
     return together(comm, lambda: session.summary(stopped))
-
-
-def _origins(comm: Any, size: int) -> list[str]:
-    """Return versions and processor of each rank, on which the last bits of its rows depend.
-
-    All ranks run one installation, but nodes may have different processors; processes that this one
-    starts have its own.
-    """
-    known = together(comm, versions)
-    processors = comm.allgather(processor()) * (size // comm.size)
-    return [origin_of(known | {"processor": name}) for name in processors]
 
 
 @dataclass(frozen=True)

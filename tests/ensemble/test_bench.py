@@ -10,9 +10,10 @@ import pytest
 import adhesis.ensemble.bench.benchmark as benchmarking
 from adhesis.ensemble.bench.bench_figure import draw
 from adhesis.ensemble.bench.benchmark import Line, Reference, benchmark, page
-from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
+from adhesis.ensemble.bench.measure import Measurement, Run, measure
 from adhesis.ensemble.bench.scenes import ONE_WAVE, SMALL_ROUGH, TWO_WAVES
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.run.launch import peak_bytes
 
 REFERENCE = Reference(1.0, "made up")
 
@@ -39,7 +40,7 @@ def test_one_wave_is_measured_against_its_exact_loss():
     assert measured.loss == pytest.approx(ONE_WAVE.exact_loss, rel=error)
     assert abs(measured.audit_residual) < error
     assert 0 < measured.cpu_seconds < 30
-    assert 20 < measured.megabytes_before <= measured.megabytes < 370 < peak_megabytes()
+    assert 20 < measured.megabytes_before <= measured.megabytes < 370 < peak_bytes() / 2**20
     assert ballast[0] == 1
     assert (measured.jumps, measured.patches) == (2, 1)
     assert measured.solutions > 10
