@@ -332,7 +332,6 @@ class Campaign:
     output: OutputTable
     stop: StopTable = StopTable()
     lists: tuple[tuple[Table, str, tuple[Value, ...]], ...] = ()
-    finest: int = field(default=0, compare=False, repr=False)
     text: str = field(default="", compare=False, repr=False)
     _at: dict[tuple[tuple[str, Value], ...], Campaign] = field(
         default_factory=dict, init=False, compare=False, repr=False
@@ -366,9 +365,7 @@ class Campaign:
 
     @property
     def finest_harmonic(self) -> int:
-        """Highest harmonic of all profiles, also of those of the campaign that :meth:`at` cut."""
-        if self.finest:
-            return self.finest
+        """Highest harmonic of all profiles."""
         names = [axis.name for axis in self.axes]
         here = {"n0": self.profile.n0, "ratio": self.profile.ratio}
         waves = [here | dict(zip(names, cell, strict=True)) for cell in self.cells]
@@ -403,8 +400,7 @@ class Campaign:
                 last = self.cycle.load_steps + 1 - self.unloading_penetration.size
                 until = cycle.turning_point * last / cycle.load_steps
                 tables["cycle"] = replace(cycle, unloading_until=until)
-            finest = self.finest_harmonic
-            self._at[task.others] = replace(self, sweep=sweep, lists=(), finest=finest, **tables)
+            self._at[task.others] = replace(self, sweep=sweep, lists=(), **tables)
         return self._at[task.others]
 
     @cached_property

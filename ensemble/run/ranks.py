@@ -1,7 +1,7 @@
 """Use MPI: messages, an honest count of ranks, no rank left waiting.
 
 The only module of a run that imports mpi4py, and only inside its functions: one process runs where
-there is no MPI (:mod:`adhesis.ensemble.doctor.probe`, in processes of its own, tries MPI out).
+there is no MPI (:mod:`adhesis.ensemble.doctor.examine`, in processes of its own, tries MPI out).
 """
 
 from __future__ import annotations
