@@ -16,8 +16,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Self
 
 from adhesis.ensemble.exit_codes import ended_by
-from adhesis.ensemble.run.attempt import Compute
-from adhesis.ensemble.run.dispatch import MASTER, REPORT_INTERVAL, Limits, Message, Worker
+from adhesis.ensemble.run.dispatch import MASTER, REPORT_INTERVAL, Compute, Limits, Message, Worker
 from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
 
 _TO_END = 10.0  # s for a process to end once its socket is closed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,10 +19,10 @@ from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
-from adhesis.ensemble.run.attempt import Outcome, StopCheck
+from adhesis.ensemble.run.dispatch import Outcome, StopCheck
 from adhesis.ensemble.run.interrupt import GRACE, StopSignals
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
+from adhesis.ensemble.run.plan import Options, Plan, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
@@ -140,9 +140,6 @@ class _Session:
         self._ends = None if deadline is None else deadline.at - time.time() + self._started
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Summary(total, plan.done, plan.failed)
-        self._groups: Mapping[int, Group] = {
-            row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
-        }
         self._compute = _Computing(campaign, plan.tasks, engine.compute)
         self._limits = dispatch.Limits(
             stop=self._stop,
@@ -194,9 +191,7 @@ class _Session:
                     + ("; Ctrl-C again ends at once" if self.signals.received == "SIGINT" else "")
                 )
 
-        master = dispatch.Master(
-            channel, schedule, self._groups, collect, self._limits, halted=halted
-        )
+        master = dispatch.Master(channel, schedule, collect, self._limits, halted=halted)
         with progress:
             return master.run()
 
@@ -245,12 +240,11 @@ class _Session:
 
     def _schedule(self) -> Schedule:
         tasks = self.plan.tasks
-        priors: dict[Hashable, float] = {
-            self._groups[row]: prior(task) for row, task in enumerate(tasks)
-        }
+        groups = {row: group_of(self.campaign, task) for row, task in enumerate(tasks)}
+        priors: dict[Hashable, float] = {groups[row]: prior(task) for row, task in enumerate(tasks)}
         rounds = {row: task.realisation for row, task in enumerate(tasks)}
         branches = {row: self.campaign.branch_of(task) for row, task in enumerate(tasks)}
-        schedule = Schedule(self.plan.rows, self._groups, priors, rounds, branches)
+        schedule = Schedule(self.plan.rows, groups, priors, rounds, branches)
         for group, (seconds, count) in self.plan.times.items():
             schedule.measured(group, seconds, count)
         return schedule

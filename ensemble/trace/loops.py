@@ -9,8 +9,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
-from adhesis.ensemble.run.attempt import Outcome, StopCheck
-from adhesis.ensemble.run.dispatch import Channel, Limits, Master, OwnWorker
+from adhesis.ensemble.run.dispatch import Channel, Limits, Master, Outcome, OwnWorker, StopCheck
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.trace.job import Job, run
@@ -52,11 +51,10 @@ class Loops:
         self.pids: list[int] = []
         expected = seconds or {}
         tasks = range(self.count)
-        self._groups = {task: task for task in tasks}
         priors: dict[Hashable, float] = {
             task: expected.get(self._jobs[task].name, 1.0) for task in tasks
         }
-        self._schedule = Schedule(tasks, self._groups, priors, dict.fromkeys(tasks, 0))
+        self._schedule = Schedule(tasks, dict(enumerate(tasks)), priors, dict.fromkeys(tasks, 0))
         self._master: Master | None = None
 
     @property
@@ -103,6 +101,6 @@ class Loops:
                 channel = started = Processes(self.processes, computing, report_interval=every)
                 stack.enter_context(started)
                 self.pids = started.pids
-            self._master = Master(channel, self._schedule, self._groups, collect, limits, tick)
+            self._master = Master(channel, self._schedule, collect, limits, tick)
             self._master.run()
         return self.done

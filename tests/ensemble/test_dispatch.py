@@ -10,11 +10,11 @@ import time
 import numpy as np
 import pytest
 
-from adhesis.ensemble.run.attempt import Outcome
 from adhesis.ensemble.run.dispatch import (
     REPORT_INTERVAL,
     Limits,
     Master,
+    Outcome,
     OwnWorker,
     Unresponsive,
     Worker,
@@ -111,7 +111,6 @@ def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **
     master = Master(
         channel,
         schedule,
-        group_of,
         collected.append,
         limits(channel) if limits else Limits(),
         clock=channel.clock,
@@ -229,7 +228,7 @@ def scripted_master(channel, tasks, collected=None):
     collected = [] if collected is None else collected
     limits = Limits(silence=120)
     return Master(
-        *(channel, schedule, group_of, collected.append, limits),
+        *(channel, schedule, collected.append, limits),
         clock=channel.clock,
         sleep=channel.sleep,
     )
@@ -309,7 +308,7 @@ def hand_out(channel, tasks, limits=None, tick=lambda: None):
     outcomes: list[Outcome] = []
     schedule = schedule_of(range(tasks), group_of)
     limits = limits or Limits()
-    reason = Master(channel, schedule, group_of, outcomes.append, limits, tick).run()
+    reason = Master(channel, schedule, outcomes.append, limits, tick).run()
     return outcomes, reason
 
 
@@ -421,7 +420,7 @@ def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
     channel = SimulatedRanks(4, seconds)
     collected: list[Outcome] = []
     master = Master(
-        *(channel, schedule, group_of, collected.append, Limits()),
+        *(channel, schedule, collected.append, Limits()),
         clock=channel.clock,
         sleep=channel.sleep,
     )
