@@ -366,10 +366,18 @@ class Campaign:
     @property
     def finest_harmonic(self) -> int:
         """Highest harmonic of all profiles."""
-        names = [axis.name for axis in self.axes]
-        here = {"n0": self.profile.n0, "ratio": self.profile.ratio}
-        waves = [here | dict(zip(names, cell, strict=True)) for cell in self.cells]
-        return max(int(w["n0"] * w["ratio"]) for w in waves)
+        return int(max(n0 * ratio for n0, ratio in self.in_cells("profile.n0", "profile.ratio")))
+
+    def in_cells(self, *keys: str) -> list[tuple[Any, ...]]:
+        """Return the different values that these keys have together in a cell, ascending."""
+        place = {axis.key: number for number, axis in enumerate(self.axes)}
+        columns = [
+            [cell[place[key]] for cell in self.cells]
+            if key in place
+            else [self.value(key)] * len(self.cells)
+            for key in keys
+        ]
+        return sorted(set(zip(*columns, strict=True)))
 
     def has_axis(self, name: str) -> bool:
         """Whether a key ("max_penetration") has several values."""
