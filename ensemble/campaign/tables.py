@@ -7,7 +7,6 @@ Every key has one rule. What a campaign means is here; how its file is read is i
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cached_property
 from operator import attrgetter
@@ -419,15 +418,16 @@ class Campaign:
                 return group[0]
         return None
 
-    def branch_of(self, task: Task) -> Hashable | None:
-        """Return a key of the tasks that share a task's loading branch; None if it has its own.
+    def branch_of(self, task: Task) -> Task:
+        """Return what the tasks that share a task's loading branch have in common.
 
-        They differ in their turning point alone.
+        They differ in their turning point alone, which it is without; the task itself, if it has a
+        branch of its own.
         """
         if self._turning is None:
-            return None
-        rest = tuple(other for other in task.others if other[0] != self._turning.name)
-        return (task.hurst, task.work_of_adhesion, task.realisation, rest)
+            return task
+        name = self._turning.name
+        return replace(task, others=tuple(other for other in task.others if other[0] != name))
 
     def sharing(self, task: Task) -> list[Task]:
         """Return the tasks that share a task's loading branch, by turning point, and it itself."""

@@ -23,7 +23,7 @@ from adhesis.ensemble.results.layout import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.launch import peak_bytes
-from adhesis.ensemble.run.plan import group_of, prior
+from adhesis.ensemble.run.plan import prior
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached
 from adhesis.ensemble.task.row import Row
@@ -240,7 +240,7 @@ def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:
     for _, of_realisation in groupby(tasks, key=attrgetter("realisation")):
         found: dict[Hashable, list[Task]] = {}
         for task in of_realisation:
-            found.setdefault(campaign.branch_of(task) or task, []).append(task)
+            found.setdefault(campaign.branch_of(task), []).append(task)
         yield from sorted(found.values(), key=lambda unit: sum(prior(task) for task in unit))
 
 
@@ -314,6 +314,6 @@ def _longest(campaign: Campaign, cells: tuple[CellPrice, ...]) -> float:
     together: dict[Hashable, float] = {}
     for cell in cells:
         if cell.tasks:
-            key = group_of(campaign, cell.task)
+            key = campaign.branch_of(cell.task)
             together[key] = together.get(key, 0.0) + cell.seconds
     return max(together.values(), default=0.0)

@@ -22,7 +22,7 @@ from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.dispatch import Outcome, StopCheck
 from adhesis.ensemble.run.interrupt import GRACE, StopSignals
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.run.plan import Options, Plan, group_of, prepare, prior
+from adhesis.ensemble.run.plan import Options, Plan, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
@@ -240,10 +240,10 @@ class _Session:
 
     def _schedule(self) -> Schedule:
         tasks = self.plan.tasks
-        groups = {row: group_of(self.campaign, task) for row, task in enumerate(tasks)}
+        branches = {row: self.campaign.branch_of(task) for row, task in enumerate(tasks)}
+        groups = {row: branch.cell for row, branch in branches.items()}
         priors: dict[Hashable, float] = {groups[row]: prior(task) for row, task in enumerate(tasks)}
         rounds = {row: task.realisation for row, task in enumerate(tasks)}
-        branches = {row: self.campaign.branch_of(task) for row, task in enumerate(tasks)}
         schedule = Schedule(self.plan.rows, groups, priors, rounds, branches)
         for group, (seconds, count) in self.plan.times.items():
             schedule.measured(group, seconds, count)
