@@ -82,16 +82,12 @@ def benchmark(scenes: Sequence[Scene] = FULL, *, seconds: float = 360.0) -> Iter
             for method, values in settings.items()
             for value in values
         ):
-            line = Line(run, reference, _left_out(run, before) or measure(run))
-            before = line.measured.cpu_seconds  # NaN if the run did not finish
-            yield line
-
-
-def _left_out(run: Run, before: float) -> Measurement | None:
-    """Return a note for a grid run that would take too long; None if it should be tried."""
-    if run.method != "grid" or before * _COST_OF_DOUBLING <= run.seconds:
-        return None
-    return Measurement(note=f"left out: it would take more than {run.seconds:g} s")
+            if run.method == "grid" and not before * _COST_OF_DOUBLING <= seconds:
+                measured = Measurement(note=f"left out: it would take more than {seconds:g} s")
+            else:
+                measured = measure(run)
+            before = measured.cpu_seconds  # NaN if the run did not finish
+            yield Line(run, reference, measured)
 
 
 def _reference(scene: Scene, seconds: float) -> Reference:

@@ -10,8 +10,6 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -75,30 +73,25 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
         known = _given_twice(text, str(error)) or _foreign_sign(text, str(error))
         reason = known or " ".join(str(error).split())
         raise InputError(f"{source} is not valid TOML: {reason}") from error
-    with _of(source):
-        for name in document:
-            if name not in TABLES:
-                known = ", ".join(f"[{t}]" for t in TABLES)
-                raise InputError(f"{shown(name)} is unknown; the tables are {known}")
-        lists: list[tuple[Table, str, tuple[float, ...]]] = []
-        tables = {name: _read_table(name, document.get(name, {}), lists) for name in TABLES}
-        _check_zip(tables["sweep"], lists)
-        if "stop" in document and tables["stop"].relative_error is None:
-            raise InputError(
-                "[stop] relative_error is missing: it must be a number between 0 and 1"
-            )
-        campaign = Campaign(text=text, lists=tuple(lists), **tables)
-        _check_together(campaign)
-    return campaign
-
-
-@contextmanager
-def _of(source: str) -> Iterator[None]:
-    """Name the file in the sentence of an InputError."""
     try:
-        yield
+        return _campaign_of(document, text)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
+
+
+def _campaign_of(document: dict[str, Any], text: str) -> Campaign:
+    for name in document:
+        if name not in TABLES:
+            known = ", ".join(f"[{t}]" for t in TABLES)
+            raise InputError(f"{shown(name)} is unknown; the tables are {known}")
+    lists: list[tuple[Table, str, tuple[float, ...]]] = []
+    tables = {name: _read_table(name, document.get(name, {}), lists) for name in TABLES}
+    _check_zip(tables["sweep"], lists)
+    if "stop" in document and tables["stop"].relative_error is None:
+        raise InputError("[stop] relative_error is missing: it must be a number between 0 and 1")
+    campaign = Campaign(text=text, lists=tuple(lists), **tables)
+    _check_together(campaign)
+    return campaign
 
 
 # Signs that word processors and other keyboards put in the place of those of TOML.
