@@ -354,8 +354,8 @@ class Worker:
 
     channel: Channel
     compute: Compute
-    deliver: Deliver
     limits: Limits
+    deliver: Deliver = lambda outcome: outcome
     clock: Callable[[], float] = time.monotonic  # replaced in tests
 
     def __post_init__(self) -> None:
@@ -430,13 +430,13 @@ class OwnWorker:
     Both ends of it are this object: the worker alone looks for urgent messages.
     """
 
-    def __init__(self, compute: Compute, deliver: Deliver, limits: Limits) -> None:
+    def __init__(self, compute: Compute, limits: Limits) -> None:
         self.rank = MASTER
         self.workers: Sequence[int] = (MASTER + 1,)
         self._tasks: deque[Message] = deque()
         self._urgent: deque[Message] = deque()
         self._answers: deque[Message] = deque()
-        self._worker = Worker(self, compute, deliver, limits)
+        self._worker = Worker(self, compute, limits)
 
     def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
         """Keep a message for the other end."""

@@ -154,7 +154,7 @@ class _Session:
         """Hand out, work, or both; returns on rank 0 why the run stopped early, or None."""
         if comm.rank > 0:
             deliver = self._write if own_rows else lambda outcome: outcome
-            dispatch.Worker(MpiChannel(comm), self._compute, deliver, self._limits).run()
+            dispatch.Worker(MpiChannel(comm), self._compute, self._limits, deliver).run()
             return None
         limits = self._limits
         with ExitStack() as stack:
@@ -162,14 +162,10 @@ class _Session:
             if comm.size > 1:
                 channel = MpiChannel(comm)
             elif self.options.processes and self.plan.rows:
-                channel = stack.enter_context(
-                    Processes(
-                        *(self.options.processes, self._compute),
-                        *(limits.task_seconds, limits.report_interval),
-                    )
-                )
+                processes = Processes(self.options.processes, self._compute, limits)
+                channel = stack.enter_context(processes)
             else:
-                channel = dispatch.OwnWorker(self._compute, lambda outcome: outcome, limits)
+                channel = dispatch.OwnWorker(self._compute, limits)
             return self._hand_out(channel, own_rows)
 
     def _hand_out(self, channel: dispatch.Channel, own_rows: bool) -> str | None:

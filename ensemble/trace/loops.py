@@ -96,9 +96,9 @@ class Loops:
         with ExitStack() as stack:
             channel: Channel
             if self.processes == 0:
-                channel = OwnWorker(computing, lambda outcome: outcome, limits)
+                channel = OwnWorker(computing, limits)
             else:
-                channel = started = Processes(self.processes, computing, report_interval=every)
+                channel = started = Processes(self.processes, computing, limits)
                 stack.enter_context(started)
                 self.pids = started.pids
             self._master = Master(channel, self._schedule, collect, limits, tick)

@@ -296,7 +296,7 @@ def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
             now = float(k)
             check(f"step {k}")
 
-    worker = Worker(OneTask(0), compute, lambda o: o, Limits(), clock=lambda: now)
+    worker = Worker(OneTask(0), compute, Limits(), clock=lambda: now)
     worker.run()
     reports = [message for message in sent if message[0] == "alive"]
     assert reports == [("alive", 5, None), *(("alive", 5, f"step {k}") for k in (11, 22, 33))]
@@ -323,7 +323,7 @@ def half(task, check):
 
 
 def test_processes_are_workers_like_any_other():
-    with Processes(2, half) as channel:
+    with Processes(2, half, Limits()) as channel:
         outcomes, reason = hand_out(channel, 20)
     assert reason is None
     found = {outcome.task: outcome.error or outcome.result for outcome in outcomes}
@@ -343,14 +343,14 @@ def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
     monkeypatch.setattr(
         subprocess.Popen, "wait", lambda p, timeout=None: calls.append("wait") or wait(p, timeout)
     )
-    with Processes(1, never) as channel:
+    with Processes(1, never, Limits()) as channel:
         os.kill(channel.pids[0], signal.SIGSTOP)
     assert calls[0] == "kill"
 
 
 def alone(compute, tasks=3, limits=None):
     limits = limits or Limits()
-    return hand_out(OwnWorker(compute, lambda outcome: outcome, limits), tasks, limits)
+    return hand_out(OwnWorker(compute, limits), tasks, limits)
 
 
 def test_a_task_in_a_kernel_meets_its_time_limit():
