@@ -13,7 +13,8 @@ from typing import Self, TextIO
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import duration
 
-_EVERY = 10.0  # s
+_LINE_INTERVALS = (5.0, 60.0)  # s: at first, and at most
+_LINES_AT_LEAST = 40  # the time between lines is this part of the time so far: 15 s after 10 min
 _LIVE = 0.1  # s between two states of a line on a terminal
 _CELLS = 24  # of a full bar
 _REWRITE = "\r\x1b[K"
@@ -26,25 +27,29 @@ def log(text: str) -> None:
     sys.stderr.flush()
 
 
+def interval(elapsed: float) -> float:
+    """Return the time between two lines, in s, after so many."""
+    first, most = _LINE_INTERVALS
+    return min(max(first, elapsed / _LINES_AT_LEAST), most)
+
+
 class Display:
     """One line, shown while something goes on: rewritten on a terminal, elsewhere written anew.
 
-    It is shown by another thread, so that there is no silence. ``text`` takes the time so far in s;
-    ``every`` is the time between lines where there is no terminal, in s, or a function of the time
-    so far. ``at_once`` shows the first line at once, not after the first interval; with ``last``
-    there is a last one. On a terminal there always are both.
+    It is shown by another thread, so that there is no silence. ``text`` takes the time so far in s.
+    ``at_once`` shows the first line at once, not after the first interval; with ``last`` there is a
+    last one. On a terminal there always are both.
     """
 
     def __init__(
         self,
         text: Callable[[float], str],
-        every: float | Callable[[float], float] = _EVERY,
         stream: TextIO | None = None,
         *,
         at_once: bool = False,
         last: bool = False,
     ) -> None:
-        self._text, self._every, self._stream = text, every, stream or sys.stderr
+        self._text, self._stream = text, stream or sys.stderr
         self._live = self._stream.isatty()
         self._at_once, self._last = at_once or self._live, last or self._live
         self._over, self._writing = threading.Event(), threading.Lock()
@@ -71,16 +76,15 @@ class Display:
     def _keep_on(self) -> None:
         if self._at_once:
             self._show()
-        while not self._over.wait(self._interval()):
+        while not self._over.wait(_LIVE if self._live else interval(self._seconds)):
             self._show()
 
-    def _interval(self) -> float:
-        seconds = time.monotonic() - self._started
-        every = self._every(seconds) if callable(self._every) else self._every
-        return min(_LIVE, every) if self._live else every
+    @property
+    def _seconds(self) -> float:
+        return time.monotonic() - self._started
 
     def _show(self, end: str = "") -> None:
-        line = printable(self._text(time.monotonic() - self._started))
+        line = printable(self._text(self._seconds))
         with self._writing:
             if not self._live:
                 print(line, file=self._stream, flush=True)
@@ -95,7 +99,7 @@ Bar = Callable[..., None]
 
 
 @contextmanager
-def bar(what: str, *, every: float = _EVERY, last: bool = True) -> Iterator[Bar]:
+def bar(what: str, *, last: bool = True) -> Iterator[Bar]:
     """Show a bar on a terminal; elsewhere, as in a notebook, lines; see :class:`Display`."""
     shown = what
 
@@ -106,5 +110,5 @@ def bar(what: str, *, every: float = _EVERY, last: bool = True) -> Iterator[Bar]
             parts.append(f"[{'#' * round(_CELLS * done / total):.<{_CELLS}}]")
         shown = "  ".join(parts)
 
-    with Display(lambda seconds: f"{shown}  {duration(seconds)}", every, last=last):
+    with Display(lambda seconds: f"{shown}  {duration(seconds)}", last=last):
         yield show

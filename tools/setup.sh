@@ -354,7 +354,7 @@ from importlib import import_module
 from adhesis.ensemble.command.main import COMMANDS, module_of
 for name in COMMANDS:
     import_module(module_of(name))
-import adhesis.ensemble.bench.equal_error, adhesis.ensemble.bench.bench_page, adhesis.solver.validate.claims
+import adhesis.ensemble.bench.benchmark, adhesis.solver.validate.claims
 import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, rich.progress, xarray'
 }
 part adhesis "adhesis itself, with its kernels" finish_installation

@@ -8,18 +8,21 @@ falls off is not counted: its drop depends on where the loop is closed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.blocks import column_blocks, row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
 from adhesis.solver.model.profile import Array
 
+# Numbers read at once (8 bytes each): large enough for the disk, small enough for any machine.
+READ_AT_ONCE = 2_000_000
+# Numbers held at once while quantiles are taken (numpy copies them once more).
+HELD_AT_ONCE = 8_000_000
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _AVERAGED = ("psd_height", "height_density", "psd_displacement", "gap_density")
 _OF_SHAPE = ("field_height", "field_displacement")
@@ -51,7 +54,7 @@ def average_curves(
     points = results.column(name, slice(0, 1)).shape[1]
     shapes = (points, points, (len(QUANTILES), points))
     out = {curve: Curve(*(np.full(shape, np.nan) for shape in shapes)) for curve in scales}
-    for columns in column_blocks(rows.size, points) if rows.size else ():
+    for columns in _column_blocks(rows.size, points) if rows.size else ():
         raw = results.column(name, rows, columns).astype(float)
         if name.endswith("patches"):  # -1 beyond the turning point of a load: not known
             raw[raw < 0] = np.nan
@@ -140,7 +143,7 @@ def _average(
     """
     shape = results.column(name, slice(0, 1)).shape[1:]
     total, count = np.zeros(shape), np.zeros(shape[:-1], dtype=np.int64)
-    for block in row_blocks(rows, int(np.prod(shape))):
+    for block in _row_blocks(rows, int(np.prod(shape))):
         values = results.column(name, block).astype(float)
         held = np.isfinite(values).all(axis=-1)
         total += np.where(held[..., None], values, 0.0).sum(axis=0)
@@ -165,7 +168,7 @@ def count_jumps(results: Results, rows: NDArray[np.intp]) -> JumpStatistics:
     slots, bins = results.campaign.output.jumps, BIN_EDGES.size - 1
     number, energy = np.zeros(len(JUMP_KINDS), dtype=np.int64), np.zeros(len(JUMP_KINDS))
     histogram = np.zeros((len(JUMP_KINDS), bins), dtype=np.int64)
-    for block in row_blocks(rows, slots):
+    for block in _row_blocks(rows, slots):
         flags = results.column("jump_kind", block)
         used = flags >= 0
         if results.campaign.cycle.under_load:
@@ -178,3 +181,17 @@ def count_jumps(results: Results, rows: NDArray[np.intp]) -> JumpStatistics:
         np.add.at(histogram, (kind, bin_of_drop), 1)
     truncated = int(np.sum(results.column("jump_count", rows) > slots))
     return JumpStatistics(number, energy, histogram, truncated)
+
+
+def _row_blocks(rows: NDArray[np.intp], width: int) -> Iterator[NDArray[np.intp]]:
+    """Split rows of ``width`` numbers, a bounded number of bytes each."""
+    step = max(1, READ_AT_ONCE // max(1, width))
+    for start in range(0, rows.size, step):
+        yield rows[start : start + step]
+
+
+def _column_blocks(rows: int, points: int) -> Iterator[slice]:
+    """Split the columns of so many rows: at most :data:`HELD_AT_ONCE` numbers, or one column."""
+    width = max(1, HELD_AT_ONCE // max(1, rows))
+    for start in range(0, points, width):
+        yield slice(start, min(points, start + width))

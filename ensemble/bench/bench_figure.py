@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from adhesis.ensemble.bench.equal_error import Line
+from adhesis.ensemble.bench.benchmark import Line
 from adhesis.ensemble.report.figures import style
 
 # sharp has the darkest colour, so that the methods differ in grey too.

@@ -16,8 +16,14 @@ import sys
 from dataclasses import asdict, dataclass, replace
 from time import process_time
 
-from adhesis.ensemble.bench.scenes import WARM_UP, Scene
-from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
+from adhesis.ensemble.bench.scenes import SMALL_ROUGH, Scene
+from adhesis.ensemble.run.launch import (
+    ONE_THREAD,
+    end_with_parent,
+    peak_bytes,
+    python,
+    python_environment,
+)
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.registry import MethodName, make_method
@@ -26,9 +32,10 @@ _SOLUTIONS = {"grid": "solves", "sharp": "fields"}
 # Accuracy of the load path of ``grid``: it costs little and leaves the nodes as the source of
 # error.
 _GRID_ACCURACY = 1e-3
-_WARM_UP_SETTING = {"grid": 8, "sharp": 1e-2}
+_WARM_UP = {"grid": 8, "sharp": 1e-2}
 # CPU seconds for start and warm-up, before the limit of the run applies.
 _START_LIMIT = 300.0
+_MB = 2**20
 
 
 @dataclass(frozen=True)
@@ -87,22 +94,25 @@ def measure(run: Run) -> Measurement:
     return Measurement(**json.loads(child.stdout))
 
 
-def _measure_here(run: Run) -> Measurement:
-    """Run and measure in this process, and end it when ``run.seconds`` are over."""
+def main() -> None:
+    """Measure the run in the first argument in this process; end it when its seconds are over."""
+    fields = json.loads(sys.argv[1])
+    run = Run(**{**fields, "scene": Scene(**fields["scene"])})
     _limit(_START_LIMIT)
-    setting, steps = _WARM_UP_SETTING[run.method], WARM_UP.load_steps
-    _loop(replace(run, scene=WARM_UP, setting=setting, load_steps=steps))
-    before = peak_megabytes()
+    # Touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
+    _loop(replace(run, scene=SMALL_ROUGH, setting=_WARM_UP[run.method], load_steps=4))
+    before = peak_bytes()
     _limit(run.seconds)
     started = process_time()
     loop = _loop(run)
-    return Measurement(
-        *(process_time() - started, peak_megabytes(), before),
+    measured = Measurement(
+        *(process_time() - started, peak_bytes() / _MB, before / _MB),
         *(loop.loss, loop.loss_dimensionless, loop.audit_residual),
         solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
         jumps=len(loop.jumps),
         patches=int(loop.patches.max()),
     )
+    print(json.dumps(asdict(measured)))
 
 
 def _loop(run: Run) -> LoopResult:
@@ -119,25 +129,6 @@ def _limit(seconds: float) -> None:
     """End this process after so many more seconds of CPU time (rounded up)."""
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(process_time() + seconds), hard))
-
-
-def peak_megabytes() -> float:
-    """Return the largest resident memory of this process so far, in MB (2²⁰ bytes)."""
-    try:
-        # getrusage also counts the memory of the parent when it started this process.
-        with open("/proc/self/status") as status:
-            peak = next(line for line in status if line.startswith("VmHWM:"))
-        return int(peak.split()[1]) / 1024
-    except (OSError, StopIteration):
-        unit = 1024**2 if sys.platform == "darwin" else 1024
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-
-
-def main() -> None:
-    """Measure the run in the first argument."""
-    fields = json.loads(sys.argv[1])
-    run = Run(**{**fields, "scene": Scene(**fields["scene"])})
-    print(json.dumps(asdict(_measure_here(run))))
 
 
 if __name__ == "__main__":

@@ -128,13 +128,3 @@ PAPER = Scene(
 
 QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
 FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)
-
-# Has touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
-WARM_UP = Scene(
-    name="warm-up",
-    title="warm-up",
-    work_of_adhesion=0.02,
-    load_steps=4,
-    n0=2,
-    ratio=4,
-)

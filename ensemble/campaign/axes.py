@@ -38,13 +38,12 @@ def aligned(axes: Sequence[Axis], zipped: Sequence[Sequence[str]]) -> list[list[
     groups: dict[tuple[str, ...], list[Axis]] = {}
     for axis in axes:
         groups.setdefault(member.get(axis.name, (axis.name,)), []).append(axis)
-    return [_sorted_together(group) for group in groups.values()]
-
-
-def _sorted_together(group: Sequence[Axis]) -> list[Axis]:
-    rows = sorted(zip(*(axis.values for axis in group), strict=True))
-    columns = zip(*rows, strict=True)
-    return [replace(axis, values=values) for axis, values in zip(group, columns, strict=True)]
+    out = []
+    for group in groups.values():
+        rows = sorted(zip(*(axis.values for axis in group), strict=True))
+        columns = zip(*rows, strict=True)
+        out.append([replace(a, values=values) for a, values in zip(group, columns, strict=True)])
+    return out
 
 
 def points(axes: Sequence[Axis], groups: Sequence[Sequence[Axis]]) -> list[tuple[Value, ...]]:

@@ -6,20 +6,11 @@ change a result.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from adhesis.ensemble.campaign.rules import shown
 from adhesis.ensemble.campaign.tables import KEYS, TURNING_POINTS, Campaign
 from adhesis.ensemble.errors import InputError
-
-
-@dataclass(frozen=True)
-class Changes:
-    """Differences of a campaign from the one of a results file."""
-
-    grown: tuple[str, ...]  # keys of the sweep that only gained values
-    other: tuple[str, ...]  # one phrase for each other key that differs: its name and both values
 
 
 def differing(one: Campaign, two: Campaign) -> list[str]:
@@ -28,8 +19,14 @@ def differing(one: Campaign, two: Campaign) -> list[str]:
     return [key for key in mine if mine[key] != other[key]]
 
 
-def compare(old: Campaign, new: Campaign) -> Changes:
-    """Compare two campaigns; keys that cannot change a result are left out."""
+def growth(
+    path: object, old: Campaign, new: Campaign, here: object = "this campaign"
+) -> tuple[str, ...]:
+    """Return the keys by which the campaign of a results file grew.
+
+    Keys that cannot change a result are left out. InputError for another campaign, with both values
+    of each key that differs otherwise.
+    """
     before, after = old.values(), new.values()
     grown, other = [], []
     missing = _cells(old) - _cells(new)
@@ -41,18 +38,12 @@ def compare(old: Campaign, new: Campaign) -> Changes:
             grown.append(key)
         else:
             other.append(f"{key} is {shown(value)} here and {shown(was)} there")
-    return Changes(tuple(grown), tuple(other))
-
-
-def growth(path: object, old: Campaign, new: Campaign) -> tuple[str, ...]:
-    """Return the keys by which the campaign of a results file grew; InputError for another one."""
-    changes = compare(old, new)
-    if changes.other:
+    if other:
         raise InputError(
-            f"{path} holds another campaign: {'; '.join(changes.other)} "
-            "(here: this campaign, there: the file)"
+            f"{path} holds another campaign than {here}: {'; '.join(other)} "
+            f"(here: {here}, there: {path})"
         )
-    return changes.grown
+    return tuple(grown)
 
 
 def _extends(key: str, was: Any, now: Any) -> bool:

@@ -10,8 +10,6 @@ import math
 import os
 import re
 import tomllib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -75,30 +73,25 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
         known = _given_twice(text, str(error)) or _foreign_sign(text, str(error))
         reason = known or " ".join(str(error).split())
         raise InputError(f"{source} is not valid TOML: {reason}") from error
-    with _of(source):
-        for name in document:
-            if name not in TABLES:
-                known = ", ".join(f"[{t}]" for t in TABLES)
-                raise InputError(f"{shown(name)} is unknown; the tables are {known}")
-        lists: list[tuple[Table, str, tuple[float, ...]]] = []
-        tables = {name: _read_table(name, document.get(name, {}), lists) for name in TABLES}
-        _check_zip(tables["sweep"], lists)
-        if "stop" in document and tables["stop"].relative_error is None:
-            raise InputError(
-                "[stop] relative_error is missing: it must be a number between 0 and 1"
-            )
-        campaign = Campaign(text=text, lists=tuple(lists), **tables)
-        _check_together(campaign)
-    return campaign
-
-
-@contextmanager
-def _of(source: str) -> Iterator[None]:
-    """Name the file in the sentence of an InputError."""
     try:
-        yield
+        return _campaign_of(document, text)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
+
+
+def _campaign_of(document: dict[str, Any], text: str) -> Campaign:
+    for name in document:
+        if name not in TABLES:
+            known = ", ".join(f"[{t}]" for t in TABLES)
+            raise InputError(f"{shown(name)} is unknown; the tables are {known}")
+    lists: list[tuple[Table, str, tuple[float, ...]]] = []
+    tables = {name: _read_table(name, document.get(name, {}), lists) for name in TABLES}
+    _check_zip(tables["sweep"], lists)
+    if "stop" in document and tables["stop"].relative_error is None:
+        raise InputError("[stop] relative_error is missing: it must be a number between 0 and 1")
+    campaign = Campaign(text=text, lists=tuple(lists), **tables)
+    _check_together(campaign)
+    return campaign
 
 
 # Signs that word processors and other keyboards put in the place of those of TOML.
@@ -200,10 +193,6 @@ def _check_zip(sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...
             )
 
 
-def _largest(campaign: Campaign, name: str, value: float) -> float:
-    return max((max(v) for _, key, v in campaign.lists if key == name), default=value)
-
-
 def _check_together(campaign: Campaign) -> None:
     profile, cycle = campaign.profile, campaign.cycle
     given = list(profile.normalisation)
@@ -229,21 +218,20 @@ def _check_together(campaign: Campaign) -> None:
         check_law(solver.method, solver.nodes_per_wave, pins=pins, has_range=material.opens)
     except ValueError as error:
         raise InputError(f"[solver] {error}") from None
-    n0, ratio = (_largest(campaign, name, getattr(profile, name)) for name in ("n0", "ratio"))
-    if n0 * ratio > MOST_WAVES:
+    waves = campaign.finest_harmonic
+    if waves > MOST_WAVES:
         raise InputError(
-            f"[profile] n0 · ratio is {round(n0 * ratio)}: "
-            f"it must be at most {MOST_WAVES} harmonics"
+            f"[profile] n0 · ratio is {waves}: it must be at most {MOST_WAVES} harmonics"
         )
-    if _largest(campaign, "rolloff", profile.rolloff) > profile.ratio:
-        raise InputError(
-            f"[profile] rolloff is {_largest(campaign, 'rolloff', profile.rolloff):g}: "
-            f"it must be at most ratio ({profile.ratio})"
-        )
+    for ratio, rolloff in campaign.in_cells("profile.ratio", "profile.rolloff"):
+        if rolloff > ratio:
+            raise InputError(
+                f"[profile] rolloff is {rolloff:g}: it must be at most ratio ({ratio})"
+            )
     _check_slopes(campaign)
     if campaign.solver.nodes_per_wave is not None:
         try:
-            check_nodes(campaign.solver.nodes_per_wave, round(n0 * ratio))
+            check_nodes(campaign.solver.nodes_per_wave, waves)
         except ValueError as error:
             raise InputError(f"[solver] {error}") from None
     if (
@@ -301,11 +289,8 @@ def _check_open(campaign: Campaign) -> bool:
     material = campaign.material
     if material.work_of_adhesion_open is None:
         return False
-    names = [axis.name for axis in campaign.axes]
-    given = {"work_of_adhesion_open": material.work_of_adhesion_open}
-    cells = (given | dict(zip(names, cell, strict=True)) for cell in campaign.cells)
-    works = {(cell["work_of_adhesion"], cell["work_of_adhesion_open"]) for cell in cells}
-    for gamma, found in sorted(works):
+    works = campaign.in_cells("sweep.work_of_adhesion", "material.work_of_adhesion_open")
+    for gamma, found in works:
         if found < gamma or gamma == 0 < found:
             rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
             raise InputError(
@@ -327,12 +312,10 @@ def _check_slopes(campaign: Campaign) -> None:
 
     Where amplitudes are scattered, the slope of their mean stands for all realisations.
     """
-    table = campaign.profile
-    (norm,) = table.normalisation
-    names, keys = ("period", "n0", "ratio", "rolloff", norm), [axis.name for axis in campaign.axes]
-    cells = (dict(zip(keys, cell, strict=True)) for cell in campaign.cells)
-    spectra = {(c["hurst"], *(c.get(name, getattr(table, name)) for name in names)) for c in cells}
-    for hurst, *values in sorted(spectra):
+    (norm,) = campaign.profile.normalisation
+    names = ("period", "n0", "ratio", "rolloff", norm)
+    keys = (f"profile.{name}" for name in names)
+    for hurst, *values in campaign.in_cells("sweep.hurst", *keys):
         spectrum: dict[str, Any] = dict(zip(names, values, strict=True))
         try:
             check_slope(math.sqrt(self_affine_profile(hurst, seed=0, **spectrum).m2))
@@ -365,7 +348,7 @@ def _check_turning_point(campaign: Campaign) -> None:
             f"it must be {entry.metadata['rule'].text}"
         )
     if cycle.stiffness is None and not cycle.under_load:
-        largest = _largest(campaign, wanted, cycle.deepest)
+        largest = campaign.in_cells("cycle.max_penetration")[-1][0] or cycle.deepest
         number_in(MAX_PENETRATION)(f"[cycle] {wanted}", largest)
     for name in ("max_penetration", "stiffness") if cycle.under_load else ():
         if getattr(cycle, name) is not None:

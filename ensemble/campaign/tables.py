@@ -7,7 +7,6 @@ Every key has one rule. What a campaign means is here; how its file is read is i
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cached_property
 from operator import attrgetter
@@ -332,7 +331,6 @@ class Campaign:
     output: OutputTable
     stop: StopTable = StopTable()
     lists: tuple[tuple[Table, str, tuple[Value, ...]], ...] = ()
-    finest: int = field(default=0, compare=False, repr=False)
     text: str = field(default="", compare=False, repr=False)
     _at: dict[tuple[tuple[str, Value], ...], Campaign] = field(
         default_factory=dict, init=False, compare=False, repr=False
@@ -366,13 +364,19 @@ class Campaign:
 
     @property
     def finest_harmonic(self) -> int:
-        """Highest harmonic of all profiles, also of those of the campaign that :meth:`at` cut."""
-        if self.finest:
-            return self.finest
-        names = [axis.name for axis in self.axes]
-        here = {"n0": self.profile.n0, "ratio": self.profile.ratio}
-        waves = [here | dict(zip(names, cell, strict=True)) for cell in self.cells]
-        return max(int(w["n0"] * w["ratio"]) for w in waves)
+        """Highest harmonic of all profiles."""
+        return int(max(n0 * ratio for n0, ratio in self.in_cells("profile.n0", "profile.ratio")))
+
+    def in_cells(self, *keys: str) -> list[tuple[Any, ...]]:
+        """Return the different values that these keys have together in a cell, ascending."""
+        place = {axis.key: number for number, axis in enumerate(self.axes)}
+        columns = [
+            [cell[place[key]] for cell in self.cells]
+            if key in place
+            else [self.value(key)] * len(self.cells)
+            for key in keys
+        ]
+        return sorted(set(zip(*columns, strict=True)))
 
     def has_axis(self, name: str) -> bool:
         """Whether a key ("max_penetration") has several values."""
@@ -403,8 +407,7 @@ class Campaign:
                 last = self.cycle.load_steps + 1 - self.unloading_penetration.size
                 until = cycle.turning_point * last / cycle.load_steps
                 tables["cycle"] = replace(cycle, unloading_until=until)
-            finest = self.finest_harmonic
-            self._at[task.others] = replace(self, sweep=sweep, lists=(), finest=finest, **tables)
+            self._at[task.others] = replace(self, sweep=sweep, lists=(), **tables)
         return self._at[task.others]
 
     @cached_property
@@ -415,15 +418,16 @@ class Campaign:
                 return group[0]
         return None
 
-    def branch_of(self, task: Task) -> Hashable | None:
-        """Return a key of the tasks that share a task's loading branch; None if it has its own.
+    def branch_of(self, task: Task) -> Task:
+        """Return what the tasks that share a task's loading branch have in common.
 
-        They differ in their turning point alone.
+        They differ in their turning point alone, which it is without; the task itself, if it has a
+        branch of its own.
         """
         if self._turning is None:
-            return None
-        rest = tuple(other for other in task.others if other[0] != self._turning.name)
-        return (task.hurst, task.work_of_adhesion, task.realisation, rest)
+            return task
+        name = self._turning.name
+        return replace(task, others=tuple(other for other in task.others if other[0] != name))
 
     def sharing(self, task: Task) -> list[Task]:
         """Return the tasks that share a task's loading branch, by turning point, and it itself."""

@@ -63,9 +63,8 @@ def campaign_template() -> str:
 def _table(name: Table) -> str:
     title = (TABLES[name].__doc__ or "").partition(": ")[2].rstrip(".")
     entries = [_entry(f"{name}.{entry.name}", entry) for entry in fields(TABLES[name])]
-    mark = "" if any(f"{name}.{entry.name}" in _VALUES for entry in fields(TABLES[name])) else "# "
     # A table without a key may stay empty, but [stop] asks for one of its own.
-    mark = mark if name == "stop" else ""
+    mark = "# " if name == "stop" else ""
     return f"\n{mark}[{name}]  # {title}\n" + "".join(entries)
 
 

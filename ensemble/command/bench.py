@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import platform
-import sys
 from pathlib import Path
 
 from adhesis.ensemble.command.parser import within
@@ -45,8 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
-    from adhesis.ensemble.bench.bench_page import COLUMNS, page
-    from adhesis.ensemble.bench.equal_error import benchmark, ratios
+    from adhesis.ensemble.bench.benchmark import COLUMNS, benchmark, page
     from adhesis.ensemble.bench.scenes import FULL, QUICK
     from adhesis.ensemble.report.tables.table import make_table
     from adhesis.ensemble.versions import processor
@@ -57,13 +55,10 @@ def execute(args: argparse.Namespace) -> int:
         for line in benchmark(QUICK if args.quick else FULL, seconds=args.budget):
             lines.append(line)
             run = line.run
-            if not sys.stderr.isatty():  # no bar there; half an hour of silence is too long
-                row = make_table("", COLUMNS, [line]).markdown().splitlines()[-1]
-                print(run.scene.name, row, file=sys.stderr)
             show_run(None, None, f"{run.scene.title}: {run.method}, {run.described}")
     machine = f"one core of {processor()}, Python {platform.python_version()}"
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
-    text = page(lines, ratios(lines), f"`{command}` on {machine}")
+    text = page(lines, f"`{command}` on {machine}")
     print(text)
     from adhesis.ensemble.bench.bench_figure import draw  # matplotlib, when all is measured
     from adhesis.ensemble.report.figures.style import save

@@ -17,7 +17,7 @@ from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
-from adhesis.ensemble.outputs import Writing, check_outputs, write_json
+from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -97,11 +97,14 @@ def execute(args: argparse.Namespace) -> int:
         with writing.output("--csv", args.csv):
             write_csv(args.csv, results)
     if fields:
-        with writing.output("--fields", args.fields):
-            record.write_npz(args.fields, fields)
+        with writing.output("--fields", args.fields), whole_file(args.fields) as stream:
+            np.savez_compressed(stream, **fields)
     if args.figure is not None:
+        from adhesis.ensemble.loop.loop_figure import draw_loops  # loads matplotlib
+        from adhesis.ensemble.report.figures.style import write
+
         with writing.output("--figure", args.figure):
-            _draw(results, args.figure)
+            write(draw_loops(results), args.figure, dpi=200)
     if args.film is not None:
         with writing.output("--film", args.film):
             loops[0].film(args.film, progress=not args.quiet)
@@ -126,9 +129,6 @@ def _run(
     if len(cycle.points) > 1:
         return run_loops(method, **cycle.arguments(cycle.points), **options)
     return (run_loop(method, **cycle.arguments(cycle.points[0]), **options),)
-
-
-# ---------------------------------------------------------------------- input
 
 
 def _take_defaults(args: argparse.Namespace) -> list[str]:
@@ -290,13 +290,3 @@ def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[floa
             method.problem.profile.heights(nodes)
             method.fields(method.detached(method.problem.separation(0.0)), nodes)
     return int(nodes)
-
-
-# ---------------------------------------------------------------------- output
-
-
-def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
-    from adhesis.ensemble.loop.loop_figure import draw_loops
-    from adhesis.ensemble.report.figures.style import write
-
-    write(draw_loops(results), path, dpi=200)

@@ -19,17 +19,15 @@ from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
-from adhesis.ensemble.reporter import log
+from adhesis.ensemble.reporter import bar, log
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
-    from adhesis.ensemble.campaign.tasks import Task
     from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.progress import Summary
     from adhesis.ensemble.run.session import Engine
 
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
-_PAUSE = 5.0  # s between two lines of a dry run
 _MOST = 2**31 - 1
 _NUMBER = within(0, _MOST, "a number that is not negative")
 _WHOLE = within(0, _MOST, "a whole number that is not negative", int)
@@ -241,21 +239,13 @@ def _tell_price(
 
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
-
-    heard = time.monotonic()
-
-    def tried(task: Task, seconds: float) -> None:
-        nonlocal heard
-        if time.monotonic() > heard + _PAUSE:
-            heard = time.monotonic()
-            log(f"pilot loop: {task}: {seconds:.3g} s")
-
-    estimate = price(
-        *(campaign, path, part),
-        compute=lambda c, t: engine.compute(c, t, None),
-        check=engine.check,
-        on_pilot=tried,
-    )
+    with bar("pilot loops", last=False) as show:
+        estimate = price(
+            *(campaign, path, part),
+            compute=lambda c, t: engine.compute(c, t, None),
+            check=engine.check,
+            on_pilot=lambda task, seconds: show(None, None, f"{task}: {seconds:.3g} s"),
+        )
     print(estimate)
     return exit_codes.DONE
 

@@ -34,28 +34,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print the status; returns 0."""
-    from adhesis.ensemble.aggregate.status import as_text, read_status
-    from adhesis.ensemble.run.lock import holder
-
     if args.watch:
         if args.json:
             raise InputError("--watch and --json cannot be given together")
         return _watch(args.file, args.interval)
-    status = read_status(args.file) | {"run": holder(args.file)}
-    if args.json:
-        print(json.dumps(status, indent=1))
-    else:
-        print(as_text(status, _life(status)))
+    status = _status(args.file)
+    print(json.dumps(status, indent=1) if args.json else _text(status))
     return 0
 
 
-def _watch(path: Path | str, interval: float) -> int:
+def _watch(path: Path, interval: float) -> int:
     """Show the status again and again: in place on a terminal, else one after the other."""
     from rich.console import Console
     from rich.live import Live
-
-    from adhesis.ensemble.aggregate.status import as_text, read_status
-    from adhesis.ensemble.run.lock import holder
 
     live = Live(console=Console(highlight=False, markup=False), auto_refresh=False)
     if sys.stdout.isatty():
@@ -64,13 +55,12 @@ def _watch(path: Path | str, interval: float) -> int:
     try:
         while True:
             now = time.monotonic()
-            status = read_status(path) | {"run": holder(path)}
+            status = _status(path)
             finished = status["done"] + status["failed"]
             # A campaign that grew, or rows that are computed again, begin a new measurement.
             if first is None or finished < first[1]:
                 first = (now, finished)
-            pace = _pace(status, now - first[0], finished - first[1])
-            text = as_text(status, pace + _life(status))
+            text = _text(status, now - first[0], finished - first[1])
             if live.is_started:
                 live.update(text, refresh=True)
             else:
@@ -83,22 +73,26 @@ def _watch(path: Path | str, interval: float) -> int:
         live.stop()
 
 
-def _life(status: dict[str, Any]) -> str:
-    """Return whether a run is at work, and how old the last row is, as a line of its own."""
+def _status(path: Path) -> dict[str, Any]:
+    from adhesis.ensemble.aggregate.status import read_status
+    from adhesis.ensemble.run.lock import holder
+
+    return read_status(path) | {"run": holder(path)}
+
+
+def _text(status: dict[str, Any], seconds: float = 0.0, finished: int = 0) -> str:
+    """Return the status as text, with a line on the run that writes, and how old the last row is.
+
+    Rate and time left are those of the tasks that were ``finished`` in the last ``seconds``.
+    """
+    from adhesis.ensemble.aggregate.status import as_text
     from adhesis.ensemble.quantities import duration
     from adhesis.ensemble.run.lock import described
 
-    run, last = status["run"], status["last_row"]
+    pace, run, last = "", status["run"], status["last_row"]
+    if finished and status["pending"]:
+        rate = finished / seconds
+        pace = f"; {3600 * rate:.3g} an hour, about {duration(status['pending'] / rate)} left"
     text = "no run is writing" if run is None else f"a run is writing ({described(run)})"
     age = "" if last is None else f"; last row {duration(max(0.0, time.time() - last))} ago"
-    return f"\n{text}{age}"
-
-
-def _pace(status: dict[str, Any], seconds: float, finished: int) -> str:
-    """Return rate and time left, from what was finished since the watch began."""
-    from adhesis.ensemble.quantities import duration
-
-    if not finished or not status["pending"]:
-        return ""
-    rate = finished / seconds
-    return f"; {3600 * rate:.3g} an hour, about {duration(status['pending'] / rate)} left"
+    return as_text(status, f"{pace}\n{text}{age}")

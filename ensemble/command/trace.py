@@ -16,7 +16,7 @@ from adhesis.ensemble.quantities import (
     read_words,
     words_of,
 )
-from adhesis.ensemble.reporter import Display
+from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.answer import (
     FIGURE_FILES,
     FILES,
@@ -95,27 +95,20 @@ def _run(prepared: Prepared, cycle: Cycle, plan: Plan, quiet: bool) -> Answer:
     """Run the plan, with lines on stderr: loops done, what is running, time left."""
     if quiet:
         return run_plan(prepared, cycle, plan, None)
-    loops: Loops | None = None
-
-    def watch(found: Loops) -> None:
-        nonlocal loops
-        loops = found
-
     load = cycle.control.is_load
-    with Display(lambda seconds: _progress(loops, seconds, load), last=True):
-        return run_plan(prepared, cycle, plan, watch)
+    with bar("loops") as show:
+        return run_plan(
+            prepared, cycle, plan, lambda loops: show(None, None, _progress(loops, load))
+        )
 
 
-def _progress(loops: Loops | None, seconds: float, load: bool) -> str:
+def _progress(loops: Loops, load: bool) -> str:
     """Return how far the loops of a trace are, as a line."""
-    if loops is None:
-        return "starting"
     running = ", ".join(
         f"{name} ({branch}, {drive_text(drive, load)})"
         for name, (branch, drive) in loops.running.items()
     )
     parts = [f"{len(loops.done)} of {loops.count} loops"]
     parts += [f"running {running}"] if running else []
-    parts.append(f"{seconds:.0f} s so far")
     left = loops.seconds_left if len(loops.done) < loops.count else None
     return "; ".join(parts) + ("" if left is None else f", about {duration(left)} left")

@@ -7,25 +7,25 @@ so that a broken MPI cannot hang the caller, and the caller's environment cannot
 
 from __future__ import annotations
 
+import importlib
 import json
-import socket
+import os
 import subprocess
+import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.run.launch import (
-    check_file_size_limit,
     cores,
     end_with_parent,
     launch_environment,
     launcher,
     python,
     python_environment,
-    settings,
 )
 from adhesis.ensemble.versions import first_lines, installed, last_lines, processor
 
@@ -53,7 +53,7 @@ class Diagnosis:
     mpirun: str
     mpirun_version: str
     versions: dict[str, str]
-    checks: list[Check] = field(default_factory=list)
+    checks: list[Check]
 
     @property
     def usable(self) -> bool:
@@ -63,13 +63,10 @@ class Diagnosis:
 
 def examine(directory: Path | str | None = None) -> Diagnosis:
     """Run all checks; ranks write a file in ``directory``, or where temporary files are."""
-    checks = [_loopback()]
     alone = _run_probe([], directory)
     found = alone.reports[0] if alone.reports else {}
     texts = found.get("versions") or installed()
-    checks.append(_libraries(alone, texts))
-    checks.append(kernels())
-
+    checks = [_libraries(alone, texts), _kernels()]
     mpi_loads = bool(found.get("mpi_loads"))
     mpirun = launcher()
     together: _Probe | None = None
@@ -90,12 +87,9 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     else:
         written = _writing(together)
         checks.append(written)
-        writer = "mpio" if written.ok else "rank 0"
-        why = (
-            "h5py has parallel HDF5, and ranks wrote a file together"
-            if written.ok
-            else written.text
-        )
+        writer, why = "rank 0", written.text
+        if written.ok:
+            writer, why = "mpio", "h5py has parallel HDF5, and ranks wrote a file together"
     return Diagnosis(
         versions=texts,
         cores=cores(),
@@ -120,67 +114,40 @@ class _Probe:
 
 def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
     try:
-        if launch:
-            check_file_size_limit()
         with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
-            command = [*launch, *python("-m", "adhesis.ensemble.doctor.probe", scratch)]
-            if launch:
-                command.append("together")
-            code, output = _run(command)
+            probe = python("-m", "adhesis.ensemble.doctor.examine", scratch)
+            code, output = _run([*launch, *probe, *(["together"] if launch else [])])
             failure = "" if code == 0 else f"did not end within {_TIME_LIMIT:.0f} s"
             if code:
                 # of several processes, the first page has the reason, of one the last lines
                 lines = first_lines(output) if launch else last_lines(output)
                 failure = f"ended with {code}: {lines}"
-            reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
-            return _Probe([report for report in reports if report], failure)
-    except (OSError, WriteError) as error:
+            reports = []
+            for path in sorted(Path(scratch).glob("report-*.json")):
+                with suppress(OSError, ValueError):  # the process ended while it wrote
+                    reports.append(json.loads(path.read_text()))
+            return _Probe(reports, failure)
+    except OSError as error:
         return _Probe([], f"cannot be started: {error}")
 
 
 def _run(command: list[str]) -> tuple[int | None, str]:
     """Return the exit code of a command and what it wrote; None if it passed the time limit."""
-    process = subprocess.Popen(
-        command,
-        env=python_environment(launch_environment(_RANKS)),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-        preexec_fn=end_with_parent,
-    )
     try:
-        output, _ = process.communicate(timeout=_TIME_LIMIT)
-    except BaseException as error:  # also an interrupt: what was started ends before its folder
-        process.terminate()  # a launcher then ends its ranks; a kill would leave them running
-        try:
-            process.communicate(timeout=5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
-        if not isinstance(error, subprocess.TimeoutExpired):
-            raise
+        done = subprocess.run(
+            command,
+            env=python_environment(launch_environment(_RANKS)),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            timeout=_TIME_LIMIT,
+            preexec_fn=end_with_parent,
+        )
+    except subprocess.TimeoutExpired:
         return None, ""
-    return process.returncode, output
-
-
-def _read_report(path: Path) -> dict[str, Any]:
-    try:
-        report: dict[str, Any] = json.loads(path.read_text())
-    except (OSError, ValueError):  # the process ended while it wrote
-        return {}
-    return report
-
-
-def _loopback() -> Check:
-    try:
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            socket.create_connection(server.getsockname(), timeout=5).close()
-    except OSError as error:
-        text = f"127.0.0.1 cannot be reached ({error}); launchers reach their ranks through it"
-        return Check("loopback", False, text, needed=False)
-    return Check("loopback", True, "up")
+    return done.returncode, done.stdout
 
 
 def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
@@ -192,8 +159,7 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
     return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
 
 
-def kernels() -> Check:
-    """Check that the compiled kernels load, and report what made them."""
+def _kernels() -> Check:
     try:
         from adhesis.solver import _kernels
     except ImportError as error:
@@ -213,8 +179,6 @@ def _ranks(probe: _Probe, mpirun: str) -> Check:
         )
     else:
         text = f"{mpirun} -n {_RANKS} {probe.failure or f'gave {len(sizes)} ranks'}"
-        if given := ", ".join(settings()):
-            text += f"; settings of MPI: {given}"
     return Check("ranks", False, text)
 
 
@@ -235,3 +199,61 @@ def _mpirun_version(mpirun: str) -> str:
     lines = [" ".join(line.split()) for line in output.splitlines()]
     # The version is in the first line of Open MPI, in the second of MPICH's Hydra.
     return next((line for line in lines if any(c.isdigit() for c in line)), "")
+
+
+# --------------------------------------------------------------------- in a process of its own
+
+
+def _report(scratch: Path, together: bool) -> None:
+    """Load the libraries, write a file together if one of several ranks, and write a report."""
+    found: dict[str, Any] = {"mpi_loads": True}
+    reason = ""
+    try:
+        import mpi4py
+
+        # One process alone does not initialise MPI, which can hang if the network is misconfigured.
+        mpi4py.rc.initialize = together
+        importlib.import_module("mpi4py.MPI")
+    except (ImportError, RuntimeError) as error:
+        found["mpi_loads"], reason = False, f"does not load: {last_lines(str(error))}"
+    found["versions"] = installed() | ({"mpi": reason} if reason else {})
+    # "3.0 parallel"; without HDF5 the reason
+    parallel = found["parallel_hdf5"] = found["versions"]["hdf5"].endswith("parallel")
+    if together:
+        from mpi4py import MPI
+
+        comm = MPI.COMM_WORLD
+        found["size"] = comm.size
+        if comm.size > 1:
+            found["mpio"] = "serial h5py"
+            if parallel:
+                found["mpio"] = _write_together(scratch / "together.h5", comm)
+    (scratch / f"report-{os.getpid()}.json").write_text(json.dumps(found))
+
+
+def _write_together(path: Path, comm: Any) -> str:
+    """Create a file collectively and write one row a rank; return "ok" or the reason."""
+    import h5py
+    import numpy as np
+
+    try:
+        with h5py.File(path, "w", driver="mpio", comm=comm) as file:
+            rows = file.create_dataset("rows", (comm.size, 1000), dtype="f8")
+            with rows.collective:
+                rows[comm.rank] = comm.rank
+            file.flush()
+            rows[comm.rank, 0] = comm.rank + 0.5
+        comm.Barrier()
+        with h5py.File(path, "r") as file:
+            expected = np.repeat(np.arange(comm.size, dtype=float)[:, None], 1000, axis=1)
+            expected[:, 0] += 0.5
+            if not np.array_equal(file["rows"][()], expected):
+                return "the file does not hold what was written"
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        return last_lines(str(error))
+    return "ok"
+
+
+if __name__ == "__main__":
+    end_with_parent()
+    _report(Path(sys.argv[1]), together=len(sys.argv) > 2)

@@ -144,26 +144,23 @@ class Film:
             {"x": drawing.across, "top": drawing.top, "rate": _RATE, "frames": frames},
             separators=(",", ":"),
         )
+        result, gamma = self._result, self._result.problem.work_of_adhesion
+        name, work = "loop: loss", result.lost
+        if isinstance(result, PathResult):
+            name, work = "path: work", result.work
         jumps = counted(len(self._result.jumps), "jump")
         shown = self._scenes.jumps_shown
         if shown < len(self._result.jumps):
             jumps += f", of which the {shown} with the largest drops have frames of their own"
         parts = {
             "@SVG@": drawing.svg(),
-            "@TITLE@": escape(self._title),
+            "@TITLE@": escape(f"{name} {work:.4g} J/m² at γ = {gamma:g} J/m²"),
             "@JUMPS@": escape(jumps),
             "@LAST@": str(len(self) - 1),
             "@DATA@": data.replace("<", "\\u003c"),
         }
         template = Path(__file__).with_name("film.html").read_text(encoding="utf-8")
         return re.sub("@[A-Z]+@", lambda found: parts[found[0]], template)
-
-    @property
-    def _title(self) -> str:
-        problem = self._result.problem
-        work = self._result.work if isinstance(self._result, PathResult) else self._result.loss
-        name = "path: work" if isinstance(self._result, PathResult) else "loop: loss"
-        return f"{name} {work:.4g} J/m² at γ = {problem.work_of_adhesion:g} J/m²"
 
     def _animation(self, ending: str, progress: Callable[[int, int], None] | None) -> bytes:
         """Return the film as matplotlib's own writer makes it."""

@@ -1,19 +1,14 @@
-"""Make what ``adhesis loop`` writes: the JSON of a loop, the fields at chosen penetrations.
-
-How files are written is in :mod:`adhesis.ensemble.outputs`.
-"""
+"""Make what ``adhesis loop`` writes: the JSON of a loop, the fields at chosen penetrations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import whole_file
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import LoopState
 from adhesis.solver.loading.path import PathResult
@@ -29,13 +24,21 @@ def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
     columns = {name: values.tolist() for name, values in result.columns().items()}
     interior, details = result.interior, asdict(result.method)
     del details["name"]
+    control, h_max = result.problem.control, result.problem.profile.h_max
+    displacement = {}
+    if not control.is_fixed:  # path of the far side in h_max
+        far = control.displacement(result.separation, result.mean_stress, h_max)
+        displacement["displacement"] = (far / h_max).tolist()
     document = {
         **result.numbers(),
-        **_displacement(result),
+        **displacement,
         "interior_tension": None if interior is None else asdict(interior),
         "loss_note": result.loss_note,
         "warnings": list(result.warnings),
-        "method_details": {key: _plain(value) for key, value in details.items()},
+        "method_details": {
+            key: value.tolist() if hasattr(value, "tolist") else value
+            for key, value in details.items()
+        },
         "jumps": result.jump_rows(),
         **columns,
     }
@@ -66,22 +69,6 @@ def document(
     for one in documents:
         one["warnings"] = [*warnings, *one["warnings"]]
     return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})
-
-
-def _displacement(result: LoopResult | PathResult) -> dict[str, Any]:
-    """Path of the far side in h_max; none at fixed separation."""
-    control, h_max = result.problem.control, result.problem.profile.h_max
-    if control.is_fixed:
-        return {}
-    far = control.displacement(result.separation, result.mean_stress, h_max)
-    return {"displacement": (far / h_max).tolist()}
-
-
-def _plain(value: Any) -> Any:
-    """Return ``value`` with numpy numbers and arrays as the JSON types."""
-    return (
-        value.item() if isinstance(value, np.generic) else getattr(value, "tolist", lambda: value)()
-    )
 
 
 # ---------------------------------------------------------------------- fields
@@ -155,10 +142,3 @@ def _arrays(found: Sequence[LoopState], n: int) -> dict[str, Any]:
         },
         "edges": edges,
     }
-
-
-def write_npz(path: Path, arrays: dict[str, Any]) -> None:
-    """Write arrays as a compressed .npz, whole or not at all (OSError)."""
-    save: Callable[..., None] = np.savez_compressed
-    with whole_file(path) as stream:
-        save(stream, **arrays)

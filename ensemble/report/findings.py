@@ -26,8 +26,7 @@ from adhesis.ensemble.report.further_axes import (
 )
 from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.task.doubt import why_beyond
-from adhesis.ensemble.task.preload import INSTEAD, highest_stress, most_reached
+from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached, why_beyond
 from adhesis.solver.loading.zero_range import ANY_RANGE
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.

@@ -10,7 +10,7 @@ checksum of every row, and BLAKE2b takes more than four times as long.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from math import prod
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS
-from adhesis.ensemble.task.dataset import KEPT, Dataset, row_shape
+from adhesis.ensemble.task.dataset import KEPT, row_shape
 
 _BLOCK_BYTES = 16 * 2**20
 
@@ -54,35 +54,19 @@ def row_checksums(
     and ``rows`` ascend.
     """
     out = np.zeros(rows.size, np.uint32)
-    widths = [prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in OF_TASKS]
-    step = max(1, _BLOCK_BYTES // sum(widths))
+    width = sum(prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in OF_TASKS)
+    step = max(1, _BLOCK_BYTES // width)
+    places = dict(zip(kept.tolist(), range(kept.size), strict=True))
     done = 0
     while done < rows.size:
         first = int(rows[done])
         last = done + int(np.searchsorted(rows[done:], first + step))
-        block = _side_by_side(read, OF_TASKS, slice(first, int(rows[last - 1]) + 1), widths)
-        for place in range(done, last):
-            row = int(rows[place])
-            value = zlib.crc32(block[row - first].data)
-            where = int(np.searchsorted(kept, row))
-            if where < kept.size and kept[where] == row:
-                here = slice(where, where + 1)
+        block = [read(d.name, slice(first, int(rows[last - 1]) + 1)) for d in OF_TASKS]
+        for number, row in enumerate(rows[done:last].tolist(), done):
+            value = checksum(values[row - first : row - first + 1] for values in block)
+            if row in places:
+                here = slice(places[row], places[row] + 1)
                 value = checksum((read(d.name, here) for d in OF_KEPT), value)
-            out[place] = value
+            out[number] = value
         done = last
-    return out
-
-
-def _side_by_side(
-    read: Read, datasets: Iterable[Dataset], rows: slice, widths: Sequence[int]
-) -> NDArray[np.uint8]:
-    """Return the bytes of rows of several datasets, those of a row in one piece."""
-    count = rows.stop - rows.start
-    out = np.empty((count, sum(widths)), np.uint8)
-    place = 0
-    for dataset, width in zip(datasets, widths, strict=True):
-        values = read(dataset.name, rows)
-        little = values.astype(values.dtype.newbyteorder("<"), copy=False)
-        out[:, place : place + width] = little.reshape(-1).view(np.uint8).reshape(count, width)
-        place += width
     return out

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results import schema
@@ -95,12 +95,7 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
 
 def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
     """Refuse a file of another campaign, or of one whose rows have other shapes."""
-    difference = compare(part.campaign, campaign)
-    if difference.other:
-        raise InputError(
-            f"{part.path} holds another campaign than {of}: {'; '.join(difference.other)} "
-            f"(here: {of}, there: {part.path})"
-        )
+    growth(part.path, part.campaign, campaign, of)
     if not schema.same_rows(part.campaign, campaign):
         raise InputError(
             f"{part.path} cannot be merged into {of}: the bins of its spectra differ (they follow "

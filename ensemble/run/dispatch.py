@@ -38,17 +38,21 @@ from __future__ import annotations
 
 import heapq
 import math
+import signal
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any, Protocol
 
-from adhesis.ensemble.run.attempt import Compute, GivenUp, Outcome, attempt
+from adhesis.ensemble.run.interrupt import in_main_thread, raised_by_handler
 from adhesis.ensemble.run.schedule import Schedule
 
-Deliver = Callable[[Outcome], Outcome]
-Collect = Callable[[Outcome], None]
+# Called by a task now and then, perhaps with a note on how far it is; it raises to end the task.
+StopCheck = Callable[..., None]
+Compute = Callable[[int, StopCheck], Any]
 Message = tuple[Any, ...]
 
 MASTER = 0
@@ -59,8 +63,33 @@ SHORTEST_PAUSE, LONGEST_PAUSE = 1e-3, 5e-3
 AHEAD, MOST_AHEAD = 0.05, 32
 # A worker that was not heard from for so long (s) ends the run; it reports at this interval (s).
 SILENCE, REPORT_INTERVAL = 120.0, 10.0
+# Interval at which a task in progress checks whether to stop, in s.
+WATCH_INTERVAL = 0.5
 # A look of the master counts as at most so much silence (s): messages wait while it is held up.
 _LONGEST_LOOK = 1.0
+
+
+class GivenUp(BaseException):
+    """Raised in a task when the run stops; not an Exception, so that no task handles it."""
+
+
+class TimeLimit(BaseException):
+    """Raised in a task that exceeds its time limit."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Outcome of a task."""
+
+    task: int
+    rank: int  # rank that computed it
+    seconds: float  # wall time
+    error: str | None = None  # reason of a failure
+    result: Any = None  # return value of ``compute``, until ``deliver`` has stored it
+
+
+Deliver = Callable[[Outcome], Outcome]
+Collect = Callable[[Outcome], None]
 
 
 class Unresponsive(RuntimeError):
@@ -101,7 +130,6 @@ class Master:
 
     channel: Channel
     schedule: Schedule
-    group_of: Mapping[int, Hashable]  # group of each task, for its measured time
     collect: Collect
     limits: Limits
     tick: Callable[[], None] = lambda: None  # called often while nothing arrives (progress)
@@ -207,7 +235,7 @@ class Master:
     def _finish(self, rank: int, outcome: Outcome) -> None:
         self._answered(rank, outcome.task)
         if outcome.error is None:
-            self.schedule.measured(self.group_of[outcome.task], outcome.seconds)
+            self.schedule.measured(self.schedule.group_of[outcome.task], outcome.seconds)
         self._hand_out()
         self.collect(outcome)
         self._hand_out()  # what was collected may have brought further tasks
@@ -230,7 +258,7 @@ class Master:
             tasks = self.schedule.take(self.limits.time_left())
             if not tasks:
                 return
-            seconds = self.schedule.mean(self.group_of[tasks[0]])
+            seconds = self.schedule.mean(self.schedule.group_of[tasks[0]])
             for task in tasks:
                 sent[task] = math.inf if seconds is None else seconds
                 self.notes[task] = None
@@ -260,14 +288,74 @@ class Master:
                 self._reason = self._reason or message[1][1]
 
 
+def attempt(
+    compute: Compute, task: int, rank: int, stop: Callable[[Any], bool], limit: float | None
+) -> Outcome:
+    """Compute one task; failures become part of the outcome.
+
+    ``stop`` takes the note of the task's last check, or None, and returns whether to give it up:
+    GivenUp is then raised. ``limit`` is in s. What the handler of a signal raises meanwhile passes.
+    """
+    started = time.perf_counter()
+    end = started + (math.inf if limit is None else limit)
+
+    def check(note: Any = None) -> None:
+        if stop(note):
+            raise GivenUp
+        if time.perf_counter() > end:
+            raise TimeLimit(f"longer than the time limit of {limit:g} s")
+
+    result, error = None, None
+    try:
+        with _watched(check):
+            result = compute(task, check)
+    except TimeLimit as failure:
+        error = str(failure)
+    except Exception as failure:
+        if raised_by_handler(failure):
+            raise
+        error = f"{type(failure).__name__}: {failure}"
+    return Outcome(task, rank, time.perf_counter() - started, error, result)
+
+
+@contextmanager
+def _watched(check: StopCheck) -> Iterator[None]:
+    """Call ``check`` from a timer too: a task may hang before it calls it itself.
+
+    A timer of the caller's own stays, and there is none of ours then.
+    """
+    if not in_main_thread() or signal.getitimer(signal.ITIMER_REAL)[0] > 0:
+        yield
+        return
+    finished = False
+
+    def on_alarm(number: int, frame: FrameType | None) -> None:
+        nonlocal finished
+        if not finished:
+            try:
+                check()
+            except BaseException:
+                finished = True  # a second exception would interrupt the unwinding of this one
+                raise
+
+    before = signal.signal(signal.SIGALRM, on_alarm)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, WATCH_INTERVAL, WATCH_INTERVAL)
+        yield
+    finally:
+        finished = True
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL if before is None else before)
+
+
 @dataclass(eq=False)
 class Worker:
     """Worker of a hand-out: computes what it is sent until it is dismissed; see the module."""
 
     channel: Channel
     compute: Compute
-    deliver: Deliver
     limits: Limits
+    deliver: Deliver = lambda outcome: outcome
     clock: Callable[[], float] = time.monotonic  # replaced in tests
 
     def __post_init__(self) -> None:
@@ -342,13 +430,13 @@ class OwnWorker:
     Both ends of it are this object: the worker alone looks for urgent messages.
     """
 
-    def __init__(self, compute: Compute, deliver: Deliver, limits: Limits) -> None:
+    def __init__(self, compute: Compute, limits: Limits) -> None:
         self.rank = MASTER
         self.workers: Sequence[int] = (MASTER + 1,)
         self._tasks: deque[Message] = deque()
         self._urgent: deque[Message] = deque()
         self._answers: deque[Message] = deque()
-        self._worker = Worker(self, compute, deliver, limits)
+        self._worker = Worker(self, compute, limits)
 
     def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
         """Keep a message for the other end."""

@@ -28,6 +28,8 @@ from adhesis.ensemble.versions import versions
 from adhesis.solver.checks import counted
 
 Group = tuple[float, ...]
+"""Cell of the tasks that take about the same time: of those that share a loading branch, without
+their turning point."""
 _MOST_SHOWN = 10
 _AGAIN = "; this run computes damaged rows again"
 
@@ -209,7 +211,7 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
     times: dict[Group, tuple[float, int]] = {}
     seconds = results.column("wall_time").tolist()
     for row in np.flatnonzero(status == DONE).tolist():
-        group = group_of(results.campaign, tasks[row])
+        group = results.campaign.branch_of(tasks[row]).cell
         sum_before, count = times.get(group, (0.0, 0))
         times[group] = (sum_before + seconds[row], count + 1)
     rows, batches = np.flatnonzero(status == PENDING).tolist(), None
@@ -229,14 +231,6 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         failed=int(np.sum(status == FAILED)),
         times=times,
     )
-
-
-def group_of(campaign: Campaign, task: Task) -> Group:
-    """Return a key of the tasks that take about the same time: their cell.
-
-    Of tasks that share a loading branch it leaves out where they turn.
-    """
-    return campaign.sharing(task)[0].cell if campaign.branch_of(task) else task.cell
 
 
 def prior(task: Task) -> float:

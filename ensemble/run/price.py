@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-import resource
-import sys
 import time
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from html import escape
 from itertools import groupby
@@ -24,9 +22,10 @@ from adhesis.ensemble.quantities import duration, percent
 from adhesis.ensemble.results.layout import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
-from adhesis.ensemble.run.plan import group_of, prior
+from adhesis.ensemble.run.launch import peak_bytes
+from adhesis.ensemble.run.plan import prior
 from adhesis.ensemble.task.compute import Runner
-from adhesis.ensemble.task.preload import INSTEAD, highest_stress, most_reached
+from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached
 from adhesis.ensemble.task.row import Row
 from adhesis.solver.checks import counted
 from adhesis.solver.method import PathError
@@ -43,6 +42,9 @@ _FEWEST_FOR_SPREAD = 6
 _FEWEST_FOR_POWER, _NARROW, _POWERS = 3, 0.1, (0.5, 3.0)
 
 Cell = tuple[float, ...]
+Known = dict[Cell, list[tuple[float, float]]]
+"""Of loops that are done or were tried out, by cell: CPU time in s, and the quantity of ``[stop]``,
+NaN where it is not known."""
 
 
 @dataclass(frozen=True)
@@ -147,29 +149,6 @@ class Price:
         return max(1, min(self.left, math.floor(self.seconds / (_BUSY * self.longest))))
 
 
-class _Known:
-    """Times and the quantity of ``[stop]`` by cell, of loops that are done or were tried out."""
-
-    def __init__(self, tasks: Sequence[Task]) -> None:
-        self.seconds: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
-        self.values: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
-
-    def add(self, cell: Cell, seconds: float, value: float) -> None:
-        """Take in a loop; a value that is not known is NaN."""
-        self.seconds[cell].append(seconds)
-        if math.isfinite(value):
-            self.values[cell].append(value)
-
-    def spread(self) -> tuple[float, int]:
-        """Standard deviation of a value over the mean of its cell, and the number of values."""
-        cells = [np.array(values) for values in self.values.values() if len(values) > 1]
-        freedom = sum(values.size - 1 for values in cells)
-        if freedom < _FEWEST_FOR_SPREAD:
-            return math.nan, 0
-        square = sum(float(np.sum((x / x.mean() - 1) ** 2)) for x in cells)
-        return math.sqrt(square / freedom), sum(values.size for values in cells)
-
-
 def price(
     campaign: Campaign,
     path: Path | None = None,
@@ -191,13 +170,16 @@ def price(
     """
     compute = compute or Runner()
     tasks = campaign.tasks(part)
-    known = _Known(tasks.of_cells())
+    known: Known = {task.cell: [] for task in tasks.of_cells()}
     left, done = tasks, 0
     if path is not None and os.path.exists(path):
         left, done = _left(campaign, path, tasks, known)
     for task in left.of_cells():
         check(campaign, task)
-    to_try = _to_try(left, known)
+    # Of the cells that are not known yet, realisation by realisation
+    unknown = np.array([not known.get(cell) for cell in left.cells])
+    rows = left.rows[unknown[left.cell_of()]]
+    to_try = left.chosen(rows[np.argsort(rows % left.realisations, kind="stable")])
     pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
     short: list[float] = []
     for unit in _units(campaign, to_try):
@@ -213,7 +195,7 @@ def price(
             took = float(row["cpu_time"])
             if row.get("preload_reached") == 0:
                 short.append(highest_stress(row["loading_mean_stress"]))
-            known.add(task.cell, took, float(row.get(campaign.stop.quantity, math.nan)))
+            known[task.cell].append((took, float(row.get(campaign.stop.quantity, math.nan))))
             pilots, together = pilots + 1, together + took
             on_pilot(task, took)
         spent, longest = spent + together, max(longest, together)
@@ -224,7 +206,7 @@ def price(
         cells=cells,
         longest=max(longest, _longest(campaign, cells)) if left else 0.0,
         file_bytes=file_size(campaign, part),
-        rank_bytes=_rank_bytes(),
+        rank_bytes=peak_bytes(),
         pilots=pilots,
         pilot_seconds=spent,
         pilots_short=len(short),
@@ -233,7 +215,7 @@ def price(
     )
 
 
-def _left(campaign: Campaign, path: Path, tasks: Tasks, known: _Known) -> tuple[Tasks, int]:
+def _left(campaign: Campaign, path: Path, tasks: Tasks, known: Known) -> tuple[Tasks, int]:
     """Tasks that a run would compute, and the number of those with a result."""
     left = np.zeros(campaign.task_count, bool)
     left[tasks.rows] = True
@@ -246,15 +228,8 @@ def _left(campaign: Campaign, path: Path, tasks: Tasks, known: _Known) -> tuple[
         more = (NOT_NEEDED,) if campaign.stop != results.campaign.stop else ()
         left[rows[~np.isin(status, (PENDING, DAMAGED, *more))]] = False
     for task, took, value in zip(tasks.chosen(rows[done]), seconds, values, strict=True):
-        known.add(task.cell, took, value)
+        known[task.cell].append((took, value))
     return tasks.chosen(np.flatnonzero(left)), int(done.sum())
-
-
-def _to_try(left: Tasks, known: _Known) -> Tasks:
-    """Tasks of the cells that are not known yet, realisation by realisation."""
-    unknown = np.array([not known.seconds.get(cell) for cell in left.cells])
-    rows = left.rows[unknown[left.cell_of()]]
-    return left.chosen(rows[np.argsort(rows % left.realisations, kind="stable")])
 
 
 def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:
@@ -265,16 +240,16 @@ def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:
     for _, of_realisation in groupby(tasks, key=attrgetter("realisation")):
         found: dict[Hashable, list[Task]] = {}
         for task in of_realisation:
-            found.setdefault(campaign.branch_of(task) or task, []).append(task)
+            found.setdefault(campaign.branch_of(task), []).append(task)
         yield from sorted(found.values(), key=lambda unit: sum(prior(task) for task in unit))
 
 
 def _cells(
-    campaign: Campaign, tasks: Tasks, left: Tasks, known: _Known
+    campaign: Campaign, tasks: Tasks, left: Tasks, known: Known
 ) -> tuple[tuple[CellPrice, ...], str]:
     firsts = tasks.of_cells()
     first = {task.cell: task for task in firsts}
-    mean = {cell: float(np.mean(seconds)) for cell, seconds in known.seconds.items() if seconds}
+    mean = {cell: float(np.mean(loops, axis=0)[0]) for cell, loops in known.items() if loops}
     of_prior = _law([prior(first[cell]) for cell in mean], list(mean.values()))
     of_cell = np.bincount(left.cell_of(), minlength=len(tasks.cells))
     count = dict(zip(first, of_cell[firsts.cell_of()].tolist(), strict=True))
@@ -289,7 +264,7 @@ def _cells(
             task,
             count[cell],
             mean[cell] if cell in mean else of_prior(prior(task)),
-            len(known.seconds[cell]),
+            len(known[cell]),
         )
         for cell, task in first.items()
     ), stop
@@ -311,17 +286,25 @@ def _law(priors: list[float], seconds: list[float]) -> Callable[[float], float]:
     return lambda prior: float(np.exp(y.mean() + power * (np.log(prior) - x.mean())))
 
 
-def _realisations(campaign: Campaign, known: _Known) -> tuple[int, str]:
-    """Realisations that a cell takes with ``[stop]``, and a sentence on it."""
+def _realisations(campaign: Campaign, known: Known) -> tuple[int, str]:
+    """Realisations that a cell takes with ``[stop]``, and a sentence on it.
+
+    They follow from the standard deviation of a value over the mean of its cell.
+    """
     at = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
     few = fewest(at)
-    spread, loops = known.spread()
-    if not loops:
+    values = [np.array([v for _, v in loops if math.isfinite(v)]) for loops in known.values()]
+    values = [of_cell for of_cell in values if of_cell.size > 1]
+    freedom = sum(of_cell.size - 1 for of_cell in values)
+    if freedom < _FEWEST_FOR_SPREAD:
         return at[-1], f"[stop]: {few} to {at[-1]} realisations a cell; the price is for {at[-1]}"
+    square = sum(float(np.sum((x / x.mean() - 1) ** 2)) for x in values)
+    spread = math.sqrt(square / freedom)
     assert campaign.stop.relative_error is not None
     count = fewest(at, (1.96 * spread / campaign.stop.relative_error) ** 2)
     return count, (
-        f"[stop]: about {count} realisations a cell, as {campaign.stop.quantity} of {loops} loops "
+        f"[stop]: about {count} realisations a cell, as {campaign.stop.quantity} of "
+        f"{sum(of_cell.size for of_cell in values)} loops "
         f"scatters by {percent(spread)} so far; at least {few}, at most {at[-1]}"
     )
 
@@ -331,11 +314,6 @@ def _longest(campaign: Campaign, cells: tuple[CellPrice, ...]) -> float:
     together: dict[Hashable, float] = {}
     for cell in cells:
         if cell.tasks:
-            key = group_of(campaign, cell.task)
+            key = campaign.branch_of(cell.task)
             together[key] = together.get(key, 0.0) + cell.seconds
     return max(together.values(), default=0.0)
-
-
-def _rank_bytes() -> int:
-    kibibytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return kibibytes if sys.platform == "darwin" else 1024 * kibibytes

@@ -16,8 +16,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Self
 
 from adhesis.ensemble.exit_codes import ended_by
-from adhesis.ensemble.run.attempt import Compute
-from adhesis.ensemble.run.dispatch import MASTER, REPORT_INTERVAL, Limits, Message, Worker
+from adhesis.ensemble.run.dispatch import MASTER, Compute, Limits, Message, Worker
 from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
 
 _TO_END = 10.0  # s for a process to end once its socket is closed
@@ -28,19 +27,14 @@ class Processes:
 
     They neither fork nor import the caller's script, so that this works from a notebook as well as
     from the command line. A process that ends, killed for want of memory say, takes its tasks with
-    it, and another one is started in its place. ``compute`` is pickled; both times are in s.
+    it, and another one is started in its place. ``compute`` is pickled; of the limits those of a
+    task's time count.
     """
 
-    def __init__(
-        self,
-        count: int,
-        compute: Compute,
-        task_seconds: float | None = None,
-        report_interval: float = REPORT_INTERVAL,
-    ) -> None:
+    def __init__(self, count: int, compute: Compute, limits: Limits) -> None:
         self.rank = MASTER
         self.workers: Sequence[int] = range(1, count + 1)
-        self._work = (compute, task_seconds, report_interval)
+        self._work = (compute, limits.task_seconds, limits.report_interval)
         self._inbox: deque[tuple[int, Message]] = deque()
         self._processes: dict[int, subprocess.Popen[bytes]] = {}
         self._sockets: dict[int, Connection] = {}
@@ -152,7 +146,7 @@ def _work(rank: int, connection: Connection) -> None:
     except EOFError:
         return  # the parent has gone before it sent anything
     limits = Limits(task_seconds=task_seconds, report_interval=report_interval)
-    Worker(_Socket(rank, connection), compute, lambda outcome: outcome, limits).run()
+    Worker(_Socket(rank, connection), compute, limits).run()
 
 
 if __name__ == "__main__":

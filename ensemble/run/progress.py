@@ -10,8 +10,6 @@ from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.reporter import Display
 
-_LINE_INTERVALS = (5.0, 60.0)  # s: at first, and at most
-_LINES_AT_LEAST = 40  # the time between lines is this part of the time so far: 15 s after 10 min
 _MOST_FAILURES_SHOWN = 5
 
 
@@ -48,12 +46,6 @@ class Summary:
         return f"{self.done} of {self.total} tasks done{failed}; {now}"
 
 
-def interval(elapsed: float) -> float:
-    """Return the time between two lines of a run, in s, after so many."""
-    first, most = _LINE_INTERVALS
-    return min(max(first, elapsed / _LINES_AT_LEAST), most)
-
-
 class ProgressLine(Display):
     """Progress of a run, on rank 0, from counts that the run keeps up to date.
 
@@ -66,7 +58,7 @@ class ProgressLine(Display):
         time_left: Callable[[], float | None],
         stream: TextIO | None = None,
     ) -> None:
-        super().__init__(self._line, interval, stream, at_once=True)
+        super().__init__(self._line, stream, at_once=True)
         self._counts = counts
         self._time_left = time_left
 

@@ -1,14 +1,13 @@
 """Use MPI: messages, an honest count of ranks, no rank left waiting.
 
 The only module of a run that imports mpi4py, and only inside its functions: one process runs where
-there is no MPI (:mod:`adhesis.ensemble.doctor.probe`, in processes of its own, tries MPI out).
+there is no MPI (:mod:`adhesis.ensemble.doctor.examine`, in processes of its own, tries MPI out).
 """
 
 from __future__ import annotations
 
 import math
 import os
-import pickle
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -88,6 +87,9 @@ def world() -> Any:
     if "mpi4py.MPI" not in sys.modules and not any(hints):
         return OneRank()
     try:
+        import mpi4py
+
+        mpi4py.rc.recv_mprobe = False  # matched probes, the default, fail on some networks
         from mpi4py import MPI
     except (ImportError, RuntimeError, OSError) as error:
         if size > 1:
@@ -137,8 +139,7 @@ def wait_for_all(comm: Any, seconds: float = math.inf) -> bool:
 class MpiChannel:
     """:class:`adhesis.ensemble.run.dispatch.Channel` over MPI.
 
-    Plain probes and receives of pickled bytes: matched probes, mpi4py's default, fail on some
-    networks. One thread a rank, so that nobody else can take a message that was probed.
+    One thread a rank, so that nobody else can take a message that was probed.
     """
 
     def __init__(self, comm: Any) -> None:
@@ -151,17 +152,13 @@ class MpiChannel:
 
     def send(self, to: int, message: tuple[Any, ...], *, urgent: bool = False) -> None:
         """Send a message to a rank."""
-        data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-        self._comm.Send([data, self._mpi.BYTE], dest=to, tag=_URGENT_TAG if urgent else _TAG)
+        self._comm.send(message, dest=to, tag=_URGENT_TAG if urgent else _TAG)
 
     def poll(self, *, urgent: bool = False) -> tuple[int, tuple[Any, ...]] | None:
         """Return the next message and who sent it, or None."""
         status = self._mpi.Status()
         tag = _URGENT_TAG if urgent else _TAG
-        if not self._comm.Iprobe(source=self._mpi.ANY_SOURCE, tag=tag, status=status):
+        if not self._comm.iprobe(source=self._mpi.ANY_SOURCE, tag=tag, status=status):
             return None
         source = status.Get_source()
-        data = bytearray(status.Get_count(self._mpi.BYTE))
-        self._comm.Recv([data, self._mpi.BYTE], source=source, tag=tag)
-        message: tuple[Any, ...] = pickle.loads(data)
-        return source, message
+        return source, self._comm.recv(source=source, tag=tag)

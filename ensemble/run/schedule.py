@@ -44,7 +44,7 @@ class Schedule:
         key_of: Mapping[int, Hashable] | None = None,
     ) -> None:
         self._groups = {name: _Group(prior) for name, prior in priors.items()}
-        self._group_of, self._round_of, self._key_of = group_of, round_of, key_of or {}
+        self.group_of, self._round_of, self._key_of = group_of, round_of, key_of or {}
         self._rounds: dict[int, list[Unit]] = {}
         self._turns: list[int] = []  # heap of these rounds, and of some that are over
         self._ordered: set[int] = set()  # rounds whose units stand in order, the longest last
@@ -97,7 +97,7 @@ class Schedule:
             return None
         left: dict[Hashable, float] = {n: group.waiting for n, group in self._groups.items()}
         for task in in_flight:
-            left[self._group_of[task]] += 0.5
+            left[self.group_of[task]] += 0.5
         return sum(count * (self.estimate(name) or 0.0) for name, count in left.items()) / workers
 
     def take(self, time_left: float | None = None) -> Unit:
@@ -128,12 +128,12 @@ class Schedule:
 
     def _count(self, unit: Iterable[int], by: int) -> None:
         for task in unit:
-            self._groups[self._group_of[task]].waiting += by
+            self._groups[self.group_of[task]].waiting += by
             self.waiting += by
 
     def _length(self, unit: Unit) -> float:
         """Estimated time of a unit in s, or relative to others before any is known."""
-        group = self._group_of[unit[0]]
+        group = self.group_of[unit[0]]
         estimate = self.estimate(group)
         return len(unit) * (self._groups[group].prior if estimate is None else estimate)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,10 +19,10 @@ from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
-from adhesis.ensemble.run.attempt import Outcome, StopCheck
+from adhesis.ensemble.run.dispatch import Outcome, StopCheck
 from adhesis.ensemble.run.interrupt import GRACE, StopSignals
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
+from adhesis.ensemble.run.plan import Options, Plan, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
@@ -90,7 +90,11 @@ def run_campaign(
             raise
         origins = [""] * size
         if plan.rows:
-            origins = _origins(comm, size)
+            # The last bits of a rank's rows depend on versions and processor. All ranks run one
+            # installation, on nodes that may differ; processes that this one starts have its own.
+            known = together(comm, versions)
+            processors = comm.allgather(processor()) * (size // comm.size)
+            origins = [origin_of(known | {"processor": name}) for name in processors]
         own_rows = comm.size > 1 and engine.all_write
         if own_rows and comm.rank > 0:
             lock.join()
@@ -102,17 +106,6 @@ def run_campaign(
         with engine.watch():
             stopped = session.run(comm, own_rows)
     return together(comm, lambda: session.summary(stopped))
-
-
-def _origins(comm: Any, size: int) -> list[str]:
-    """Return versions and processor of each rank, on which the last bits of its rows depend.
-
-    All ranks run one installation, but nodes may have different processors; processes that this one
-    starts have its own.
-    """
-    known = together(comm, versions)
-    processors = comm.allgather(processor()) * (size // comm.size)
-    return [origin_of(known | {"processor": name}) for name in processors]
 
 
 @dataclass(frozen=True)
@@ -147,9 +140,6 @@ class _Session:
         self._ends = None if deadline is None else deadline.at - time.time() + self._started
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Summary(total, plan.done, plan.failed)
-        self._groups: Mapping[int, Group] = {
-            row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
-        }
         self._compute = _Computing(campaign, plan.tasks, engine.compute)
         self._limits = dispatch.Limits(
             stop=self._stop,
@@ -164,7 +154,7 @@ class _Session:
         """Hand out, work, or both; returns on rank 0 why the run stopped early, or None."""
         if comm.rank > 0:
             deliver = self._write if own_rows else lambda outcome: outcome
-            dispatch.Worker(MpiChannel(comm), self._compute, deliver, self._limits).run()
+            dispatch.Worker(MpiChannel(comm), self._compute, self._limits, deliver).run()
             return None
         limits = self._limits
         with ExitStack() as stack:
@@ -172,14 +162,10 @@ class _Session:
             if comm.size > 1:
                 channel = MpiChannel(comm)
             elif self.options.processes and self.plan.rows:
-                channel = stack.enter_context(
-                    Processes(
-                        *(self.options.processes, self._compute),
-                        *(limits.task_seconds, limits.report_interval),
-                    )
-                )
+                processes = Processes(self.options.processes, self._compute, limits)
+                channel = stack.enter_context(processes)
             else:
-                channel = dispatch.OwnWorker(self._compute, lambda outcome: outcome, limits)
+                channel = dispatch.OwnWorker(self._compute, limits)
             return self._hand_out(channel, own_rows)
 
     def _hand_out(self, channel: dispatch.Channel, own_rows: bool) -> str | None:
@@ -201,9 +187,7 @@ class _Session:
                     + ("; Ctrl-C again ends at once" if self.signals.received == "SIGINT" else "")
                 )
 
-        master = dispatch.Master(
-            channel, schedule, self._groups, collect, self._limits, halted=halted
-        )
+        master = dispatch.Master(channel, schedule, collect, self._limits, halted=halted)
         with progress:
             return master.run()
 
@@ -252,12 +236,11 @@ class _Session:
 
     def _schedule(self) -> Schedule:
         tasks = self.plan.tasks
-        priors: dict[Hashable, float] = {
-            self._groups[row]: prior(task) for row, task in enumerate(tasks)
-        }
-        rounds = {row: task.realisation for row, task in enumerate(tasks)}
         branches = {row: self.campaign.branch_of(task) for row, task in enumerate(tasks)}
-        schedule = Schedule(self.plan.rows, self._groups, priors, rounds, branches)
+        groups = {row: branch.cell for row, branch in branches.items()}
+        priors: dict[Hashable, float] = {groups[row]: prior(task) for row, task in enumerate(tasks)}
+        rounds = {row: task.realisation for row, task in enumerate(tasks)}
+        schedule = Schedule(self.plan.rows, groups, priors, rounds, branches)
         for group, (seconds, count) in self.plan.times.items():
             schedule.measured(group, seconds, count)
         return schedule

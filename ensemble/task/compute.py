@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,7 +70,7 @@ class _Shared:
     """Loading branch of the last task, which the next one may continue."""
 
     campaign: Campaign
-    key: Hashable
+    key: Task
     turning_point: float
     branch: LoadingBranch
 
@@ -98,7 +97,7 @@ class Runner:
         here, plan = campaign.at(task), field_plan(campaign, task)
         turn, key = here.cycle.turning_point, campaign.branch_of(task)
         branch = self._branch(campaign, task, key, turn)
-        shared = None if key is None else _Shared(campaign, key, turn, branch)
+        shared = _Shared(campaign, key, turn, branch) if key != task else None
         self._shared = None  # an interrupted branch is not continued
         try:
             loop = branch.loop(turn, marks=_marks(plan), progress=progress)
@@ -107,7 +106,7 @@ class Runner:
             raise
         self._shared = shared
         axes: dict[Branch, Array] | None = None
-        if key is not None or here.cycle.turns_at_stress:  # its load steps are not the curves' axes
+        if key != task or here.cycle.turns_at_stress:  # its load steps are not the curves' axes
             unit = campaign.penetration_unit(task)
             axes = {
                 "loading": unit * campaign.loading_penetration,
@@ -118,9 +117,7 @@ class Runner:
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         return {"wall_time": wall, "cpu_time": cpu, **row}
 
-    def _branch(
-        self, campaign: Campaign, task: Task, key: Hashable | None, turn: float
-    ) -> LoadingBranch:
+    def _branch(self, campaign: Campaign, task: Task, key: Task, turn: float) -> LoadingBranch:
         """Return the loading branch of a task: that of the last task, if they share one."""
         last = self._shared
         same = last is not None and last.campaign is campaign and last.key == key

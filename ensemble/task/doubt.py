@@ -1,4 +1,6 @@
-"""Decide which losses are doubtful: those whose estimated error exceeds the requested accuracy.
+"""Decide which losses are doubtful, and word what is known of loops short of their preload.
+
+A loss is doubtful if its estimated error exceeds the requested accuracy.
 
 A loop has two estimates of its error: the audit compares the loop integral with the sum of the
 energy drops, and ``loss_error`` is the estimated numerical error of both. The latter was compared
@@ -12,9 +14,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from adhesis.ensemble.quantities import percent
+from adhesis.ensemble.quantities import percent, stress_text
 from adhesis.solver.loading.zero_range import (
     ANY_RANGE,
     DOUBTFUL_EXCESS,
@@ -31,6 +33,7 @@ _OF_LIMIT = (
 )
 OF_DOUBT = ("audit_residual", "loss_error", *_OF_LIMIT)
 """Numbers of a row from which its loss is judged."""
+INSTEAD = "Rougher profiles, a stiffer material or a smaller preload let loops reach it"
 
 
 def why_beyond(opens: bool) -> str:
@@ -67,3 +70,18 @@ def doubtful(values: Mapping[str, Any], accuracy: float) -> NDArray[np.bool_]:
 def beyond_zero_range(values: Mapping[str, Any]) -> NDArray[np.bool_]:
     """Return which losses an adhesion of finite range may not have; see :func:`doubtful`."""
     return beyond_limit(*(values[name] for name in _OF_LIMIT))
+
+
+def highest_stress(loading: ArrayLike) -> float:
+    """Return the highest mean stress in Pa at the load steps of loops, NaN where there is none."""
+    return float(np.max(np.nan_to_num(loading, nan=-np.inf)))
+
+
+def most_reached(highest: float) -> str:
+    """Return "at load steps the mean stress is at most 3 kPa", or that all contact is in tension.
+
+    Between load steps it may be higher, up to a jump: rows of results hold load steps alone.
+    """
+    if highest <= 0:
+        return "at load steps the mean stress is a tension wherever there is contact"
+    return f"at load steps the mean stress is at most {stress_text(highest)}"

@@ -218,7 +218,8 @@ def field_row(
     }
     height, pick = profile.heights(plan.nodes), slice(None, None, plan.stride)
     row["psd_height"][:] = plan.spectral_density(height)
-    row["height_density"][:] = _density(height / profile.h_rms, HEIGHT_EDGES)
+    count, _ = np.histogram(height / profile.h_rms, HEIGHT_EDGES)
+    row["height_density"][:] = count / (np.diff(HEIGHT_EDGES) * height.size)
     if keep:
         row["field_height"][:] = height[pick]
     found = _at_penetrations(plan, loop) if plan.preload is None else _at_stresses(plan, loop)
@@ -268,9 +269,3 @@ def _at_stresses(plan: FieldPlan, loop: LoopResult) -> _Found:
                 state = loop.at_stress(part * plan.preload, branch).state
                 found[BRANCHES.index(branch), number] = state
     return found
-
-
-def _density(values: Array, edges: Array) -> Array:
-    """Return a histogram, divided by the number of values and by the width of each bin."""
-    count, _ = np.histogram(values, edges)
-    return np.asarray(count / (np.diff(edges) * values.size))

@@ -11,8 +11,7 @@ from functools import partial
 from typing import Any
 
 from adhesis.ensemble.quantities import stress_text
-from adhesis.ensemble.run.attempt import Outcome, StopCheck
-from adhesis.ensemble.run.dispatch import Channel, Limits, Master, OwnWorker
+from adhesis.ensemble.run.dispatch import Channel, Limits, Master, Outcome, OwnWorker, StopCheck
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.solver.loading.cycle import turn_arguments
@@ -168,9 +167,8 @@ class Loops:
         self.pids: list[int] = []
         expected = [(seconds or {}).get(job.name, 1.0) for job in self._jobs]
         priors: dict[Hashable, float] = dict(enumerate(expected))
-        self._groups = {task: task for task in range(self.count)}
-        rounds = dict.fromkeys(self._groups, 0)
-        self._schedule = Schedule(self._groups, self._groups, priors, rounds)
+        tasks = range(self.count)
+        self._schedule = Schedule(tasks, dict(enumerate(tasks)), priors, dict.fromkeys(tasks, 0))
         self._master: Master | None = None
 
     @property
@@ -210,11 +208,11 @@ class Loops:
         with ExitStack() as stack:
             channel: Channel
             if self.processes == 0:
-                channel = OwnWorker(computing, lambda outcome: outcome, limits)
+                channel = OwnWorker(computing, limits)
             else:
-                channel = started = Processes(self.processes, computing, report_interval=every)
+                channel = started = Processes(self.processes, computing, limits)
                 stack.enter_context(started)
                 self.pids = started.pids
-            self._master = Master(channel, self._schedule, self._groups, collect, limits, tick)
+            self._master = Master(channel, self._schedule, collect, limits, tick)
             self._master.run()
         return self.done

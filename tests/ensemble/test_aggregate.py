@@ -95,8 +95,10 @@ def test_curves_are_the_means_of_the_raw_rows(file, hurst, gamma):
 
 def test_blocks_of_any_size_give_the_same_numbers(file, monkeypatch):
     whole = aggregate(file)
-    monkeypatch.setattr("adhesis.ensemble.results.blocks.HELD_AT_ONCE", 18)  # 3 columns of 6 rows
-    monkeypatch.setattr("adhesis.ensemble.results.blocks.READ_AT_ONCE", 100)
+    monkeypatch.setattr(
+        "adhesis.ensemble.aggregate.by_blocks.HELD_AT_ONCE", 18
+    )  # 3 columns of 6 rows
+    monkeypatch.setattr("adhesis.ensemble.aggregate.by_blocks.READ_AT_ONCE", 100)
     pieces = aggregate(file)
     for one, two in zip(whole.cells, pieces.cells, strict=True):
         for name, curve in one.curves.items():
@@ -236,7 +238,7 @@ def test_a_file_without_a_finished_task_is_refused(tmp_path):
 
 MEMORY = """
 import resource, sys
-from adhesis.ensemble.results import blocks
+from adhesis.ensemble.aggregate import by_blocks as blocks
 from adhesis.ensemble.aggregate.average import aggregate
 blocks.HELD_AT_ONCE //= 20
 blocks.READ_AT_ONCE //= 20

@@ -1,4 +1,4 @@
-"""The benchmark: ratios at equal error, runs in processes of their own, tables, figure, command."""
+"""The benchmark: runs in processes of their own, tables, figure, command."""
 
 import csv
 import math
@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import adhesis.ensemble.bench.equal_error as benchmarking
+import adhesis.ensemble.bench.benchmark as benchmarking
 from adhesis.ensemble.bench.bench_figure import draw
-from adhesis.ensemble.bench.bench_page import page
-from adhesis.ensemble.bench.equal_error import Line, Reference, benchmark, ratios
-from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
+from adhesis.ensemble.bench.benchmark import Line, Reference, benchmark, page
+from adhesis.ensemble.bench.measure import Measurement, Run, measure
 from adhesis.ensemble.bench.scenes import ONE_WAVE, SMALL_ROUGH, TWO_WAVES
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.run.launch import peak_bytes
 
 REFERENCE = Reference(1.0, "made up")
 
@@ -32,27 +32,6 @@ def failed(method, setting, scene=ONE_WAVE) -> Line:
 GRID = [line("grid", 2**k, 4.0**k, 2.0**-k) for k in range(1, 5)]
 
 
-def test_ratio_is_interpolated_between_grid_runs():
-    (ratio,) = ratios([*GRID, line("sharp", 1e-2, 0.5, -(2.0**-2.5))])
-    assert ratio.converged.bound == ""
-    assert ratio.converged.value == ratio.cheapest.value == pytest.approx(4.0**2.5 / 0.5)
-
-
-def test_ratio_is_a_bound_outside_the_grid_runs():
-    better, worse = ratios([*GRID, line("sharp", 1e-6, 0.5, 0.0), line("sharp", 0.9, 0.5, 0.9)])
-    assert (better.converged.bound, better.converged.value) == (">", pytest.approx(4.0**4 / 0.5))
-    assert (worse.converged.bound, worse.converged.value) == ("<", pytest.approx(4.0 / 0.5))
-
-
-def test_a_grid_that_is_right_by_chance_is_told_beside_those_that_stay_right():
-    coarse, *finer = GRID
-    finer.append(line("grid", 1024, 1e6, 2.0**-4))  # which a cheaper one beats
-    lucky = replace(coarse, measured=replace(coarse.measured, loss=1.0 - 2.0**-3))
-    (ratio,) = ratios([lucky, *finer, line("sharp", 1e-2, 1.0, 2.0**-3)])
-    assert ratio.cheapest.value == pytest.approx(4.0)
-    assert ratio.converged.value == pytest.approx(4.0**3)
-
-
 def test_one_wave_is_measured_against_its_exact_loss():
     """In a process of its own: the memory of this one does not count."""
     ballast, error = np.ones(50_000_000), 1e-3  # 380 MB, touched
@@ -61,7 +40,7 @@ def test_one_wave_is_measured_against_its_exact_loss():
     assert measured.loss == pytest.approx(ONE_WAVE.exact_loss, rel=error)
     assert abs(measured.audit_residual) < error
     assert 0 < measured.cpu_seconds < 30
-    assert 20 < measured.megabytes_before <= measured.megabytes < 370 < peak_megabytes()
+    assert 20 < measured.megabytes_before <= measured.megabytes < 370 < peak_bytes() / 2**20
     assert ballast[0] == 1
     assert (measured.jumps, measured.patches) == (2, 1)
     assert measured.solutions > 10
@@ -117,11 +96,10 @@ def test_reference_is_the_tightest_run_that_finishes(monkeypatch):
 
 def test_page_has_every_run_and_says_what_did_not_finish():
     lines = [*GRID, failed("grid", 1024), line("sharp", 1e-3, 0.5, 1e-3)]
-    text = page(lines, ratios(lines), "a test")
+    text = page(lines, "a test")
     assert "| grid | 1024 nodes | – | – | – | – | – | – | given up after 60 s |" in text
     assert "| sharp | 1e-03 | 0.50 | 200 | 2 | +1.0e-03 | +1.0e-03 | 10 |" in text
     assert "Reference: made up." in text
-    assert "| one wave, α = 0.2 | 1e-03 | 1.0e-03 | over 5.1e+02 | over 5.1e+02 |" in text
     rows = [row for row in text.splitlines() if row.startswith("| grid")]
     assert {row.count("|") for row in rows} == {10}
 

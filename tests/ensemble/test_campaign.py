@@ -10,14 +10,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import field_plan
 from adhesis.solver.model.pattern import stripes
-from tests.support.campaign_support import ROOT, campaign_text
+from tests.support.campaign_support import ROOT, campaign_text, compare
 from tests.support.wrong_values import outside
 
 

@@ -10,11 +10,11 @@ import time
 import numpy as np
 import pytest
 
-from adhesis.ensemble.run.attempt import Outcome
 from adhesis.ensemble.run.dispatch import (
     REPORT_INTERVAL,
     Limits,
     Master,
+    Outcome,
     OwnWorker,
     Unresponsive,
     Worker,
@@ -111,7 +111,6 @@ def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **
     master = Master(
         channel,
         schedule,
-        group_of,
         collected.append,
         limits(channel) if limits else Limits(),
         clock=channel.clock,
@@ -229,7 +228,7 @@ def scripted_master(channel, tasks, collected=None):
     collected = [] if collected is None else collected
     limits = Limits(silence=120)
     return Master(
-        *(channel, schedule, group_of, collected.append, limits),
+        *(channel, schedule, collected.append, limits),
         clock=channel.clock,
         sleep=channel.sleep,
     )
@@ -297,7 +296,7 @@ def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
             now = float(k)
             check(f"step {k}")
 
-    worker = Worker(OneTask(0), compute, lambda o: o, Limits(), clock=lambda: now)
+    worker = Worker(OneTask(0), compute, Limits(), clock=lambda: now)
     worker.run()
     reports = [message for message in sent if message[0] == "alive"]
     assert reports == [("alive", 5, None), *(("alive", 5, f"step {k}") for k in (11, 22, 33))]
@@ -309,7 +308,7 @@ def hand_out(channel, tasks, limits=None, tick=lambda: None):
     outcomes: list[Outcome] = []
     schedule = schedule_of(range(tasks), group_of)
     limits = limits or Limits()
-    reason = Master(channel, schedule, group_of, outcomes.append, limits, tick).run()
+    reason = Master(channel, schedule, outcomes.append, limits, tick).run()
     return outcomes, reason
 
 
@@ -324,7 +323,7 @@ def half(task, check):
 
 
 def test_processes_are_workers_like_any_other():
-    with Processes(2, half) as channel:
+    with Processes(2, half, Limits()) as channel:
         outcomes, reason = hand_out(channel, 20)
     assert reason is None
     found = {outcome.task: outcome.error or outcome.result for outcome in outcomes}
@@ -344,14 +343,14 @@ def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
     monkeypatch.setattr(
         subprocess.Popen, "wait", lambda p, timeout=None: calls.append("wait") or wait(p, timeout)
     )
-    with Processes(1, never) as channel:
+    with Processes(1, never, Limits()) as channel:
         os.kill(channel.pids[0], signal.SIGSTOP)
     assert calls[0] == "kill"
 
 
 def alone(compute, tasks=3, limits=None):
     limits = limits or Limits()
-    return hand_out(OwnWorker(compute, lambda outcome: outcome, limits), tasks, limits)
+    return hand_out(OwnWorker(compute, limits), tasks, limits)
 
 
 def test_a_task_in_a_kernel_meets_its_time_limit():
@@ -421,7 +420,7 @@ def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
     channel = SimulatedRanks(4, seconds)
     collected: list[Outcome] = []
     master = Master(
-        *(channel, schedule, group_of, collected.append, Limits()),
+        *(channel, schedule, collected.append, Limits()),
         clock=channel.clock,
         sleep=channel.sleep,
     )

@@ -154,7 +154,7 @@ def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("run_loop", "run_loops", "run_path"):
         monkeypatch.setattr(loop_command, name, no_work)
     monkeypatch.setattr(trace_command, "run_plan", no_work)
-    monkeypatch.setattr("adhesis.ensemble.bench.equal_error.benchmark", no_work)
+    monkeypatch.setattr("adhesis.ensemble.bench.benchmark.benchmark", no_work)
     monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", no_work)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from adhesis.ensemble.aggregate.status import as_text, read_status
-from adhesis.ensemble.campaign.compare import Changes, compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.precision import (
     LEAST,
@@ -32,6 +31,7 @@ from tests.support.campaign_support import (
     adhesis,
     adhesis_here,
     campaign_text,
+    compare,
     differences,
     done_rows,
     kill_all,
@@ -309,7 +309,7 @@ def test_what_a_stop_may_be(tmp_path):
     assert len(compare(new, old).other) == 2
     assert compare(parse_campaign(campaign_text(realisations="8")), old).other
     spelt = parse_campaign(text(quantity="loss_dimensionless"))
-    assert compare(old, spelt) == Changes((), ())
+    assert compare(old, spelt) == ((), ())
     (phrase,) = compare(old, parse_campaign(text(quantity="loss"))).other
     assert phrase == "stop.quantity is 'loss' here and 'loss_dimensionless' there"
     path = tmp_path / "c.toml"

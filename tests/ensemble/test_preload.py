@@ -134,8 +134,8 @@ def test_a_mean_stress_that_the_loop_does_not_have_is_refused(tmp_path, monkeypa
 
 def test_the_way_of_a_trace_under_a_weight_has_a_unit(monkeypatch):
     monkeypatch.setattr(Loops, "running", {"answer": ("unloading", -3.4e4)})
-    for load, text in ((True, "p̄ -34 kPa);"), (False, "Δ/h_max -3.4e+04)")):
-        assert f"(unloading, {text}" in _progress(Loops((), 1), 1.0, load)
+    for load, text in ((True, "p̄ -34 kPa)"), (False, "Δ/h_max -3.4e+04)")):
+        assert f"(unloading, {text}" in _progress(Loops((), 1), load)
 
 
 def test_fields_are_written_at_mean_stresses(tmp_path, capsys):

@@ -214,7 +214,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         for name in ("run_loop", "run_loops", "run_path"):
             monkeypatch.setattr(loop_command, name, begins)
         monkeypatch.setattr(trace_command, "run_plan", begins)
-        monkeypatch.setattr("adhesis.ensemble.bench.equal_error.benchmark", begins)
+        monkeypatch.setattr("adhesis.ensemble.bench.benchmark.benchmark", begins)
         yield folder
 
 

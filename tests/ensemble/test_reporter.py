@@ -4,13 +4,14 @@ import io
 import sys
 import time
 
-from adhesis.ensemble.reporter import bar
-from adhesis.ensemble.run.progress import ProgressLine, Summary, interval
+from adhesis.ensemble.reporter import bar, interval
+from adhesis.ensemble.run.progress import ProgressLine, Summary
 
 
-def test_what_takes_long_is_told_and_what_is_over_is_not(capsys) -> None:
+def test_what_takes_long_is_told_and_what_is_over_is_not(capsys, monkeypatch) -> None:
     said: list[str] = []
-    with bar("claims", every=0.05, last=False) as show:
+    monkeypatch.setattr("adhesis.ensemble.reporter.interval", lambda elapsed: 0.05)
+    with bar("claims", last=False) as show:
         end = time.monotonic() + 20
         while not any(line.startswith("one claim  [############............]  ") for line in said):
             said += capsys.readouterr().err.splitlines()
@@ -20,10 +21,11 @@ def test_what_takes_long_is_told_and_what_is_over_is_not(capsys) -> None:
             time.sleep(0.005)
     assert said[0].startswith("claims  ")
     capsys.readouterr()
-    with bar("no sooner than it is due", every=60.0, last=False):
+    monkeypatch.setattr("adhesis.ensemble.reporter.interval", lambda elapsed: 60.0)
+    with bar("no sooner than it is due", last=False):
         pass
     assert not capsys.readouterr().err
-    with bar("loading", every=60.0):
+    with bar("loading"):
         pass
     assert capsys.readouterr().err.startswith("loading  ")
 

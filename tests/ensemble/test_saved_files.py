@@ -12,7 +12,7 @@ import xarray as xr
 
 import adhesis
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.sealed_file import sealed
+from adhesis.ensemble.loop.saved import sealed
 from tests.support.crafted_hdf5 import made, put, virtual
 from tests.support.exact_wave import ExactWave
 

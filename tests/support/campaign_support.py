@@ -10,13 +10,17 @@ import time
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 from unittest.mock import patch
 
 import h5py
 import numpy as np
 
+from adhesis.ensemble.campaign.compare import growth
+from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command import run
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.run import launch
 from tests.support.fake_run import fake_engine
 from tests.support.launchers import MPIRUN
@@ -67,6 +71,22 @@ def campaign_text(**changes: str) -> str:
         place = next(i for i, line in enumerate(lines) if line.startswith(f"{key} = "))
         lines[place] = f"{key} = {value}"
     return "\n".join(lines) + "\n"
+
+
+class Compared(NamedTuple):
+    """Keys by which a campaign grew, and a phrase for each that makes it another one."""
+
+    grown: tuple[str, ...] = ()
+    other: tuple[str, ...] = ()
+
+
+def compare(old: Campaign, new: Campaign) -> Compared:
+    try:
+        return Compared(growth("f", old, new))
+    except InputError as error:
+        phrases = str(error).removeprefix("f holds another campaign than this campaign: ")
+        phrases = phrases.removesuffix(" (here: this campaign, there: f)")
+        return Compared(other=tuple(phrases.split("; ")))
 
 
 def write_campaign(folder: Path, name: str = "c.toml", **changes: str) -> Path:
