@@ -120,9 +120,6 @@ class Field:
     def opening(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def scaled_opening(self) -> numpy.typing.NDArray[numpy.float64]: ...
-
-    @property
     def orders(self) -> numpy.typing.NDArray[numpy.int64]: ...
 
     @property

@@ -93,6 +93,12 @@ inline double largest(const Vector& values) {
   return size;
 }
 
+inline double norm(const Vector& values) {
+  double square = 0;
+  for (double value : values) square += value * value;
+  return std::sqrt(square);
+}
+
 // Indices of those that are marked.
 inline Integers indices(const Flags& marked) {
   Integers out;

@@ -151,7 +151,7 @@ Matrix tangent_between(LinearResponse& r, const Vector& ends, const Integers& so
                        double prescribed, const EdgeLaw& law, const Model& model) {
   EdgeStates states = states_at(ends, law);
   for (int e : some) states.held[e] = true;
-  condense_gaps(r, hold_edges(r, ends, states));
+  hold_edges(r, ends, states);
   const ResponseSolution now = r.solve(prescribed, law, model.device);
   Matrix out = HeldEdges(r, some, now, model.device).tangent();
   for (int c = 0; c < out.n; ++c) {
@@ -270,8 +270,6 @@ void bind_field(nb::module_& m) {
       .def_ro("separation", &Field::separation)
       .def_ro("unit_mean", &Field::unit_mean)
       .def_ro("opening", &Field::opening)
-      .def_ro("scaled_opening", &Field::scaled_opening,
-              "f: the openings over sqrt(1-η²), at all nodes.")
       .def_prop_ro("orders", [](const Field& f) { return f.nodes.orders; })
       .def_prop_ro("offset", [](const Field& f) { return f.nodes.offset; })
       .def_prop_ro("theta", [](const Field& f) { return f.nodes.theta; })

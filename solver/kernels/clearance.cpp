@@ -59,29 +59,6 @@ double clearance_since(const Field& field, int k, const SearchedGap& was,
 
 }  // namespace
 
-RemainingClearance clearance_left(const Field& field, const SearchedGaps& searched,
-                                  const SearchLengths& lengths) {
-  const int count = field.nodes.gap_count();
-  RemainingClearance out{Vector(count, -1), Integers(count, -1), {}};
-  size_t j = 0;
-  for (int k = 0; k < count; ++k) {
-    const double least = field.nodes.gaps[k].end[0] - COMPARABLE * lengths.wave;
-    while (j < searched.size() && searched[j]->end[0] < least) ++j;
-    if (j < searched.size()) {
-      const GaussRule& rule = gauss_rules()[field.nodes.orders[k]];
-      const double left = clearance_since(field, k, *searched[j], lengths, rule);
-      // a clearance that is left is positive: below zero it would have to be searched
-      if (left != -1) {
-        out.clearance[k] = left;
-        out.before[k] = int(j);
-        continue;
-      }
-    }
-    out.to_search.push_back(k);
-  }
-  return out;
-}
-
 double seed_width(double curvature, const SearchLengths& lengths) {
   const double first = std::pow(16 * lengths.surface / (pi * curvature * curvature), 1.0 / 3);
   return std::min(std::max(0.5 * first, lengths.narrowest), lengths.widest);
@@ -97,38 +74,42 @@ double clearance_of(const Minimum& minimum, const SearchLengths& lengths) {
   return minimum.opening - lengths.range + overlap;
 }
 
-Vector least_clearances(const std::vector<Minimum>& minima, int gaps,
-                        const SearchLengths& lengths) {
-  Vector out(gaps, infinity);
-  for (const Minimum& minimum : minima)
-    out[minimum.gap] = std::min(out[minimum.gap], clearance_of(minimum, lengths));
-  return out;
-}
-
 Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths) {
   const Nodes& nodes = field.nodes;
   const int count = nodes.gap_count();
-  RemainingClearance left = clearance_left(field, searched, lengths);
   Search out;
-  out.count = int(left.to_search.size());
-  out.minima = find_minima(field, left.to_search, lengths.range);
-  Vector found = least_clearances(out.minima, count, lengths);
-  out.least = infinity;
-  for (int k = 0; k < count; ++k)
-    if (left.before[k] >= 0) out.least = std::min(out.least, left.clearance[k]);
-  // where surfaces attract each other already, more than the closing of a gap decides
-  for (const Minimum& minimum : out.minima)
-    if (minimum.opening < lengths.range) found[minimum.gap] = std::min(found[minimum.gap], 0.0);
+  out.searched.resize(count);
+  Integers again;  // the gaps that have to be searched
+  size_t before = 0;
   for (int k = 0; k < count; ++k) {
-    if (left.before[k] >= 0) {
-      out.searched.push_back(searched[left.before[k]]);
-      continue;
+    const double least = nodes.gaps[k].end[0] - COMPARABLE * lengths.wave;
+    while (before < searched.size() && searched[before]->end[0] < least) ++before;
+    double left = -1;
+    if (before < searched.size())
+      left = clearance_since(field, k, *searched[before], lengths, gauss_rules()[nodes.orders[k]]);
+    // a clearance that is left is positive: below zero it would have to be searched
+    if (left == -1) {
+      again.push_back(k);
+    } else {
+      out.searched[k] = searched[before];
+      out.least = std::min(out.least, left);
     }
+  }
+  out.count = int(again.size());
+  out.minima = find_minima(field, again, lengths.range);
+  Vector found(count, infinity);  // least clearances at the minima
+  for (const Minimum& minimum : out.minima) {
+    double clearance = clearance_of(minimum, lengths);
+    // where surfaces attract each other already, more than the closing of a gap decides
+    if (minimum.opening < lengths.range) clearance = std::min(clearance, 0.0);
+    found[minimum.gap] = std::min(found[minimum.gap], clearance);
+  }
+  for (int k : again) {
     const GaussRule& rule = gauss_rules()[nodes.orders[k]];
     const auto first = nodes.theta.begin() + nodes.offset[k];
-    out.searched.push_back(std::make_shared<SearchedGap>(
+    out.searched[k] = std::make_shared<SearchedGap>(
         SearchedGap{nodes.gaps[k].end, nodes.orders[k], Vector(first, first + rule.count),
-                    low_openings(field, k, rule), found[k]}));
+                    low_openings(field, k, rule), found[k]});
   }
   return out;
 }

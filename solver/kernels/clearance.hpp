@@ -40,15 +40,6 @@ struct SearchedGap {
 
 using SearchedGaps = std::vector<std::shared_ptr<const SearchedGap>>;
 
-struct RemainingClearance {
-  Vector clearance;    // a lower bound in each gap; negative where it has to be searched
-  Integers before;     // index among those searched; negative where it has to be searched
-  Integers to_search;  // the gaps that have to be searched
-};
-
-RemainingClearance clearance_left(const Field& field, const SearchedGaps& searched,
-                                  const SearchLengths& lengths);
-
 // Opening left at a minimum before a seed is put; not positive at a touch. A minimum in the range
 // of an edge touches at zero, or from where the surfaces between it and the edge part on.
 double clearance_of(const Minimum& minimum, const SearchLengths& lengths);
@@ -57,16 +48,13 @@ double clearance_of(const Minimum& minimum, const SearchLengths& lengths);
 double seed_width(double curvature, const SearchLengths& lengths);
 
 struct Search {
-  double least;  // clearance left in the gaps that were not searched
-  int count;     // of gaps that were searched
+  double least = infinity;  // clearance left in the gaps that were not searched
+  int count = 0;            // of gaps that were searched
   std::vector<Minimum> minima;
   SearchedGaps searched;
 };
 
 // Find the minima of a field, searching only gaps that may have closed.
 Search search(const Field& field, const SearchedGaps& searched, const SearchLengths& lengths);
-
-// Find the least clearance at these minima in each of so many gaps, infinite where there is none.
-Vector least_clearances(const std::vector<Minimum>& minima, int gaps, const SearchLengths& lengths);
 
 }  // namespace adhesis

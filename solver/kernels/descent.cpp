@@ -6,20 +6,6 @@ namespace adhesis {
 
 namespace {
 
-// Compute the norm of the forces C_c² - C |C| from C - C_c at some edges.
-double force_at(const Vector& residual, const Integers& edges, const Vector& ends,
-                const EdgeLaw& law) {
-  double square = 0;
-  for (size_t i = 0; i < edges.size(); ++i) {
-    const int e = edges[i];
-    const double opening = residual[i] + critical_opening(ends[e], law).value;
-    const double critical = critical_of(e, ends[e], opening, law).value;
-    const double force = critical * critical - opening * std::abs(opening);
-    square += force * force;
-  }
-  return std::sqrt(square);
-}
-
 // Let the softest edge run where the others are not stable; false if all are held. It is sought
 // among the gaps of the smallest run of the tree that is not stable.
 bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolution& now) {
@@ -107,12 +93,13 @@ ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& t
                   const Vector& ends, double& strongest, double reach, bool equal_speeds,
                   const EdgeLaw& law, const Panels& panels) {
   const int count = int(edges.size());
-  const double force = force_at(residual, edges, ends, law);
+  const EdgeModel start(edges, ends, residual, tangent, law, panels);
+  const double force = norm(start.forces());
   strongest = std::max(strongest, force);
   const std::vector<Gap> gaps = map_gaps(ends);
   bool is_long = reach >= LEAST_REACH && !near_balance(force, strongest, law);
   while (true) {
-    EdgeModel openings(edges, ends, residual, tangent, law, panels);
+    EdgeModel openings = start;
     const double longest = (is_long ? reach : std::min(reach, 1.0)) * law.longest_step;
     const double share = is_long ? LONG_CLOSING : CLOSING_SHARE;
     Vector limit(count), motion(ends.size());
@@ -190,7 +177,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       edges = indices(states.held);
       moved = false;
     }
-    if (!moved) condense_gaps(response, hold_edges(response, ends, states));
+    if (!moved) hold_edges(response, ends, states);
     ++out.steps;
     moved = false;
     const ResponseSolution now = response.solve(prescribed, law, device);

@@ -6,12 +6,6 @@ namespace adhesis {
 
 namespace {
 
-double norm(const Vector& force) {
-  double square = 0;
-  for (double value : force) square += value * value;
-  return std::sqrt(square);
-}
-
 // Find the share of a step that keeps every motion within its limit.
 double share_within(const EdgeModel& model, const Vector& step, const Vector& limit) {
   double share = 1;

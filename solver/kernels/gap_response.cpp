@@ -129,7 +129,7 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law) {
       charge_by_edge[side][first + i] =
           strength[side] * (w * space.solved[by_left_end + side][i] + space.singular[side][i]);
   }
-  condense(k);
+  is_stale[k] = true;
 }
 
 WIDE void LinearResponse::condense(int k) {

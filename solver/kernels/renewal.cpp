@@ -47,8 +47,6 @@ bool replace_runs(LinearResponse& response, const Flags& changed, const Model& m
   return true;
 }
 
-bool any(const Flags& flags) { return std::find(flags.begin(), flags.end(), true) != flags.end(); }
-
 }  // namespace
 
 Outdated is_outdated(const LinearResponse& response, int k, const Gap& gap, const EdgeLaw& law) {
@@ -108,64 +106,44 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
   EdgeStates both(states);
   for (int e = 0; e < 2 * count; ++e)
     if (far[e / 2]) both.held[e] = true;
-  const Flags others = hold_edges(response, ends, both);
-  if (!any(changed)) {
-    condense_gaps(response, others);
-    return true;
-  }
+  hold_edges(response, ends, both);
   for (int k = 0; k < count; ++k)
     if (changed[k] && has_room) fill_gap(k, 2, nodes, response.equations, model);
   bool renewed = has_room;
-  Flags again(changed);
-  for (int k = 0; k < count; ++k) {
-    if (changed[k] && renewed) {
+  for (int k = 0; k < count; ++k)
+    if (changed[k] && renewed)
       renewed = renew_gap(response, k, before[k], gauss_rules()[orders[k]], pressure, law);
-    } else if (others[k]) {
-      response.condense(k);
-      again[k] = true;
-    }
-  }
   if (!(renewed && replace_runs(response, changed, model))) {
     // While edges move towards one state, a gap must not lose modes again, or the field's error
     // would drive them to and fro.
     auto anew = set_up_response(ends, prescribed, nodes.orders, law, model);
     if (!anew) return false;
     response = std::move(*anew);
-    condense_gaps(response, hold_edges(response, ends, states));
+    hold_edges(response, ends, states);
     return true;
   }
-  response.factor_runs(again);
-  if (any(far)) {
+  if (std::find(far.begin(), far.end(), true) != far.end()) {
     // their potentials are not those of the old edges: solved with these held
     pressure = response.solve(prescribed, law, model.device).pressure;
     hold_edges(response, ends, states);
     for (int k = 0; k < count; ++k)
       if (far[k]) response.linearise_in_current_potential(k, pressure, law);
-    response.factor_runs(far);
   }
   return true;
 }
 
-Flags hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states) {
+void hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states) {
   const auto& [held, recedes] = states;
   const Vector motion = response.motion_to(ends);
-  Flags changed(ends.size() / 2);
   for (int e = 0; e < int(ends.size()); ++e) {
     Edge& edge = response.edges[e];
     const double here = held[e] ? motion[e] : 0;
     if (bool(held[e]) != edge.held || here != edge.here || bool(recedes[e]) != edge.recedes)
-      changed[e / 2] = true;
+      response.is_stale[e / 2] = true;
     edge.recedes = recedes[e];
     edge.held = held[e];
     edge.here = here;
   }
-  return changed;
-}
-
-void condense_gaps(LinearResponse& response, const Flags& some) {
-  for (int k = 0; k < response.gap_count(); ++k)
-    if (some[k]) response.condense(k);
-  if (any(some)) response.factor_runs(some);
 }
 
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
@@ -196,7 +174,6 @@ std::optional<LinearResponse> set_up_response(const Vector& ends, double prescri
   for (Edge& edge : out.edges) edge.held = law.pins();  // which are pinned is not known yet
   const int count = out.gap_count();
   for (int k = 0; k < count; ++k) out.linearise_in_current_potential(k, field.pressure, law);
-  out.factor_runs(Flags(count, true));
   return out;
 }
 

@@ -33,12 +33,8 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
                      double pressure, double prescribed, const EdgeLaw& law, const Model& model,
                      bool raises = true);
 
-// Hold some edges where they are, and no others, and note which of all recede; marks the gaps that
-// are to be condensed.
-Flags hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states);
-
-// Eliminate the edges of some gaps anew, and factor the runs that hold them.
-void condense_gaps(LinearResponse& response, const Flags& some);
+// Hold some edges where they are, and no others, and note which of all recede.
+void hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states);
 
 // Renew the response for a known equilibrium; returns false as move_references does.
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,

@@ -10,14 +10,20 @@ LinearResponse::LinearResponse(Nodes given, Equations given_equations, Tree give
   about_pressure.resize(count);
   edges.resize(2 * count);
   softness.assign(count, 1);
+  is_stale.assign(count, true);
   for (Vector* values : {&about, &scaled_opening, &mean_by_potential}) values->resize(n);
   for (Pair* pair : {&opening_by_potential, &charge_by_edge, &held_charge, &motion_by_potential})
     for (Vector& values : *pair) values.resize(n);
   for (Vector& values : potential) values.resize(tree.size());
 }
 
-void LinearResponse::factor_runs(Flags changed) {
-  changed.resize(tree.run_count());
+void LinearResponse::factor_runs() {
+  Flags changed(tree.run_count());
+  for (int k = 0; k < tree.count; ++k) {
+    changed[k] = is_stale[k];
+    if (is_stale[k]) condense(k);
+    is_stale[k] = false;
+  }
   for (int run = tree.count; run < tree.run_count(); ++run) {
     auto [one, two] = tree.runs[run].half;
     if (changed[run] || changed[one] || changed[two]) {
@@ -31,6 +37,7 @@ void LinearResponse::factor_runs(Flags changed) {
 ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
                                        const Device& device) {
   const int count = gap_count(), n = nodes.size();
+  factor_runs();
   Pair motion = {Vector(2 * count), Vector(2 * count)};
   for (int column = 0; column < 2; ++column) {
     Vector& g = potential[column];

@@ -64,22 +64,17 @@ struct LinearResponse {
   Pair potential;                   // of the last solution, without p and by a unit of p
   std::array<double, 2> mean = {};  // its mean opening, times 2π, likewise
   Vector softness;  // compliance of each gap's edges, over that from which on gaps are soft
+  Flags is_stale;   // whether a gap's edges have to be eliminated anew, before the next solution
 
   LinearResponse(Nodes nodes, Equations equations, Tree tree);
 
   int gap_count() const { return nodes.gap_count(); }
 
-  // Compute the response of gap k about its reference.
+  // Compute the response of gap k about its reference, between given edges.
   void linearise(int k, const EdgeLaw& law);
 
-  // Linearise gap k about its potential in the last solution, and let its edges follow.
+  // Linearise gap k about its potential in the last solution.
   void linearise_in_current_potential(int k, double pressure, const EdgeLaw& law);
-
-  // Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
-  void condense(int k);
-
-  // Factor the runs that have changed, or hold gaps that have.
-  void factor_runs(Flags changed);
 
   // Solve for all edges, with d prescribed.
   ResponseSolution solve(double prescribed, const EdgeLaw& law, const Device& device);
@@ -99,6 +94,12 @@ struct LinearResponse {
   Vector motion_to(const Vector& ends) const;
 
  private:
+  // Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
+  void condense(int k);
+
+  // Condense the gaps that are stale, and factor the runs that hold them.
+  void factor_runs();
+
   void update_softness(const Pair& motion, double by_pressure, const EdgeLaw& law,
                        const Device& device);
 };
