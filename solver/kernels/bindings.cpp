@@ -292,12 +292,14 @@ void bind_field(nb::module_& m) {
       .def(
           "by_prescribed",
           [](const Field& f) {
+            if (f.solved[1].empty())
+              throw std::invalid_argument("solved in a known potential: it has no derivatives");
             const double rate = -2 * pi / f.resistance;
             Vector out = edge_openings(f.solved[1], f.nodes, f.equations, false);
             for (double& opening : out) opening *= -rate;
             return std::tuple(rate, -f.unit_mean * rate / (2 * pi), out);
           },
-          "Differentiate p, q0 s and C by d at fixed edges.")
+          "Differentiate p, q0 s and C by d at fixed edges; ValueError if the potential was known.")
       .def(
           "fine_opening",
           [](const Field& f, int k, double per_wave) {
