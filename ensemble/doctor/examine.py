@@ -19,13 +19,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.run.launch import (
+    check_file_size_limit,
     cores,
     end_with_parent,
     launch_environment,
     launcher,
     python,
     python_environment,
+    settings,
 )
 from adhesis.ensemble.versions import first_lines, installed, last_lines, processor
 
@@ -114,6 +117,8 @@ class _Probe:
 
 def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
     try:
+        if launch:
+            check_file_size_limit()
         with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
             probe = python("-m", "adhesis.ensemble.doctor.examine", scratch)
             code, output = _run([*launch, *probe, *(["together"] if launch else [])])
@@ -127,7 +132,7 @@ def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
                 with suppress(OSError, ValueError):  # the process ended while it wrote
                     reports.append(json.loads(path.read_text()))
             return _Probe(reports, failure)
-    except OSError as error:
+    except (OSError, WriteError) as error:
         return _Probe([], f"cannot be started: {error}")
 
 
@@ -179,6 +184,8 @@ def _ranks(probe: _Probe, mpirun: str) -> Check:
         )
     else:
         text = f"{mpirun} -n {_RANKS} {probe.failure or f'gave {len(sizes)} ranks'}"
+        if given := ", ".join(settings()):
+            text += f"; settings of MPI: {given}"
     return Check("ranks", False, text)
 
 

@@ -20,7 +20,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from adhesis import _version
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.escape import one_line
 
 # Variables that a launcher sets for its ranks. A second launcher that inherits them passes for one
 # of those ranks: both wait for each other, or end without a message.
@@ -29,6 +30,13 @@ _LAUNCHER_PREFIXES = ("OMPI_", "OPAL_", "ORTE_", "PRTE_", "PMIX_", "PMI_", "HYDI
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _RANKS_PER_CORE = 16
+
+# Where users and sites set what a launcher does, beside its own installation.
+_SETTINGS = ("OMPI_MCA_", "PRTE_MCA_", "PMIX_MCA_", "HYDRA_", "I_MPI_", "MPICH_", "UCX_", "FI_")
+_SETTINGS_FOLDERS = (".openmpi", ".prte", ".pmix")
+
+# Open MPI 4.1 makes files of a little more than 4 MB in /tmp and /dev/shm.
+_SHARED_BYTES = 8 * 2**20
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
 _LIBC = ctypes.CDLL(None)
@@ -120,3 +128,23 @@ def check_ranks(name: str, ranks: int) -> None:
             f"{name} is {ranks}: at most {most} are started here, on {counted(cores(), 'core')}; "
             "more ranks than cores compute no faster"
         )
+
+
+def check_file_size_limit() -> None:
+    """Raise WriteError under a limit of file sizes with which ranks cannot share memory.
+
+    Open MPI 4.1 hangs there, or its ranks crash, before any of them has begun.
+    """
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    if limit != resource.RLIM_INFINITY and limit < _SHARED_BYTES:
+        raise WriteError(
+            "ranks share memory in files of some MB, and the limit of file sizes (ulimit -f) is "
+            f"{limit / 1e6:g} MB: raise it to {_SHARED_BYTES / 1e6:.0f} MB"
+        )
+
+
+def settings() -> list[str]:
+    """Return the settings of launchers that were made outside their installation."""
+    given = [one_line(f"{k}={v}") for k, v in sorted(os.environ.items()) if k.startswith(_SETTINGS)]
+    files = (Path(os.path.expanduser("~"), name, "mca-params.conf") for name in _SETTINGS_FOLDERS)
+    return [*given, *(str(path) for path in files if path.is_file())]
