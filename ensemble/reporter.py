@@ -13,8 +13,8 @@ from typing import Self, TextIO
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import duration
 
-_LINE_INTERVALS = (5.0, 60.0)  # s: at first, and at most
-_LINES_AT_LEAST = 40  # the time between lines is this part of the time so far: 15 s after 10 min
+_LINE_INTERVALS = (5.0, 15.0)  # s: at first, and at most
+_LINES_AT_LEAST = 40  # the time between lines is this part of the time so far: 15 s from 10 min on
 _LIVE = 0.1  # s between two states of a line on a terminal
 _CELLS = 24  # of a full bar
 _REWRITE = "\r\x1b[K"

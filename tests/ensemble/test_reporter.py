@@ -40,12 +40,12 @@ def test_what_is_printed_beside_a_bar_goes_to_stdout(capsys, monkeypatch) -> Non
     assert "the first claim" in terminal.getvalue()
 
 
-def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds() -> None:
+def test_no_silence_is_above_fifteen_seconds() -> None:
     at, lines = 0.0, 0
     while at < 36000.0:
-        assert interval(at) <= (15.0 if at < 600.0 else 60.0)
+        assert interval(at) <= 15.0
         at, lines = at + interval(at), lines + 1
-    assert lines < 800  # ten hours: a log that can be read
+    assert lines < 2500  # ten hours
 
 
 class _Terminal(io.StringIO):
