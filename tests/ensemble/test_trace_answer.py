@@ -563,6 +563,7 @@ def test_a_range_of_a_trace_is_said_with_what_zones_at_edges_change() -> None:
     assert "\nrange       adhesion of a range of 2e-07 m" in str(answer)
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys, monkeypatch):
     """The measure reaches the loops, the page and the document; an unknown one is refused."""
     monkeypatch.setattr(answers, "Loops", lambda jobs, *_: Loops(jobs, 0))  # in this process
