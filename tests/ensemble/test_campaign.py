@@ -229,11 +229,7 @@ def test_growth_and_other_changes_are_told_apart():
         )
     )
     difference = compare(old, grown)
-    assert set(difference.grown) == {
-        "sweep.hurst",
-        "sweep.work_of_adhesion",
-        "sweep.realisations",
-    }
+    assert set(difference.grown) == {"sweep.hurst", "sweep.work_of_adhesion", "sweep.realisations"}
     assert not difference.other
     # The other way round nothing grew: there is no file without the rows it holds.
     assert len(compare(grown, old).other) == 3

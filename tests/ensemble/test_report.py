@@ -26,12 +26,7 @@ from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings, paper
-from adhesis.ensemble.report.figures import (
-    catalogue,
-    loops,
-    loss_figures,
-    shapes_and_spectra,
-)
+from adhesis.ensemble.report.figures import catalogue, loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
@@ -347,10 +342,7 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
             for b, branch in enumerate(("loading", "unloading")):
                 spectrum = cell.fields.psd_displacement[b, state]
                 np.testing.assert_array_equal(branches[branch][:, 1], spectrum)
-        places = {
-            "Fig. 4": "H = 0.8, γ = 0.01 and 0.04 J/m²",
-            "Fig. 8": "H = 0.7, γ = 0.04 J/m²",
-        }
+        places = {"Fig. 4": "H = 0.8, γ = 0.01 and 0.04 J/m²", "Fig. 8": "H = 0.7, γ = 0.04 J/m²"}
         for (name, place), nearest, at in zip(places.items(), said, (0.4, 0.7), strict=True):
             end = f"; the nearest to it here is {place}, {nearest}." if nearest else "."
             assert caption[name].endswith(f"is at {place}, Δ/h_max = {at:g}{end}")

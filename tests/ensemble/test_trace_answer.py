@@ -20,13 +20,7 @@ from adhesis import Control, Problem, make_method, run_loop, self_affine_profile
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
-from adhesis.ensemble.trace.answer import (
-    COVERAGE,
-    Answer,
-    NoAnswer,
-    make_cycle,
-    run_plan,
-)
+from adhesis.ensemble.trace.answer import COVERAGE, Answer, NoAnswer, make_cycle, run_plan
 from adhesis.ensemble.trace.answer import document as document_of
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import what_was_read
