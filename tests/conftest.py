@@ -1,4 +1,4 @@
-"""What all tests share: markers and what they need, one answer from the property tests.
+"""What all tests share: markers and what they need, figures that are not written.
 
 Values and helpers that several tests use are in :mod:`tests.support`.
 """
@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from hypothesis import settings
 
 from tests.support import one_thread  # noqa: F401  # before what loads numpy
 from tests.support.figures import few_figures
@@ -34,11 +33,6 @@ for number, handler in (
 ):
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
-
-# The same examples every time. `make fuzz` draws anew, from a seed that it prints.
-settings.register_profile("same", derandomize=True, deadline=None)
-settings.register_profile("anew", deadline=None, database=None, print_blob=True)
-settings.load_profile(os.environ.get("ADHESIS_PROPERTIES", "same"))
 
 
 @pytest.fixture

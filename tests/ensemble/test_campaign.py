@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import os
 import re
 from collections.abc import Iterator
 
@@ -19,6 +20,11 @@ from adhesis.ensemble.task.fields import field_plan
 from adhesis.solver.model.pattern import stripes
 from tests.support.campaign_support import ROOT, campaign_text
 from tests.support.wrong_values import outside
+
+# The same examples every time. `make fuzz` draws anew, from a seed that it prints.
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("anew", deadline=None, database=None, print_blob=True)
+settings.load_profile(os.environ.get("ADHESIS_PROPERTIES", "same"))
 
 
 def complaint(text: str) -> str:

@@ -8,6 +8,7 @@ import json
 import os
 import re
 import signal
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,7 @@ def only(plan: Plan, *names: str) -> Plan:
     )
 
 
+@cache
 def prepared() -> Prepared:
     heights = PROFILE.at(X) + 1e-3 * X + 5e-9 * np.random.default_rng(0).standard_normal(N)
     return prepare_trace(Trace(heights, LENGTH / N, "t.txt"))
@@ -201,6 +203,7 @@ def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
     assert cycle.turn(0.3) == "u_tot/h_max = 0.3 of a stiffness of 1e+09 Pa/m"
 
 
+@cache
 def small_plan() -> tuple[Prepared, Any, Plan]:
     trace = prepared()
     cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3)
