@@ -1,4 +1,4 @@
-"""What all tests share: markers and what they need, one answer from the property tests.
+"""What all tests share: markers and what they need, figures that are not written.
 
 Values and helpers that several tests use are in :mod:`tests.support`.
 """
@@ -6,17 +6,22 @@ Values and helpers that several tests use are in :mod:`tests.support`.
 import gc
 import os
 import signal
-from pathlib import Path
+import sys
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from hypothesis import settings
 
 from tests.support import one_thread  # noqa: F401  # before what loads numpy
+from tests.support.figures import few_figures
 from tests.support.launcher_crash import pytest_runtest_protocol  # noqa: F401  # a hook
 from tests.support.launchers import without_mpi, without_slurm
 from tests.support.progress import Waiting
 from tests.support.scheduling import rank_of, scheduler
+
+# Byte code is kept, or each process compiles all that it imports: seconds of the time of a command.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Nothing that is imported and collected is garbage: until all is, looking for some is in vain.
 gc.disable()
@@ -29,26 +34,12 @@ for number, handler in (
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
 
-# The same examples every time. `make fuzz` draws anew, from a seed that it prints.
-settings.register_profile("same", derandomize=True, deadline=None)
-settings.register_profile("anew", deadline=None, database=None, print_blob=True)
-settings.load_profile(os.environ.get("ADHESIS_PROPERTIES", "same"))
-
 
 @pytest.fixture
-def quick_figures(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Draw figures, here by name, and write empty files: to lay one out and write it takes long."""
-    figures: dict[str, Any] = {}
-
-    def save(figure: object, stem: Path) -> tuple[Path, Path]:
-        figures[stem.name] = figure
-        paths = stem.with_suffix(".png"), stem.with_suffix(".pdf")
-        for path in paths:
-            path.write_bytes(b"")
-        return paths
-
-    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", save)
-    return figures
+def quick_figures() -> Iterator[dict[str, Any]]:
+    """Draw figures, here by name, and write pictures of one point."""
+    with few_figures() as figures:
+        yield figures
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -151,7 +151,11 @@ def _interrupts(name: str) -> Iterator[None]:
     def handle(number: int, frame: FrameType | None) -> None:
         nonlocal received
         received = number
-        if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f, _ in walk_stack(frame)):
+        frames = [f for f, _ in walk_stack(frame)]
+        if any(f.f_code is dropped.__code__ for f in frames):  # where it would be dropped for good
+            come_again()
+            return
+        if any(f.f_globals.get("__name__") == "importlib._bootstrap" for f in frames):
             outputs = sys.modules.get("adhesis.ensemble.outputs")
             if outputs is not None:
                 outputs.remove_unfinished()
@@ -169,6 +173,9 @@ def _interrupts(name: str) -> Iterator[None]:
             return
         for each in before:
             signal.signal(each, handle)
+        come_again()
+
+    def come_again() -> None:
         threading.Timer(_AGAIN, os.kill, (os.getpid(), received)).start()
 
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[: 1 if name == _PARALLEL else 3]

@@ -209,10 +209,7 @@ def test_the_interval_reaches_as_far_as_students_and_as_halls():
     assert low == pytest.approx(mean - student)  # the short side
     assert high > mean + 1.2 * student  # the side of the tail
     other_low, other_high = interval(-3e-7 * values)
-    assert (other_low, other_high) == (
-        pytest.approx(-3e-7 * high),
-        pytest.approx(-3e-7 * low),
-    )
+    assert (other_low, other_high) == (pytest.approx(-3e-7 * high), pytest.approx(-3e-7 * low))
 
 
 def test_intervals_of_few_and_of_equal_values():

@@ -263,7 +263,19 @@ def test_a_signal_while_modules_are_loaded_leaves_no_part_of_an_output(tmp_path)
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatch):
-    """Python drops what is raised there; a command waits for ever where the signal is lost."""
+    """Python drops what is raised there; a command waits for ever where the signal is lost.
+
+    It comes again, for the first time while the timer that sends it is still being started.
+    """
+    timers: list[threading.Timer] = []
+
+    class Early(threading.Timer):
+        def start(self):
+            timers.append(self)
+            if len(timers) == 1:
+                signal.raise_signal(number)
+            else:
+                super().start()
 
     class Finalized:
         def __del__(self):
@@ -275,8 +287,10 @@ def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatc
         return 0
 
     monkeypatch.setattr("adhesis.ensemble.command.status.execute", execute)
+    monkeypatch.setattr(threading, "Timer", Early)
     assert main(["status", "r.h5"]) == code
     assert "Traceback" not in capsys.readouterr().err
+    assert len(timers) == 2
 
 
 def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):

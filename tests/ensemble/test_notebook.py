@@ -415,7 +415,8 @@ def test_failed_tasks_are_loud(tmp_path):
 
 def test_campaigns_run_outside_the_main_thread(tmp_path):
     """As asyncio.to_thread and servers call them; two at once leave stderr as it was."""
-    small = adhesis.Campaign(campaign_text(realisations="1", hurst="[0.7]"))
+    one_task = {"realisations": "1", "hurst": "[0.7]", "work_of_adhesion": "[0.04]"}
+    small = adhesis.Campaign(campaign_text(**one_task))
     before = sys.stderr
 
     async def both() -> list[Any]:

@@ -194,11 +194,7 @@ def test_a_report_on_a_full_disk_ends_in_one_sentence_and_leaves_the_old_one(ask
         "sys.exit(main(['report', 'r.h5', '--to', 'out']))"
     )
     done = subprocess.run(
-        python("-c", code),
-        env=python_environment(),
-        capture_output=True,
-        text=True,
-        check=False,
+        python("-c", code), env=python_environment(), capture_output=True, text=True, check=False
     )
     assert done.returncode == 74, done.stderr
     lines = done.stderr.splitlines()

@@ -123,7 +123,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     x = np.arange(200)
     lines = [f"{a} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
     Path("trace.csv").write_text("\n".join(lines))
-    Path("c.toml").write_text(campaign_text())
+    Path("c.toml").write_text(campaign_text(hurst="[0.7]", realisations="1"))
 
     def make(kind: str, ending: str = "") -> str:
         if kind.endswith("of another user") and os.geteuid() != 0:

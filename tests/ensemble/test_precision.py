@@ -56,6 +56,14 @@ def run(path, out, fake="", **options):
     )
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The campaign of ``text()``, undisturbed, by one process: its results file and its end."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "c.toml").write_text(text())
+    return folder / "r.h5", run(folder / "c.toml", folder / "r.h5")
+
+
 def test_the_rule_goes_by_the_interval_that_tables_print():
     values = np.random.default_rng(3).lognormal(0, 0.6, 40)
     (printed,) = estimates(values)
@@ -229,10 +237,10 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity)
     assert precision_lines(summary.precisions)[1] in again.stderr.splitlines()
 
 
-def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path):
+def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path, finished):
+    earlier, first = finished
     path, out, whole = tmp_path / "c.toml", tmp_path / "r.h5", tmp_path / "w.h5"
-    path.write_text(text())
-    first = run(path, out)
+    shutil.copy(earlier, out)
     path.write_text(text(0.16, 120))
     second, alone = run(path, out), run(path, whole)
     assert second.computed == alone.computed - first.computed > 0
@@ -290,17 +298,16 @@ def test_failures_count_as_looked_at_and_may_be_computed_again(tmp_path):
 
 @pytest.mark.mpi
 @pytest.mark.skipif(shutil.which(MPIRUN) is None, reason="there is no mpirun here")
-def test_ranks_and_kills_change_no_bit_of_a_precision_campaign(tmp_path):
-    path, out, whole = tmp_path / "c.toml", tmp_path / "r.h5", tmp_path / "w.h5"
+def test_ranks_and_kills_change_no_bit_of_a_precision_campaign(tmp_path, finished):
+    path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text())
-    run(path, whole)
     process = start("run", path, "--out", out, ranks=3, fake="step=0.02")
     wait_until(lambda: done_rows(out) >= 20)
     kill_all(process)
     process.communicate()
     resumed = adhesis("run", path, "--out", out, ranks=2, fake="")
     assert resumed.returncode == 0, resumed.stderr
-    assert differences(out, whole) == []
+    assert differences(out, finished[0]) == []
 
 
 def test_what_a_stop_may_be(tmp_path):

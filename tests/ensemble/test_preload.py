@@ -26,8 +26,10 @@ from adhesis.ensemble.command.trace import _progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
+from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.loops import Cycle, Job, Loops
 from adhesis.ensemble.trace.loops import compute as compute_job
+from adhesis.ensemble.trace.trace_page import page_text
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.synthetic_results import campaign, rows, write
@@ -155,14 +157,15 @@ def test_fields_are_written_at_mean_stresses(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("quick_figures")
-def test_a_trace_turns_at_the_preload(tmp_path, capsys):
+def test_a_trace_turns_at_the_preload(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(answers, "Loops", lambda jobs, *_: Loops(jobs, 0))  # in this process
     rng = np.random.default_rng(1)
     x = np.linspace(0, 1e-3, 200)
     z = sum(1e-6 / n * np.cos(2 * np.pi * n * x / 1e-3 + rng.uniform(0, 6)) for n in range(1, 9))
     path = tmp_path / "trace.csv"
     np.savetxt(path, np.transpose([x, z]), delimiter=",")
     words = ["trace", str(path), "--unit", "m", "--work-of-adhesion", "0.002", "--young", "1e6"]
-    words += ["--poisson", "0.5", "--quick", "--quiet", "--processes", "1", "--load-steps", "3"]
+    words += ["--poisson", "0.5", "--quick", "--quiet", "--load-steps", "3"]
     assert main([*words, "--preload", "300", "--to", str(tmp_path / "out")]) == 0
     assert "to a preload of 300 Pa at a fixed separation" in capsys.readouterr().out
     document = json.loads((tmp_path / "out" / "trace.json").read_text())
@@ -181,8 +184,7 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys):
     )
     (line,) = (line for line in str(weight).splitlines() if line.startswith("loss"))
     assert "(under a weight; it falls off at " in line
-    page = weight.page(tmp_path / "w").with_suffix(".md").read_text()
-    assert "(under a weight; it falls off at " in page.split("pull-off", 1)[0]
+    assert "(under a weight; it falls off at " in page_text(weight, {}).split("pull-off", 1)[0]
 
 
 PRELOADS = [100.0, 400.0]

@@ -26,12 +26,7 @@ from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings, paper
-from adhesis.ensemble.report.figures import (
-    catalogue,
-    loops,
-    loss_figures,
-    shapes_and_spectra,
-)
+from adhesis.ensemble.report.figures import catalogue, loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
@@ -41,6 +36,7 @@ from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import GAP_BINS
 from tests.support.browser import needs_browser, seen_by_browser
+from tests.support.figures import few_figures
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
 ROOT = Path(__file__).parent.parent.parent
@@ -59,34 +55,25 @@ def data(file):
 
 
 # Figures that are laid out and written: each takes seconds, and all are by one function.
-DOT = base64.b64decode(
-    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
-)
 SAVED = ("fig6_contact_against_stress", "loss_by_mechanism")
-FIGURES: dict[str, Figure] = {}  # those of the report, by name
 
 
 @pytest.fixture(scope="module")
-def report(file) -> Path:
-    """The report; figures but two are pictures of their names."""
-    directory = file.parent / "report"
-
-    def written(figure, stem):
-        FIGURES[stem.name] = figure
-        if stem.name in SAVED:
-            return save(figure, stem)
-        for suffix in (".png", ".pdf"):
-            stem.with_suffix(suffix).write_bytes(DOT + stem.name.encode())
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("adhesis.ensemble.report.figures.style.save", written)
-        write_report(file, directory, io.StringIO())
-    return directory
+def made(file) -> tuple[Path, dict[str, Figure]]:
+    """The report, and its figures by name."""
+    with few_figures(*SAVED) as figures:
+        write_report(file, file.parent / "report", io.StringIO())
+    return file.parent / "report", figures
 
 
-@pytest.fixture
-def drawn(report) -> dict[str, Figure]:
-    return FIGURES
+@pytest.fixture(scope="module")
+def report(made) -> Path:
+    return made[0]
+
+
+@pytest.fixture(scope="module")
+def drawn(made) -> dict[str, Figure]:
+    return made[1]
 
 
 def margin(figure) -> float:
@@ -96,7 +83,7 @@ def margin(figure) -> float:
 
 
 @pytest.fixture
-def undrawn(monkeypatch, quick_figures) -> list[str]:
+def undrawn(monkeypatch) -> list[str]:
     """Draw no figure but those of the list, for tests that read tables and the page alone."""
     wanted: list[str] = []
 
@@ -150,7 +137,8 @@ def of_paper(of: Campaign) -> bool:
     return paper.is_reading(of, of.sweep.hurst)
 
 
-def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path, undrawn):
+@pytest.mark.usefixtures("undrawn", "quick_figures")
+def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
     for name in ("paper", "beside/ratio-200", "beside/equal-c0", "beside/penetration-0.93"):
         assert of_paper(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
     text = (ROOT / "jobs" / "paper.toml").read_text()
@@ -356,10 +344,7 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
             for b, branch in enumerate(("loading", "unloading")):
                 spectrum = cell.fields.psd_displacement[b, state]
                 np.testing.assert_array_equal(branches[branch][:, 1], spectrum)
-        places = {
-            "Fig. 4": "H = 0.8, γ = 0.01 and 0.04 J/m²",
-            "Fig. 8": "H = 0.7, γ = 0.04 J/m²",
-        }
+        places = {"Fig. 4": "H = 0.8, γ = 0.01 and 0.04 J/m²", "Fig. 8": "H = 0.7, γ = 0.04 J/m²"}
         for (name, place), nearest, at in zip(places.items(), said, (0.4, 0.7), strict=True):
             end = f"; the nearest to it here is {place}, {nearest}." if nearest else "."
             assert caption[name].endswith(f"is at {place}, Δ/h_max = {at:g}{end}")
@@ -473,20 +458,14 @@ def test_the_page_embeds_every_figure_that_exists(report):
     assert "nan" not in page.replace("nano", "")
 
 
-def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, monkeypatch, undrawn):
+def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, undrawn):
     undrawn += SAVED
-
-    def only_some(figure, stem):
-        if stem.name in undrawn:
-            save(figure, stem)
-
-    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", only_some)
-    write_report(file, tmp_path, io.StringIO())
+    with few_figures(*SAVED):
+        write_report(file, tmp_path, io.StringIO())
     names = {path.name for path in tmp_path.iterdir()}
-    assert {"losses.csv", "curves.nc", "report.md", "loss_by_mechanism.pdf"} < names
+    assert {"losses.csv", "curves.nc", "report.html", "loss_by_mechanism.pdf"} < names
     for name in names:
-        if name != "report.html":  # it holds the figures, of which only some were drawn
-            assert (tmp_path / name).read_bytes() == (report / name).read_bytes(), name
+        assert (tmp_path / name).read_bytes() == (report / name).read_bytes(), name
 
 
 def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(
@@ -611,18 +590,18 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
         assert alone[row[:2]][by_steps] == pytest.approx(np.mean(audit * loss))
 
 
-def test_another_largest_penetration_is_compared_with(file, tmp_path, undrawn):
+@pytest.mark.usefixtures("undrawn", "quick_figures")
+def test_another_largest_penetration_is_compared_with(file, tmp_path):
     lower = companion(
         tmp_path, "lower.h5", 0.5, a=("max_penetration = 0.9", "max_penetration = 0.6")
     )
-    write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
-    page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "cycle.max_penetration = 0.6" in page
+    data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
+    assert "cycle.max_penetration = 0.6" in write_page(data, {})
     assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
 
 
-def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
-    factor = 19 / aggregate(file).finished([0.8], [0.04])[0].estimates["loss_dimensionless"].mean
+def test_the_reading_nearest_to_the_paper_is_named(file, data, tmp_path):
+    factor = 19 / data.finished([0.8], [0.04])[0].estimates["loss_dimensionless"].mean
     wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 100", "ratio = 200"))
     other = companion(tmp_path, "other.h5", factor, a=("ratio = 100", "ratio = 30"))
     data = aggregate(file, [wider, other])
@@ -738,15 +717,13 @@ def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
     assert warning.startswith("WARNING: 3 of 4 losses")
 
 
-def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, undrawn):
+def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path):
     for n, named, other in (
         (3, "by Student's t", "Hall"),
         (10, "Hall's transformation", "fewer than"),
     ):
         plan = campaign(hurst=(0.7,), gamma=(0.01,), realisations=n)
-        path = write(tmp_path / f"{n}.h5", plan, rows(plan))
-        write_report(path, tmp_path / str(n), io.StringIO())
-        page = (tmp_path / str(n) / "report.md").read_text(encoding="utf-8")
+        page = write_page(aggregate(write(tmp_path / f"{n}.h5", plan, rows(plan))), {})
         assert named in page
         assert other not in page
 

@@ -110,10 +110,7 @@ CRAFTED: dict[str, Callable[[h5py.File, Path], object]] = {
     ),
     "a bomb": lambda file, _: made(file, STRESS, **BOMB),
     "a group": lambda file, _: put(file.create_group("more"), file["/"], "up"),
-    "a group in place": lambda file, _: (
-        file.__delitem__(STRESS),
-        file.create_group(STRESS),
-    ),
+    "a group in place": lambda file, _: (file.__delitem__(STRESS), file.create_group(STRESS)),
 }
 
 

@@ -370,9 +370,7 @@ def test_the_lock_stays_after_a_failure_so_that_ranks_that_still_write_are_met(t
     orphans = []
     with pytest.raises(RuntimeError):
         fail_while_holding(
-            path,
-            RuntimeError("the run failed"),
-            lambda: orphans.append(holding(path, join=True)),
+            path, RuntimeError("the run failed"), lambda: orphans.append(holding(path, join=True))
         )
     try:
         with pytest.raises(InputError, match="ranks that have outlived it"):

@@ -8,6 +8,7 @@ import json
 import os
 import re
 import signal
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -57,6 +58,7 @@ def only(plan: Plan, *names: str) -> Plan:
     )
 
 
+@cache
 def prepared() -> Prepared:
     heights = PROFILE.at(X) + 1e-3 * X + 5e-9 * np.random.default_rng(0).standard_normal(N)
     return prepare_trace(Trace(heights, LENGTH / N, "t.txt"))
@@ -234,6 +236,7 @@ def test_the_figure_of_the_tables_says_what_turning_points_are(control, at_prelo
     assert drawn[0].axes[-1].get_xlabel() == f"turning point: {label}"
 
 
+@cache
 def small_plan() -> tuple[Prepared, Any, Plan]:
     trace = prepared()
     cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3)
@@ -590,6 +593,7 @@ def test_a_range_of_a_trace_is_said_with_what_zones_at_edges_change() -> None:
     assert "\nrange       adhesion of a range of 2e-07 m" in str(answer)
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys, monkeypatch):
     """The measure reaches the loops, the page and the document; an unknown one is refused."""
     monkeypatch.setattr(answers, "Loops", lambda jobs, *_: Loops(jobs, 0))  # in this process

@@ -369,12 +369,15 @@ Amplitude Error(nm)|height difference (nm)|log 높이 (nm)|1/z (nm)|z+offset (nm
 OTHER_UNITS = "V|mV|µV|A|nA|s|ms|deg|°|rad|counts|a.u.|N|Hz|px|%|nm²|nm^2|1/nm|nm/V|V/nm|LSB"
 
 
+FEW = [f"{x};{z}" for x, z in PAIRS[:40]]  # what is refused for its header needs no more
+
+
 @pytest.mark.parametrize("name", re.split(r"[|\n]", NOT_HEIGHTS.strip()))
 def test_a_unit_counts_behind_known_names_of_heights_alone(name: str, tmp_path: Path) -> None:
     for head, rows, options in (
-        (f"x (um);{name}", [f"{x};{z}" for x, z in PAIRS], {}),
-        (f"X;{name}\n[um];[um]", [f"{x};{z}" for x, z in PAIRS], {}),
-        (name, ZS, {"step": STEP}),
+        (f"x (um);{name}", FEW, {}),
+        (f"X;{name}\n[um];[um]", FEW, {}),
+        (name, ZS[:40], {"step": STEP}),
     ):
         with pytest.raises(InputError, match=r"states (no|the) unit|is no length|above the num"):
             read_trace(put(tmp_path / "t.txt", [head, *rows]), **options)  # type: ignore[arg-type]
@@ -382,12 +385,11 @@ def test_a_unit_counts_behind_known_names_of_heights_alone(name: str, tmp_path: 
 
 @pytest.mark.parametrize("unit", OTHER_UNITS.split("|"))
 def test_a_unit_by_option_makes_no_lengths_of_other_quantities(unit, tmp_path):
-    two = [f"{x};{z}" for x, z in PAIRS]
     for head, rows, options in (
-        (f"x (um);z ({unit})", two, {}),
-        (f"x [{unit}];z [um]", two, {}),
-        (f"x;z\num;{unit}", two, {}),
-        (f"z ({unit})", ZS, {"step": STEP}),
+        (f"x (um);z ({unit})", FEW, {}),
+        (f"x [{unit}];z [um]", FEW, {}),
+        (f"x;z\num;{unit}", FEW, {}),
+        (f"z ({unit})", ZS[:40], {"step": STEP}),
     ):
         with pytest.raises(InputError, match=r"is no length|count|correct the wrong"):
             read_trace(put(tmp_path / "t.txt", [head, *rows]), unit="um", **options)

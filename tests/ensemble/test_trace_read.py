@@ -48,10 +48,7 @@ TEXTS: dict[str, list[str]] = {
     "names and units between single spaces": ["# x (mm) h (um)", *rows(" ", ".", 1e3, 1e6, ".7f")],
     "strokes and spaces": ["# x / mm z / µm", *rows("  ", ".", 1e3, 1e6, ".7f")],
     "units in words": ["% position in mm, height in m", *rows(" ", ".", 1e3, 1, ".12f")],
-    "a header with other signs": [
-        "#x (mm); profile z (µm)",
-        *rows("\t", ".", 1e3, 1e6, ".7f"),
-    ],
+    "a header with other signs": ["#x (mm); profile z (µm)", *rows("\t", ".", 1e3, 1e6, ".7f")],
     "units on a line of their own": ["Position;Profile", "mm;µm", *rows(";", ".", 1e3, 1e6, ".7f")],
     "units as keys": ["X-Unit: mm", "Z-Unit: um", "Points: 200", *rows(",", ".", 1e3, 1e6, ".7f")],
     "one unit for both": ["% Units: micrometers", "% Scan length: 0.1 mm", *rows(" ", ".")],
@@ -233,7 +230,6 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     ),
     "one column number": (BOTH, {"columns": 1}, TypeError, r"columns is 1: it must be a list"),
     "a text for a path": ("1,2\n3,4\n", {}, InputError, r"cannot read 1,2\\n3,4\\n: there is no"),
-    "neither": (3, {}, TypeError, r"source is 3: .* a path, an open file .* list .* Series"),
 }
 
 
@@ -326,11 +322,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
         {"unit": "um"},
         "line 1 .* has '1.000,5', which is no number",
     ),
-    "one number or two": (
-        [f"{k % 7},{k % 3}" for k in range(99)],
-        {"unit": "um"},
-        "give decimal",
-    ),
+    "one number or two": ([f"{k % 7},{k % 3}" for k in range(99)], {"unit": "um"}, "give decimal"),
     "four numbers or two": (
         [f"{k},5,1,{k % 3}" for k in range(99)],
         {"unit": "um"},

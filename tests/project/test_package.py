@@ -134,9 +134,10 @@ import mpi4py
 
 def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     """The settings are those of a site, and not of a rank."""
-    small = campaign(realisations=2)
+    one_cell = {"hurst": (0.8,), "gamma": (0.04,), "realisations": 2}
+    small = campaign(**one_cell)
     results = write(tmp_path / "r.h5", small, rows(small))
-    (tmp_path / "c.toml").write_text(text_of(realisations=2))
+    (tmp_path / "c.toml").write_text(text_of(**one_cell))
     done = run_python("-c", COMMANDS, tmp_path / "c.toml", results, tmp_path / "report")
     assert done.returncode == 0, done.stderr
     lines = (line.split() for line in done.stdout.splitlines() if line.startswith("loaded "))

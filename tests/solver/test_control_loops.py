@@ -1,5 +1,7 @@
 """Loops under every control: the single wave against its closed form, rough profiles by audit."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -19,6 +21,7 @@ def wave_of(alpha: float) -> SingleWave:
     return SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, 1e6, "arc")
 
 
+@cache
 def loop_of(
     profile: Profile, work_of_adhesion: float, stiffness: float, turn: float, **options: float
 ) -> LoopResult:

@@ -2,27 +2,33 @@
 
 A module's tests stay together, in order: what they share is made once, and none of them can depend
 on what another process does. Modules that start ranks or jobs stay together, too, or these would
-crowd each other out. What takes longest begins first.
+crowd each other out, and those that load what takes seconds. What takes longest begins first.
 """
 
 from typing import Any
 
-RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py")
+TOGETHER = {
+    "ranks": ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py"),
+    # which load SurfaceTopography
+    "readers": ("test_heights.py", "test_trace_instruments.py", "test_trace_field_texts.py"),
+}
 LONG = (
-    *("ranks", "test_docs.py", "test_report.py", "test_kinetics.py", "test_trace_answer.py"),
-    *("test_notebook.py", "test_grid.py", "test_preload.py", "test_staging.py"),
-    *("test_sharp_path.py", "test_run.py", "test_merge.py", "test_precision.py", "test_damage.py"),
-    *("test_report_axes.py", "test_finite_range.py", "test_limits.py", "test_interior.py"),
-    *("test_extremes.py", "test_loop_command.py", "test_opened.py", "test_hostile.py"),
-    *("test_bench.py", "test_symmetry.py", "test_paths.py", "test_every_claim"),
+    *("ranks", "test_kinetics.py", "test_docs.py", "test_notebook.py", "test_report.py"),
+    *("test_grid.py", "test_run.py", "test_merge.py", "test_staging.py", "test_precision.py"),
+    *("test_sharp_path.py", "test_trace_answer.py", "test_damage.py", "test_preload.py"),
+    *("test_every_claim", "readers", "test_two_works.py", "test_store.py", "test_report_axes.py"),
+    *("test_symmetry.py", "test_finite_range.py", "test_interior.py", "test_sharp_many.py"),
+    *("test_opened.py", "test_loop_command.py", "test_extremes.py", "test_hostile.py"),
+    *("test_sharp.py", "test_bench.py", "test_limits.py", "test_pattern.py", "test_paths.py"),
 )
 
 
 def group_of(nodeid: str) -> str:
     path, _, name = nodeid.partition("::")
     module = path.rpartition("/")[2]
-    if module in RANKS:
-        return "ranks"
+    for group, modules in TOGETHER.items():
+        if module in modules:
+            return group
     # each whole validation is as long as many a module
     return name if name.startswith("test_every_claim") else path
 
