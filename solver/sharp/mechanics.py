@@ -205,9 +205,7 @@ class EdgeMechanics(EdgeProblem):
                     rests = max(rests, RESTS + 1)  # no patience changes anything
                 rested = gaps
                 strict = rests <= RESTS
-                point = self.equilibrium(
-                    gaps, prescribed, reach, strict=strict, memory=law.memory
-                )
+                point = self.equilibrium(gaps, prescribed, reach, strict=strict, memory=law.memory)
                 if point is not None:
                     return point, raced
                 ways = self.ways_off_saddle(gaps, prescribed, law)
