@@ -84,10 +84,6 @@ MOST_OPENINGS = 1000
 
 # ---------------------------------------------------------------- continuation of a branch
 
-FIRST_MOTION = 0.0125
-"""λ_min. Longest predicted motion of the fastest edge in a step from a point before which none is
-known, which is straight. With four times this 300 of 509 steps after a jump, with 120 patches,
-found no equilibrium: 5 % of all fields."""
 PREDICTED_MOTION = 0.15
 """λ_min. Longest predicted motion of the edge that leads in one step."""
 ORDER_RESOLVED = 0.1

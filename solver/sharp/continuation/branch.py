@@ -17,7 +17,7 @@ from adhesis.solver.sharp.gap.ends import signs_of, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
-    FIRST_MOTION,
+    LONGEST_STEP,
     ORDER_RESOLVED,
     PREDICTED_MOTION,
     QUIET_STRESS,
@@ -215,10 +215,12 @@ class StableBranch:
     def _next_step(self) -> float:
         """Return the next step in d: the leading edge is not to move far, nor the target be passed.
 
-        A step that leads across a fold may be shorter than the finest.
+        A step that leads across a fold may be shorter than the finest. The first one after a jump
+        follows the tangent: where it was longer, more than a half of them failed in a loop of 120
+        patches.
         """
         predictor = self._predictor
-        motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
+        motion = PREDICTED_MOTION if predictor.way else LONGEST_STEP * STEP_REDUCTION
         size = min(self._longest, predictor.reach(motion * self._edges.wave, self.finest))
         if not predictor.fold_distance < self.finest:
             size = max(size, self.finest)
