@@ -40,8 +40,7 @@ def growth(
             other.append(f"{key} is {shown(value)} here and {shown(was)} there")
     if other:
         raise InputError(
-            f"{path} holds another campaign than {here}: {'; '.join(other)} "
-            f"(here: {here}, there: {path})"
+            f"{path} holds another campaign: {'; '.join(other)} (here: {here}, there: {path})"
         )
     return tuple(grown)
 

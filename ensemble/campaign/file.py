@@ -226,7 +226,8 @@ def _check_together(campaign: Campaign) -> None:
     for ratio, rolloff in campaign.in_cells("profile.ratio", "profile.rolloff"):
         if rolloff > ratio:
             raise InputError(
-                f"[profile] rolloff is {rolloff:g}: it must be at most ratio ({ratio})"
+                f"[profile] rolloff is {rolloff:g}: it must be at most ratio ({ratio}) in every "
+                "cell of the sweep (zip joins lists whose values belong together)"
             )
     _check_slopes(campaign)
     if campaign.solver.nodes_per_wave is not None:

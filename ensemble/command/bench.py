@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import platform
+import sys
 from pathlib import Path
 
 from adhesis.ensemble.command.parser import within
@@ -55,6 +56,9 @@ def execute(args: argparse.Namespace) -> int:
         for line in benchmark(QUICK if args.quick else FULL, seconds=args.budget):
             lines.append(line)
             run = line.run
+            if not sys.stderr.isatty():  # no bar there, and a job may end before the last run
+                row = make_table("", COLUMNS, [line]).markdown().splitlines()[-1]
+                print(run.scene.name, row, file=sys.stderr)
             show_run(None, None, f"{run.scene.title}: {run.method}, {run.described}")
     machine = f"one core of {processor()}, Python {platform.python_version()}"
     command = "adhesis bench --quick" if args.quick else "adhesis bench"

@@ -239,7 +239,7 @@ def _tell_price(
 
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
-    with bar("pilot loops", last=False) as show:
+    with bar("price", last=False) as show:
         estimate = price(
             *(campaign, path, part),
             compute=lambda c, t: engine.compute(c, t, None),

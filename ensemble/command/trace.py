@@ -111,4 +111,5 @@ def _progress(loops: Loops, load: bool) -> str:
     parts = [f"{len(loops.done)} of {loops.count} loops"]
     parts += [f"running {running}"] if running else []
     left = loops.seconds_left if len(loops.done) < loops.count else None
-    return "; ".join(parts) + ("" if left is None else f", about {duration(left)} left")
+    parts += [] if left is None else [f"about {duration(left)} left"]
+    return "; ".join(parts)

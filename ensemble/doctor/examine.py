@@ -138,21 +138,29 @@ def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
 
 def _run(command: list[str]) -> tuple[int | None, str]:
     """Return the exit code of a command and what it wrote; None if it passed the time limit."""
+    process = subprocess.Popen(
+        command,
+        env=python_environment(launch_environment(_RANKS)),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        preexec_fn=end_with_parent,
+    )
     try:
-        done = subprocess.run(
-            command,
-            env=python_environment(launch_environment(_RANKS)),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            timeout=_TIME_LIMIT,
-            preexec_fn=end_with_parent,
-        )
-    except subprocess.TimeoutExpired:
+        output, _ = process.communicate(timeout=_TIME_LIMIT)
+    except BaseException as error:  # also an interrupt: what was started ends before its folder
+        process.terminate()  # a launcher then ends its ranks; a kill would leave them running
+        try:
+            process.communicate(timeout=5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+        if not isinstance(error, subprocess.TimeoutExpired):
+            raise
         return None, ""
-    return done.returncode, done.stdout
+    return process.returncode, output
 
 
 def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:

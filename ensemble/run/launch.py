@@ -1,4 +1,4 @@
-"""What it takes to start processes: the interpreter, ``mpirun``, cores and environment.
+"""What processes take: the interpreter, ``mpirun``, cores, environment, memory and limits.
 
 Every Python process of adhesis is started by :func:`python` in :func:`python_environment`: neither
 lets it import from the working directory, where a user's ``numpy.py`` may lie.

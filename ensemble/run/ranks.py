@@ -89,7 +89,8 @@ def world() -> Any:
     try:
         import mpi4py
 
-        mpi4py.rc.recv_mprobe = False  # matched probes, the default, fail on some networks
+        # matched probes, the default, fail on some networks; too late if MPI is loaded already
+        mpi4py.rc.recv_mprobe = False
         from mpi4py import MPI
     except (ImportError, RuntimeError, OSError) as error:
         if size > 1:

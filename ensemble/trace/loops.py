@@ -180,7 +180,7 @@ class Loops:
     @property
     def running(self) -> dict[str, tuple[str, float]]:
         """By job name: the branch and prescribed value reached."""
-        notes = {} if self._master is None else dict(self._master.notes)  # another thread may ask
+        notes = {} if self._master is None else self._master.notes
         return {self._jobs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
 
     def run(

@@ -84,7 +84,7 @@ def compare(old: Campaign, new: Campaign) -> Compared:
     try:
         return Compared(growth("f", old, new))
     except InputError as error:
-        phrases = str(error).removeprefix("f holds another campaign than this campaign: ")
+        phrases = str(error).removeprefix("f holds another campaign: ")
         phrases = phrases.removesuffix(" (here: this campaign, there: f)")
         return Compared(other=tuple(phrases.split("; ")))
 
