@@ -25,7 +25,7 @@ class Lattice:
     height : array
         h in m.
     adhesion : array
-        γ sqrt(1 + h'²) in J/m².
+        γ(x) sqrt(1 + h'²), or γ(x) by the flat measure, in J/m².
     origin : int
         Node at the highest crest.
     equal_parts : int
@@ -89,7 +89,7 @@ class Lattice:
         return contact.displacement[nodes] - self.height[nodes] + contact.separation
 
     def adhesion_energy(self, contact: Contact) -> float:
-        """Compute -Σ γ sqrt(1 + h'²) dx over the contact nodes, in J/m."""
+        """Compute the energy of adhesion of the contact nodes, in J/m."""
         return float(-self.dx * dot(self.adhesion, contact.mask.astype(np.float64)))
 
     def energy(self, contact: Contact) -> float:

@@ -48,8 +48,8 @@ class GridMethod(Method):
     ----------
     problem : Problem
     accuracy : float
-        Wanted relative error of the loss: sets the tolerances of stresses, of the location of jumps
-        and of the load steps, and the nodes unless they are given.
+        Wanted relative error of the loss: sets the tolerances of the location of jumps and of the
+        load steps, and the nodes unless they are given.
     nodes_per_wave : int, optional
         Least number of nodes per shortest wave. Default: 0.032/accuracy (32 at 1e-3), from 8 to
         256; at 256 the discretisation error is about 1e-4, also for a smaller accuracy. The number

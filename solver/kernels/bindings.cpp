@@ -194,14 +194,11 @@ void bind_model(nb::module_& m) {
       .def(
           "stress",
           [](const Panels& p, const Vector& theta) {
-            std::pair<Vector, Vector> out;
-            for (double at : theta) {
-              out.first.push_back(evaluate_series(p.stress, at, p).value);
-              out.second.push_back(evaluate_series(p.slope, at, p).value);
-            }
+            Vector out;
+            for (double at : theta) out.push_back(evaluate_series(p.stress, at, p).value);
             return out;
           },
-          "theta"_a, "Evaluate S and S' at any angles.");
+          "theta"_a, "Evaluate S at any angles.");
   nb::class_<Device>(m, "LoadingDevice")
       .def(nb::init<double, double>(), "separation_weight"_a, "compliance"_a)
       .def_ro("separation_weight", &Device::separation_weight)
@@ -457,9 +454,9 @@ void bind_nucleation(nb::module_& m) {
       },
       "field"_a, "searched"_a, "lengths"_a, Unlocked(),
       "Find the minima of the gaps of a field that may have closed.\n\n"
-      "Returns the least clearance of the other gaps, the number of these, their minima "
-      "(positions, openings, widths of seeds, rims and clearances), and the updated searched "
-      "gaps.");
+      "Returns the least clearance of the gaps that were not searched, the number of those that "
+      "were, their minima (positions, openings, widths of seeds, rims and clearances), and the "
+      "updated searched gaps.");
 }
 
 void bind_predictor(nb::module_& m) {

@@ -22,7 +22,7 @@
 // - energy: that of the contact is the integral of w of advancing edges over its patches. An edge
 //   that recedes dissipates the integral of the difference: friction, in a column of its own.
 //
-// What a law has to keep. Of laws written in Python points 1 to 3 are checked at some places,
+// What a law has to keep. Points 1 to 3 of a law of one's own are checked at some places,
 // before a path is followed (adhesion.py):
 //
 // 1. w is positive, of period 2π, and smooth over the shortest wave that `StressSource.top` states:
@@ -53,7 +53,7 @@ namespace adhesis {
 class Adhesion {
  public:
   const bool pins;              // whether edges are held between two thresholds
-  const double least, largest;  // bounds of w
+  const double least, largest;  // bounds of w where the profile is flat
 
   Adhesion(bool pins, double least, double largest) : pins(pins), least(least), largest(largest) {}
   Adhesion(const Adhesion&) = delete;

@@ -30,8 +30,8 @@ struct Edge {
   double isolated_correction = 0;         // motion that would balance the gap by itself
   std::array<double, 2> motion = {};      // without potentials and p, and by a unit of p
 
-  // C - C_c and its derivative by the edge's own motion, by the law of where the edge is now. The
-  // law is asked at every use, so a response stays valid where an edge begins to recede.
+  // C - C_c and its derivative by the edge's own motion. Both thresholds are known, so a response
+  // stays valid where an edge begins to recede.
   ValueAndSlope imbalance(int side) const {
     if (!recedes) return {residual, tangent[side]};
     return {residual - pinning_range.value, tangent[side] - pinning_range.slope};

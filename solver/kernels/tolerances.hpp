@@ -63,7 +63,7 @@ inline constexpr double REFERENCE_SCALE = 0.1;
 inline constexpr double SOFT_EDGE = 6.0;
 
 // C_c. Edges further out of balance do not follow as their tangent has it: in the reference of
-// their gap it is renewed, and in a descent they run. Without renewal this rates were wrong by 2e-3
+// their gap it is renewed, and in a descent they run. Without renewal rates were wrong by 2e-3
 // after some gaps had been moved by 0.1 λ_min and back, and by 0.3 λ_min no equilibrium was found.
 inline constexpr double UNBALANCED = 0.01;
 

@@ -81,8 +81,8 @@ def run_loop(
 class LoadingBranch:
     """Loading branch that is followed on demand, with loops that unload from its turning points.
 
-    A loop depends on the turning points and marks of the branch, but not on which of them are used,
-    nor on earlier computations.
+    A loop depends on the turning points and marks of the branch, but not on which of them are
+    used.
 
     Parameters
     ----------

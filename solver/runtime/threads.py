@@ -8,9 +8,9 @@ changes the last bits of a sum.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from functools import cache, wraps
-from threading import Lock, RLock
+from threading import Lock
 from typing import Any, TypeVar
 
 from adhesis.solver.runtime.uninterrupted import uninterrupted
@@ -21,16 +21,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 _limit = Lock()
 
 
-def new_lock() -> AbstractContextManager[Any]:
-    """Make a reentrant lock."""
-    return RLock()
-
-
 def one_at_a_time(function: F) -> F:
     """Let one thread at a time call the decorated methods of an object, by its lock ``in_use``.
 
-    Methods reuse work arrays and plans in every call. Only counters and caches persist between
-    calls, so the results do not depend on the threads, to the last bit.
+    Methods reuse work arrays and plans in every call. What persists between calls is counters,
+    caches, and without adhesion the states of the last loading: results do not depend on the
+    threads, to the last bit.
     """
 
     @wraps(function)

@@ -1,4 +1,4 @@
-"""Points of a branch: stable equilibria of the edges, with their rates there and before."""
+"""Points of a branch: equilibria of the edges, with their rates there and before."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class PinnedEdges(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A stable equilibrium on a branch, or the field of its edges at another d next to it.
+    """An equilibrium of edges, stable on a branch, or the field of edges next to one.
 
     Attributes
     ----------

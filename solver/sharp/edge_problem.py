@@ -30,7 +30,7 @@ FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
 
 @dataclass
 class Counters:
-    """Numbers of field solutions, energies, fine openings and steps."""
+    """Numbers of field solutions (also by the linear response), energies, fine openings, steps."""
 
     fields: int = 0
     energies: int = 0

@@ -33,7 +33,8 @@ less have not left their branch."""
 ENDLESS = 100_000
 """Steps of one descent, or nucleations in one jump; more are an endless loop."""
 RESTS = 20
-"""How often a descent may come to rest without a minimum that Newton's iteration finds. Without it
+"""How often a descent may come to rest without a minimum that Newton's iteration finds; as often
+again edges that are nearly in equilibrium are taken, or moved. Without it
 one of 72 loops (H = 0.9, γ = 0.07) went to and fro between two places beside a fold."""
 OTHER_MINIMUM = 0.01
 """λ_min. Edges this far apart are those of different minima."""
@@ -80,7 +81,7 @@ NEAR_STRENGTH = 0.8
 MOST_MAXIMA = 32
 """Maxima of tension of one field that are refined."""
 MOST_OPENINGS = 1000
-"""Openings one after the other at one prescribed value; more are an endless loop."""
+"""Touches and openings one after the other in one step; more are an endless loop."""
 
 # ---------------------------------------------------------------- continuation of a branch
 

@@ -82,7 +82,7 @@ def test_field_equals_the_explicit_solution(patches):
     }[patches]
     field = solved_field(source, np.array(gaps), separation, 1e-13)
     c, opening = explicit_solution(
-        lambda theta: source.panels.stress(theta)[0], np.array(gaps), separation, 60
+        lambda theta: source.panels.stress(theta), np.array(gaps), separation, 60
     )
     assert np.abs(field.opening - opening).max() < 1e-11 * np.abs(opening).max()
     # p̄ = ±c_0 up to the factors 2 of the scaled product T

@@ -151,7 +151,7 @@ class Follower:
     def _nucleation_jump(self, branch: StableBranch, target: Target) -> ComputedJump | None:
         """Compute the jump where contact first appears in a gap, or a gap in contact; else None.
 
-        The trail is searched for both; without a touch it begins anew.
+        The trail is searched for both, and begins anew.
         """
         trail, start = branch.trail, branch.trail[0].d
         if len(trail) == 1:

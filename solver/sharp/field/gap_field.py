@@ -107,7 +107,7 @@ class GapField:
         if self._solve is not None:
             solution = self._solve()
             check_definite(solution)
-            self._solution, self._solve = solution, None  # it may hold a response
+            self._solution, self._solve = solution, None
         return self._solution
 
     @property

@@ -46,7 +46,7 @@ class RefinedTension:
     def at(self, theta: Array) -> Array:
         """Compute the tension at some positions on the contact."""
         pull = sum_pull(theta, self._sine, self._cosine, self._source_weight) / (4 * np.pi)
-        return np.asarray(pull - self._source.panels.stress(theta)[0] - self._pressure)
+        return np.asarray(pull - self._source.panels.stress(theta) - self._pressure)
 
     def inside(self, theta: float) -> bool:
         """Return whether a position lies on the contact."""

@@ -46,7 +46,8 @@ class Crack:
     ----------
     position : float
     value : float
-        Margin before it opens, in units of the strength; not positive if it opens.
+        Margin before it opens, a share of the strength, of the crack's length or of sqrt(G);
+        not positive if it opens.
     length : float
         Of the crack; 0 if it does not open.
     barrier : float
