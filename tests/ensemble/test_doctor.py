@@ -62,12 +62,18 @@ def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path, monkeypa
     assert found["writer"] == "rank 0"
 
 
-def test_a_launcher_that_hangs_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    hanging = tmp_path / "mpirun"
-    hanging.write_text('#!/bin/sh\n[ "$1" = --version ] || exec sleep 600\n')
+def test_a_launcher_that_hangs_is_given_up_and_may_end_its_ranks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hanging, ended = tmp_path / "mpirun", tmp_path / "ended"
+    hanging.write_text(
+        f"#!/bin/sh\n[ \"$1\" = --version ] && exit\ntrap 'echo > {ended}; kill $!; exit 1' TERM\n"
+        "sleep 600 & wait\n"
+    )
     hanging.chmod(0o755)
     monkeypatch.setattr(doctor, "_TIME_LIMIT", 2.0)
     monkeypatch.setenv("MPIRUN", str(hanging))
     diagnosis = doctor.examine()
     assert not diagnosis.usable
     assert any("did not end within" in check.text for check in diagnosis.checks)
+    assert ended.exists()
