@@ -25,9 +25,8 @@ def _limited(work: Callable[..., Any], limit: float, given: tuple[Any, ...]) -> 
 class Isolated:
     """A function whose calls run in another process, one after the other.
 
-    A process that dies or takes too long is replaced at the next call; leaving a ``with`` block
-    of :func:`contextlib.closing` ends it. ``work`` is a function of the top level of a module,
-    ``limit`` the CPU time of a call, in s.
+    A process that dies or takes too long is replaced at the next call. ``work`` is a function of
+    the top level of a module, ``limit`` the CPU time of a call, in s.
     """
 
     def __init__(self, work: Callable[..., Any], limit: float) -> None:
