@@ -283,7 +283,7 @@ if ! find_parallel_hdf5; then
 fi
 if ! has_mpi; then why_serial=${why_serial:-"no mpirun in PATH"}; fi
 
-# ------------------------------------------- side by side: h5py and all other packages
+# ------------------------------------------- side by side: h5py, and all other packages with adhesis
 
 build_h5py() {
     # A compile job for each core and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
@@ -319,8 +319,17 @@ if [ -z "$why_serial" ]; then
         part h5py "building h5py" build_h5py
     fi
 fi
+install_adhesis() {
+    # The kernels are compiled here: half a minute of CPU time.
+    if ! has_compiler; then
+        install $(locked ziglang) || return 1
+        export CXX="$venv/bin/python -m ziglang c++"
+    fi
+    PATH=$venv/bin:$PATH install --no-build-isolation --editable .
+}
 part rest "all other packages" install_rest
 required rest
+part adhesis "adhesis itself, with its kernels" install_adhesis
 if [ -n "${pid[h5py]:-}" ] && ! finish h5py; then
     tail -n 15 .setup/h5py.log
     why_serial="h5py could not be built against $hdf5 (see .setup/h5py.log)"
@@ -341,14 +350,9 @@ if ! has_mpi; then
     step mpich "no mpirun in PATH: one from the package mpich" install "mpich==$MPICH" ||
         warn "no MPI: install one (Debian: openmpi-bin); adhesis run works in one process only"
 fi
-finish_installation() {
-    # The kernels are compiled here: half a minute of CPU time.
-    if ! has_compiler; then
-        install $(locked ziglang) || return 1
-        export CXX="$venv/bin/python -m ziglang c++"
-    fi
-    PATH=$venv/bin:$PATH install --no-build-isolation --editable . || return 1
-    # Byte code of what commands import, also for users who may not write here.
+required adhesis
+# Byte code of what commands import, also for users who may not write here.
+import_all() {
     "$venv/bin/python" -c '
 from importlib import import_module
 from adhesis.ensemble.command.main import COMMANDS, module_of
@@ -357,8 +361,8 @@ for name in COMMANDS:
 import adhesis.ensemble.bench.benchmark, adhesis.solver.validate.claims
 import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, rich.progress, xarray'
 }
-part adhesis "adhesis itself, with its kernels" finish_installation
-required adhesis
+part imports "byte code" import_all
+required imports
 
 # ----------------------------------------------------------------- the mpirun that fits, and Slurm
 
