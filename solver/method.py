@@ -36,7 +36,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from threading import RLock
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -47,6 +46,7 @@ from adhesis.solver.model.jump import BRANCHES, Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks, parabola_vertex
+from adhesis.solver.runtime.threads import new_lock
 from adhesis.solver.values import ByValue
 from adhesis.solver.views import NotebookDisplay
 
@@ -244,7 +244,7 @@ class Method(NotebookDisplay, ABC):
         self.problem = instance("problem", problem, Problem, how)
         self._check_adhesion(self.problem)
         self.chosen = chosen
-        self.in_use = RLock()  # of one_at_a_time
+        self.in_use = new_lock()  # of one_at_a_time
 
     @classmethod
     def _check_adhesion(cls, problem: Problem) -> None:

@@ -8,9 +8,9 @@ changes the last bits of a sum.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache, wraps
-from threading import Lock
+from threading import Lock, RLock
 from typing import Any, TypeVar
 
 from adhesis.solver.runtime.uninterrupted import uninterrupted
@@ -19,6 +19,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # The number of threads is a property of the process.
 _limit = Lock()
+
+
+def new_lock() -> AbstractContextManager[Any]:
+    """Make a reentrant lock."""
+    return RLock()
 
 
 def one_at_a_time(function: F) -> F:
