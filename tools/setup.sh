@@ -291,7 +291,7 @@ build_h5py() {
     local config=$root/.setup/build.cfg
     printf '[build_ext]\nparallel = %s\n' "$(env -u OMP_NUM_THREADS nproc 2>/dev/null || echo 2)" >"$config"
     install $(locked mpi4py) &&
-        DIST_EXTRA_CONFIG=$config CC=$compiler HDF5_MPI=ON HDF5_DIR=$hdf5 CFLAGS='-O1 -g0 -w' \
+        DIST_EXTRA_CONFIG=$config CC=$compiler HDF5_MPI=ON HDF5_DIR=$hdf5 CFLAGS='-O0 -g0 -w' \
             pip wheel --no-cache-dir --no-build-isolation --no-deps \
             --no-binary=h5py --wheel-dir "$wheels.new" "h5py==$H5PY" &&
         rm -rf "$wheels" && mv "$wheels.new" "$wheels"
