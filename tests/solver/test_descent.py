@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
+from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
 from adhesis.solver._kernels import (
     Descent,
     DescentEvent,
@@ -18,6 +18,7 @@ from adhesis.solver._kernels import (
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.dense import DenseSolution, dense_tangent, solve_densely
+from tests.support.scenes import loops_at
 
 SOLID = HalfSpace(1e6, 0.5)
 
@@ -168,16 +169,10 @@ def test_a_step_after_which_a_gap_needs_more_nodes_is_judged():
         amplitudes="deterministic",
     )  # fmt: skip
     problem = Problem(profile, SOLID, 56.953749479986186, strength=7.224849617527944e7)
-    loops = [
-        run_loop(
-            SharpMethod(problem, accuracy=accuracy),
-            max_penetration=0.8079232131592422,
-            load_steps=18,
-        )
-        for accuracy in (1e-3, 1e-4)
-    ]
-    assert [jump.kind for jump in loops[0].jumps] == [jump.kind for jump in loops[1].jumps]
-    assert abs(loops[0].loss - loops[1].loss) < loops[0].loss_error + loops[1].loss_error
+    path = {"max_penetration": 0.8079232131592422, "load_steps": 18}
+    coarse, fine = loops_at(problem, 1e-3, 1e-4, **path)
+    assert [jump.kind for jump in coarse.jumps] == [jump.kind for jump in fine.jumps]
+    assert abs(coarse.loss - fine.loss) < coarse.loss_error + fine.loss_error
 
 
 def test_a_patch_vanishes_where_the_surfaces_are_far_apart(wave):

@@ -11,6 +11,7 @@ from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.mechanics import leaving_step
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.grids import grid_of
+from tests.support.scenes import loops_at
 
 SOLID = HalfSpace(1e6, 0.5)
 PHASES = [
@@ -159,10 +160,7 @@ def test_two_folds_too_near_to_be_told_apart_are_a_race():
     )
     gamma = 0.3660918153358999 * SOLID.modulus * 1e-12 * profile.q0 * 8
     problem, depth = Problem(profile, SOLID, gamma), 0.8667227826221429
-    coarse, fine = (
-        run_loop(SharpMethod(problem, accuracy=accuracy), max_penetration=depth, load_steps=31)
-        for accuracy in (1e-3, 1e-4)
-    )
+    coarse, fine = loops_at(problem, 1e-3, 1e-4, max_penetration=depth, load_steps=31)
     assert abs(coarse.loss - fine.loss) > 3 * (coarse.loss_error + fine.loss_error)
     (raced,) = (jump for jump in coarse.jumps if jump.raced)
     same = min(fine.jumps, key=lambda jump: abs(jump.separation - raced.separation))

@@ -11,7 +11,6 @@ from adhesis.solver._kernels import (
     set_up_response,
     solve_field,
 )
-from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.edge_problem import FIXED_SEPARATION
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -19,6 +18,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support import next_to_a_fold
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
+from tests.support.scenes import loops_at
 
 
 @pytest.fixture(scope="module")
@@ -207,14 +207,8 @@ def test_no_step_leads_to_another_branch():
     )
     half_space = HalfSpace(young=1e6, poisson=0.5)
     gamma = 0.5935246633443851 * half_space.modulus * 1e-12 * profile.q0 * 14
-    coarse, fine = (
-        run_loop(
-            SharpMethod(Problem(profile, half_space, gamma), accuracy=accuracy),
-            max_penetration=0.6572167384925119,
-            load_steps=28,
-        )
-        for accuracy in (1e-3, 3e-4)
-    )
+    path = {"max_penetration": 0.6572167384925119, "load_steps": 28}
+    coarse, fine = loops_at(Problem(profile, half_space, gamma), 1e-3, 3e-4, **path)
     assert abs(coarse.loss - fine.loss) < coarse.loss_error
     assert abs(coarse.audit_residual) < 1e-4
 
