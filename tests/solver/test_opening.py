@@ -24,9 +24,7 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.problem import griffith_length
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
-from adhesis.solver.sharp.continuation.branch import StableBranch
 from adhesis.solver.sharp.nucleation.opening import Crack, judge_maximum
-from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
 
 PERIOD = 2e-3
 # Two troughs, of which the one at x = λ/2 is the shallower.
@@ -133,24 +131,6 @@ def test_patches_open_under_every_control(control, turning_point):
     assert abs(loop.audit_residual) < 1e-4
     opened = [jump for jump in loop.jumps if jump.kind == "opening"]
     assert all(jump.energy_drop > -jump.barrier for jump in opened)
-
-
-def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
-    """It halved each of them once, so that none grew again: such a loop did not end."""
-    branch = SimpleNamespace(
-        _states=SimpleNamespace(
-            of_point=lambda point: point, energy_residual=lambda before, after: 100.0
-        ),
-        _output=SimpleNamespace(d=0.0),
-        _at_output=None,
-        _resolution=SimpleNamespace(jump=1e-6, work=1.0),
-        _work_before=(0.0, math.inf),
-        _work_of_fields=0.0,
-    )
-    for d in (1.0, 0.5):
-        StableBranch._work_error(branch, SimpleNamespace(d=d))
-    branch._work_before = (0.0, math.inf)  # the step was accepted
-    assert StableBranch._work_error(branch, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
 
 
 def test_work_and_energy_agree_between_openings():
