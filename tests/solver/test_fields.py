@@ -38,7 +38,7 @@ def shares_of(method: Method, state: ContactState) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("name", "options", "accuracy"),
-    [("sharp", {"accuracy": 1e-5}, 5e-4), ("grid", {"nodes_per_wave": 2048}, 0.03)],
+    [("sharp", {"accuracy": 1e-5}, 5e-4), ("grid", {"nodes_per_wave": 1024}, 0.03)],
 )
 @pytest.mark.parametrize("alpha", [0.1, 0.4])
 def test_density_of_the_gap_is_that_of_johnsons_wave(name, options, accuracy, alpha):

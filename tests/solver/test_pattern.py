@@ -137,7 +137,7 @@ def test_two_works_and_a_pattern_share_their_variation_and_are_kept_in_a_file(tm
 
 def test_both_methods_agree_on_a_pattern():
     sharp = loop_of(Problem(ROUGH, SOLID, 2e-3, pattern=UNEVEN), max_penetration=0.7, load_steps=10)
-    method = make_method("grid", sharp.problem, nodes_per_wave=128)
+    method = make_method("grid", sharp.problem, nodes_per_wave=64)
     grid = run_loop(method, max_penetration=0.7, load_steps=10)
     even = loop_of(Problem(ROUGH, SOLID, 2e-3), max_penetration=0.7, load_steps=10)
     assert abs(grid.loss - sharp.loss) < grid.loss_error + sharp.loss_error

@@ -138,7 +138,7 @@ def test_vanishing_adhesion_ends_and_tells_what_it_misses():
     """
     profile = profile_of(0.8, 2, 12, 3)
     fair, faint = (
-        loop(profile, gamma, max_penetration=0.5, load_steps=10) for gamma in (1e-7, 1e-8)
+        loop(profile, gamma, max_penetration=0.25, load_steps=5) for gamma in (1e-7, 1e-8)
     )
     assert abs(fair.audit_residual) < 1e-3
     assert fair.loss_error < 1e-3 * fair.loss
