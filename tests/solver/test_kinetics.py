@@ -179,7 +179,7 @@ def test_nothing_races_where_the_rules_agree():
 
 
 def test_grid_runs_the_same_race():
-    result = run_loop(GridMethod(race(), nodes_per_wave=64), max_penetration=0.8, load_steps=20)
+    result = run_loop(GridMethod(race(), nodes_per_wave=32), max_penetration=0.8, load_steps=20)
     assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=2e-3)
     assert result.loss_dimensionless == pytest.approx(5.178224, rel=5e-3)
     assert result.jumps[0].raced

@@ -141,7 +141,7 @@ def test_grid_takes_mirror_images_one_after_the_other_too():
     problem = Problem(profile, SOFT, 2e-4)
     sharp, grid = (
         run_loop(method, max_penetration=0.5, load_steps=10)
-        for method in (make_method("sharp", problem), grid_of(problem, nodes=1024))
+        for method in (make_method("sharp", problem), grid_of(problem, nodes=512))
     )
     for loop in (sharp, grid):
         assert loop.jumps[0].patches_after == 1
