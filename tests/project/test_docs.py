@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from markdown_it import MarkdownIt
 from PIL import Image
 
 from adhesis.ensemble import exit_codes
@@ -50,28 +51,12 @@ class Block:
 
 def blocks(page: Path) -> Iterator[Block]:
     """Every block, in order; paragraphs of an indented block are blocks of their own."""
-    language: str | None = None
-    kept: list[str] = []
-    before = ""
-    for line in [*page.read_text().splitlines(), ""]:
-        if language is not None:
-            if line == "```":
-                yield Block(page, language, "\n".join(kept) + "\n")
-                language, kept = None, []
-            else:
-                kept.append(line)
-        elif line.startswith("```"):
-            language = line[3:]
-        elif line.startswith("    ") and (kept or before == "" or before.startswith("#")):
-            kept.append(line[4:])
-        elif kept:
-            assert line == "", f"{page}: no empty line before {line!r}"
-            yield Block(page, "", "\n".join(kept) + "\n")
-            kept = []
-        else:
-            assert not line.startswith("    "), f"{page}: neither text nor a block: {line!r}"
-        before = line
-    assert language is None, f"{page}: a fence is not closed"
+    for token in MarkdownIt("commonmark").parse(page.read_text()):
+        if token.type == "fence":
+            yield Block(page, token.info, token.content)
+        elif token.type == "code_block":
+            for text in token.content.split("\n\n"):
+                yield Block(page, "", text.strip("\n") + "\n")
 
 
 def is_of_commands(block: Block) -> bool:
