@@ -152,16 +152,6 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
 
 
-def test_the_field_of_an_equilibrium_has_no_derivatives_at_fixed_edges(wave):
-    """Newton's iteration knows the potential, and asks for none of them: that was a crash."""
-    prescribed = 0.5 * 2 * np.pi * 1e-3
-    gaps = run(wave, NARROW, 0.5, 1000).gaps
-    point = wave.edges.equilibrium(gaps, prescribed, 0.05 * wave.edges.wave)
-    assert point is not None
-    with pytest.raises(ValueError, match="known potential"):
-        point.field.solution.by_prescribed()
-
-
 def test_a_step_after_which_a_gap_needs_more_nodes_is_judged():
     """Without that it passed a minimum 0.04 λ_min beyond a fold: one jump less, loss 3e-3 off."""
     profile = self_affine_profile(

@@ -200,8 +200,8 @@ def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     """The whole of ``adhesis validate``; without --slow a part of the long claims.
 
     On a grid of half as many nodes, whose edges are known half as well. Other α are in
-    test_sharp_path.py, an opening trough in test_opening.py, controls in test_control_loops.py,
-    audits of rough loops in test_grid.py and test_touch.py.
+    test_sharp_path.py, controls in test_control_loops.py, audits of rough loops in test_grid.py
+    and test_touch.py.
     """
     alphas = validation.ALPHAS
     if not request.config.getoption("--slow"):
@@ -211,7 +211,7 @@ def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
         nodes, standard = judging.GRIDS[-2], judging.STANDARDS["grid"]
         coarser = replace(standard, nodes=nodes, edge=1 / nodes)
         monkeypatch.setitem(judging.STANDARDS, "grid", coarser)
-        elsewhere = (validation.controls, validation.opening, validation.audit)
+        elsewhere = (validation.controls, validation.audit)
         kept = tuple(claim for claim in validation.CLAIMS if claim not in elsewhere)
         monkeypatch.setattr(validation, "CLAIMS", kept)
     code = main(["validate", "--method", name, "--json"])
