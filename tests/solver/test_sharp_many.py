@@ -164,25 +164,6 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     assert np.abs(back.field.opening - anew.field.opening).max() < 1e-5 * scale
 
 
-def test_gaps_that_come_to_need_more_nodes_take_them_in_the_response_that_is_known(many_gaps):
-    """A patch narrows to a third, and widens again: with more nodes, to the same state."""
-    edges, point = many_gaps
-    gaps, d = point.gaps, point.d
-    edges.forget()
-    anew = edges.equilibrium(gaps, d, edges.wave)
-    known = edges.response_at(gaps, d)
-    orders, narrowed = known.orders, gaps.copy()
-    left, right = gaps[2, 1], gaps[3, 0]
-    middle = 0.5 * (left + right)
-    narrowed[2, 1], narrowed[3, 0] = np.array([left, right]) + 0.7 * (middle - [left, right])
-    assert edges.response_at(narrowed, d) is known
-    assert np.flatnonzero(known.orders > orders).tolist() == [3]
-    back = edges.equilibrium(gaps, d, edges.wave)
-    assert edges.response_at(back.gaps, d) is known
-    assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.field_error
-    assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
-
-
 def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):
     """A patch less, and one more: with the same result as without any response."""
     edges, point = many_gaps
