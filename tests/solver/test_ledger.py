@@ -41,8 +41,11 @@ def test_every_interval_of_a_path_balances(name):
     lost = path.jumps[-1:] if is_load else ()  # under a load it is U, of either sign
     assert min(jump.energy_drop for jump in path.jumps if jump not in lost) >= 0
     assert abs(path.audit_residual) < 1e-4
-    for minor in path.minor_loops:
-        assert minor.audit_residual == pytest.approx(0, abs=path.loss_error)
+    (minor,) = path.minor_loops
+    assert (minor.start, minor.turn, minor.branch) == (*points[1:], "loading")
+    assert minor.audit_residual == pytest.approx(0, abs=path.loss_error)
+    assert minor.loss >= -1e-6 * path.work
+    assert set(path.leg) == {0, 1, 2, 3}
 
 
 def test_a_ledger_states_work_jump_and_friction_of_each_interval():
