@@ -31,11 +31,6 @@ UM = "x (um),z (um)"
 TWO = [f"{x},{z}" for x, z in PAIRS]
 
 
-def with_codes(codes: dict[int, str]) -> list[str]:
-    """Rows of two columns, with other heights at some points."""
-    return [f"{x},{codes.get(k, z)}" for k, (x, z) in enumerate(PAIRS)]
-
-
 def grouped(sign: str) -> list[str]:
     """Rows in nm whose positions have signs of thousands."""
     return [f"{500 * k:,};{1e3 * float(z):.3f}".replace(",", sign) for k, z in enumerate(ZS)]
@@ -140,7 +135,8 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
     ],
 )
 def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
-    trace = read_trace(put(tmp_path / "t.csv", [UM, *with_codes(codes)]))
+    rows = [f"{x},{codes.get(k, z)}" for k, (x, z) in enumerate(PAIRS)]
+    trace = read_trace(put(tmp_path / "t.csv", [UM, *rows]))
     gaps = np.flatnonzero(np.isnan(trace.heights)).tolist()
     assert gaps == (list(codes) if missing else [])
     assert any(f"{missing} heights of" in note for note in trace.notes) == (missing > 0)
@@ -490,14 +486,12 @@ def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> 
 # ---------------------------------------------------------------------- options and objects
 
 
-def array_of_xarray() -> object:
-    return xr.DataArray(Z, dims="x", coords={"x": PLACE})
-
-
-@pytest.mark.parametrize("make", [array_of_xarray, lambda: xr.Dataset({"z": ("x", Z)})])
-def test_objects_of_other_libraries_are_refused_with_what_can_be_read(make):
+@pytest.mark.parametrize(
+    "source", [xr.DataArray(Z, dims="x", coords={"x": PLACE}), xr.Dataset({"z": ("x", Z)})]
+)
+def test_objects_of_other_libraries_are_refused_with_what_can_be_read(source):
     with pytest.raises(TypeError, match=r"it must be a path, .* an array or list of heights"):
-        read_trace(make(), step=STEP)
+        read_trace(source, step=STEP)
 
 
 def test_an_object_from_before_a_reload_is_named_as_that() -> None:

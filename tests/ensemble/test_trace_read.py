@@ -16,6 +16,7 @@ import pytest
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from tests.support.wrong_values import WithUnit
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -178,12 +179,6 @@ def test_missing_heights_in_memory_are_gaps() -> None:
 
 
 WORDS = FRAME.assign(**{"z (um)": "high"})
-
-
-class WithUnit(np.ndarray):
-    """An array with a unit, as unyt and astropy have them."""
-
-    units = "um"
 
 
 REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {

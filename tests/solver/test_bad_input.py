@@ -40,7 +40,7 @@ from adhesis.solver.checks import Bounds, counted, real, shown, whole
 from adhesis.solver.loading.cycle import check_cycle
 from adhesis.solver.method import MethodReport
 from tests.support.exact_wave import ExactWave
-from tests.support.wrong_values import outside
+from tests.support.wrong_values import WithUnit, outside
 
 PERIOD, AMPLITUDE = 1e-3, 1e-6
 WAVE = single_wave(AMPLITUDE, PERIOD)
@@ -82,12 +82,6 @@ def path(points: Any, **change: Any) -> PathResult:
 def answer(**change: Any) -> Any:
     prepared = change.pop("prepared", None) or prepare_trace(TRACE)
     return loss_of_trace(prepared, **{"half_space": SOLID, "work_of_adhesion": 0.04} | change)
-
-
-class WithUnit(np.ndarray):
-    """An array with a unit, as unyt and astropy have them."""
-
-    units = "MPa"
 
 
 NOT_NUMBERS: list[Any] = [
