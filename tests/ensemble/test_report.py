@@ -76,12 +76,6 @@ def drawn(made) -> dict[str, Figure]:
     return made[1]
 
 
-def margin(figure) -> float:
-    with style():
-        box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
-    return min(box.x0, box.y0, width - box.x1, height - box.y1)
-
-
 @pytest.fixture
 def undrawn(monkeypatch) -> list[str]:
     """Draw no figure but those of the list, for tests that read tables and the page alone."""
@@ -419,11 +413,13 @@ def test_every_figure_is_legible_at_column_width_in_colour_and_grey(drawn, monke
     monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)  # laid out, but not drawn
     for name, figure in drawn.items():
         save(figure, tmp_path / name)
-        width = figure.get_size_inches()[0] * 25.4
-        assert width == pytest.approx(85) or width == pytest.approx(175)
+        width, height = figure.get_size_inches()
+        assert any(25.4 * width == pytest.approx(millimetres) for millimetres in (85, 175))
         texts = [t for t in figure.findobj(mpl.text.Text) if t.get_text() and t.get_visible()]
         assert min(t.get_fontsize() for t in texts) >= 4.5, name  # indices in formulas
-        assert margin(figure) >= 0, name  # nothing is cut off
+        with style():
+            box = figure.get_tightbbox()
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0, name  # nothing is cut off
         bottom = figure.axes[-1] if name != "pull_off_stress" else figure.axes[0]
         assert bottom.get_xlabel(), name
         assert figure.axes[0].get_ylabel(), name

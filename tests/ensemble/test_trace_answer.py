@@ -440,11 +440,8 @@ def test_the_summary_states_the_scope(document: dict[str, Any], folder: Path) ->
 
 
 def test_unphysical_input_is_doubted_and_zero_range_comes_first() -> None:
-    trace, cycle, plan = small_plan()
-    hard = dataclasses.replace(cycle, works_of_adhesion=(30.0,))
-    plan = make_plan(trace, hard, quick=True, processes=0)
-    plan = only(plan, "answer")
-    found = run_plan(trace, hard, plan)
+    trace, cycle, _ = small_plan()
+    found = of_the_answer_alone(dataclasses.replace(cycle, works_of_adhesion=(30.0,)), trace)
     assert found.pull_off_stress.value > 0.3 * 1e6
     assert any("of Young's modulus: small strain does not hold" in text for text in found.warnings)
 
@@ -538,18 +535,13 @@ def test_a_plan_expects_no_more_patches_than_crests_that_are_reached(gamma: floa
     x = 1e-6 * np.arange(1000)
     ridge = 9e-6 * np.exp(-(((x - 0.64e-3) / 12e-6) ** 2))
     trace = prepare_trace(Trace(PROFILE.at(x) + ridge, 1e-6, "t.txt"))
-    plan = make_plan(trace, make_cycle(HALF_SPACE, gamma, 0.9, 40, "auto", 1e-3), processes=0)
-    (job,) = (job for job in plan.jobs if job.name == "answer")
-    found = run_plan(
-        trace,
-        make_cycle(HALF_SPACE, gamma, 0.9, 40, "auto", 1e-3),
-        dataclasses.replace(plan, runs=plan.runs[:1], jobs=(job,)),
-    ).main
+    cycle = make_cycle(HALF_SPACE, gamma, 0.9, 40, "auto", 1e-3)
+    plan = make_plan(trace, cycle, processes=0)
+    found = of_the_answer_alone(cycle, trace).main
     assert found["patches"] / 3 <= plan.patches <= 3 * found["patches"]
     assert plan.seconds["Δ 0.3"] < plan.seconds["answer"]
 
 
-@pytest.mark.usefixtures("quick_figures")
 def of_the_answer_alone(cycle: Any, trace: Prepared) -> Answer:
     """Run the answer's own loop of a trace."""
     return run_plan(trace, cycle, only(make_plan(trace, cycle, quick=True, processes=0), "answer"))

@@ -115,10 +115,6 @@ def example() -> str:
     return block.text
 
 
-def wrong_example() -> str:
-    return re.sub(r"hurst = .*", "hurst = [0.8, 1.2]", example())
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the commands run: with the files that they name."""
@@ -168,7 +164,8 @@ def test_commands_run(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.usefixtures("quick_figures")
 @pytest.mark.parametrize("page", LESSONS, ids=lambda page: str(page.relative_to(ROOT)))
 def test_lessons_print_what_their_pages_show(page, tmp_path, monkeypatch):
-    (tmp_path / "wrong.toml").write_text(wrong_example())
+    wrong = re.sub(r"hurst = .*", "hurst = [0.8, 1.2]", example())
+    (tmp_path / "wrong.toml").write_text(wrong)
     monkeypatch.chdir(tmp_path)
     pieces = list(transcripts.pieces(page.read_text()))
     shown = sum(is_transcript(block) for block in BLOCKS if block.page == page)

@@ -1,14 +1,12 @@
 """Two works of adhesion: an edge advances at γ, recedes at γ_open, and is pinned between both."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from adhesis import PathError
 from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import run_path
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -49,14 +47,6 @@ def closed_form(ratio: float, depth: float) -> tuple[float, float]:
     gained = closes.energy(closes.half_width(A))
     lost = opens.energy(opens.fold_half_width)
     return float((lost - gained + friction) / PERIOD), float(friction / PERIOD)
-
-
-@cache
-def rough_loop() -> LoopResult:
-    problem = Problem(Profile(PERIOD, ROUGH), SOLID, 1e-3, work_of_adhesion_open=2e-3)
-    return run_loop(
-        make_method("sharp", problem, accuracy=1e-4), max_penetration=0.6, load_steps=20
-    )
 
 
 @pytest.mark.parametrize("depth", [0.3, 0.6])
@@ -128,7 +118,8 @@ def test_a_loop_of_many_patches_closes_its_audit():
 
 
 def test_friction_only_grows():
-    loop = rough_loop()
+    problem = Problem(Profile(PERIOD, ROUGH), SOLID, 1e-3, work_of_adhesion_open=2e-3)
+    (loop,) = loops_at(problem, 1e-4, max_penetration=0.6, load_steps=20)
     assert np.all(np.diff(loop.edge_friction) >= 0)
     assert loop.to_dataframe().attrs["units"]["edge_friction"] == "J/m"
     data = loop.to_xarray()
