@@ -236,6 +236,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {},
         r"such as '5,200', and none whose ',' is a decimal sign for certain: give decimal",
     ),
+    "perhaps thousands in both columns": (
+        ["x (nm);z (nm)", *(f"{1000 + 500 * k:,};{9 + float(z):.3f}".replace(".", ",")
+                           for k, z in enumerate(ZS))],
+        {},
+        r"such as '1,000', and none whose ',' is a decimal sign for certain: give decimal",
+    ),
     "UTF-16 without a mark": (
         "\n".join([UM, *TWO]).encode("utf-16-le"),
         {"columns": [1, 2]},

@@ -285,6 +285,11 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
         {},
         "line 11.*no posit",
     ),
+    "points of thousands": (
+        [f"1.{k:03d},5;0,1" for k in range(99)],
+        {"unit": "um"},
+        "line 1 .* has '1.000,5', which is no number",
+    ),
     "one number or two": ([f"{k % 7},{k % 3}" for k in range(99)], {"unit": "um"}, "give decimal"),
     "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),
     "flat": ([f"{k} 1.0" for k in range(99)], {"unit": "um"}, "flat trace has no loss"),
