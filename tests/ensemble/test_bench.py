@@ -63,11 +63,6 @@ def fake_measure(run: Run) -> Measurement:
     return Measurement(1.0, 200.0, 190.0, loss * (1 + error), 2.0, 1e-3, 10, 2, 1)
 
 
-@pytest.fixture
-def no_runs(monkeypatch):
-    monkeypatch.setattr(benchmarking, "measure", fake_measure)
-
-
 def test_a_grid_that_would_take_too_long_is_left_out_and_so_are_finer_ones(monkeypatch):
     def slow(run: Run) -> Measurement:
         return replace(fake_measure(run), cpu_seconds=20.0 if run.setting == 256 else 1.0)
@@ -114,7 +109,8 @@ def test_figure_has_a_panel_for_each_scene_even_if_nothing_finished():
     draw([failed("sharp", 1e-3)])
 
 
-def test_command_writes_table_records_and_figure(no_runs, tmp_path, capsys):
+def test_command_writes_table_records_and_figure(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(benchmarking, "measure", fake_measure)
     assert main(["bench", "--quick", "--to", str(tmp_path / "new")]) == 0
     written = {path.name for path in (tmp_path / "new").iterdir()}
     assert written == {"benchmark.csv", "benchmark.md", "benchmark.png", "benchmark.pdf"}

@@ -104,13 +104,11 @@ REFUSED = r"""
 h_rms = "1 m" -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
 h_rms = 1e-18 -> [profile] h_rms is 1e-18 with period 0.001, so the rms slope is
 h_rms = [1e-6, "1 m"] -> [profile] h_rms is 1.0 with period 0.001, so the rms slope is
-period = [1e-3, 1e-9] -> [profile] h_rms is 1e-06 with period 1e-09, so the rms slope is
 ratio = 50000; h_rms = 1e-9; nodes_per_wave = 100000 ->
     [solver] nodes_per_wave is 100000: with 50000 waves it must be at most 1342
 # numbers that can hardly be meant without a unit
 period = 1000 -> period is 1000, which would be 1000 m: give its unit, as in 1000um (1000m, if
 period = [1e-3, 2.5] -> period is 2.5, which would be 2.5 m
-period = 1e4; h_rms = 1 -> which would be
 work_of_adhesion = [0.04, 40] -> work_of_adhesion is 40, which would be 40 J/m²: give its unit, as
 # keys that are missing or do not go together
 period = -> [profile] period is missing

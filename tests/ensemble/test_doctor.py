@@ -1,6 +1,7 @@
 """`adhesis doctor`: what it says is what was tried."""
 
 import json
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.doctor import examine as doctor
-from tests.support.campaign_support import run_python
+from tests.support.campaign_support import run_python, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +66,23 @@ def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path, monkeypa
 def test_a_launcher_that_hangs_is_given_up_and_may_end_its_ranks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    hanging, ended = tmp_path / "mpirun", tmp_path / "ended"
+    """It has its time limit as soon as it hangs, and all else the one of the product."""
+    hanging, begun, ended = (tmp_path / name for name in ("mpirun", "begun", "ended"))
     hanging.write_text(
         f"#!/bin/sh\n[ \"$1\" = --version ] && exit\ntrap 'echo > {ended}; kill $!; exit 1' TERM\n"
-        "sleep 600 & wait\n"
+        f"sleep 600 & echo > {begun}; wait\n"
     )
     hanging.chmod(0o755)
-    monkeypatch.setattr(doctor, "_TIME_LIMIT", 2.0)
+    communicate = subprocess.Popen.communicate
+
+    def at_once(process, input=None, timeout=None):
+        words = list(map(str, process.args))
+        if str(hanging) in words and "--version" not in words and timeout == doctor._TIME_LIMIT:
+            wait_until(begun.exists)
+            timeout = 0.01
+        return communicate(process, input, timeout)
+
+    monkeypatch.setattr(subprocess.Popen, "communicate", at_once)
     monkeypatch.setenv("MPIRUN", str(hanging))
     diagnosis = doctor.examine()
     assert not diagnosis.usable

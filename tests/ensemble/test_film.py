@@ -147,15 +147,11 @@ def test_without_ffmpeg_an_mp4_is_refused(loop, monkeypatch):
         loop.film("a.mp4")
 
 
-def run(*words: object) -> int:
-    scene = ("--hurst", 0.8, "--n0", 2, "--ratio", 4, "--load-steps", 4, "--quiet")
-    return main(["loop", *map(str, (*scene, *words))])
-
-
 def test_the_command_writes_the_film_of_a_loop_and_of_a_path(tmp_path, capsys):
-    for k, way in enumerate((("--max-penetration", 0.5), ("--path", "0.5,0.2,0.6,out"))):
+    scene = "loop --hurst 0.8 --n0 2 --ratio 4 --load-steps 4 --quiet"
+    for k, way in enumerate(("--max-penetration 0.5", "--path 0.5,0.2,0.6,out")):
         file = tmp_path / f"{k}.html"
-        assert run(*way, "--film", file) == 0
+        assert main([*f"{scene} {way}".split(), "--film", str(file)]) == 0
         assert f"wrote       {file}" in capsys.readouterr().out
         assert len(data_of(file.read_text())["frames"]) > 20
 

@@ -33,15 +33,11 @@ COMMAS = [h.replace(".", ",") for h in NM]
 
 TEXTS: dict[str, tuple[str, bytes, dict[str, str]]] = {
     "metres": ("a.csv", "\n".join(METRES).encode(), {}),
-    "no suffix": ("a", "\n".join(METRES).encode(), {}),
-    "a UTF-8 mark": ("a.csv", "\n".join(METRES).encode("utf-8-sig"), {}),
     "a header without a unit": ("a.csv", "\n".join(["height", *METRES]).encode(), {}),
     "a comment": ("a.csv", "\n".join(["# one period (in m)", *METRES]).encode(), {}),
     "a header with a unit": ("a.csv", "\n".join(["z (nm)", *NM]).encode(), {}),
     "decimal commas": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode(), {}),
-    "UTF-16": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode("utf-16"), {}),
     "UTF-32": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode("utf-32"), {}),
-    "CR": ("a.csv", "\r".join(["z (nm)", *NM, ""]).encode(), {}),
     "a unit by option": ("a.csv", "\n".join(NM).encode(), {"unit": "nm"}),
     "one row": ("a.csv", ",".join(METRES).encode(), {}),
     "one row, spaces": ("a.csv", " ".join(METRES).encode(), {}),
@@ -89,12 +85,10 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "xlsx": ("x.xlsx", archive("xl/workbook.xml"), r"is a workbook: save its columns as text"),
     "xls": ("x.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "is a workbook"),
     "xlsx as csv": ("x.csv", archive("xl/workbook.xml"), "is a workbook: save its columns as text"),
-    "zip as dat": ("x.dat", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
     "npz": ("x.npz", saved(WAVE), r"archive of arrays: save the one of the heights as \.npy"),
     "npz as npy": ("x.npy", saved(WAVE), "archive of arrays"),
     "pdf": ("x.pdf", b"%PDF-1.7\n", "is a PDF: export the heights as text"),
     "png": ("x.png", PNG, r"is a picture \(PNG\)"),
-    "png as csv": ("x.csv", PNG, r"is a picture \(PNG\)"),
     "jpeg": ("x.jpg", b"\xff\xd8\xff\xe0" + bytes(40), r"is a picture \(JPEG\)"),
     "empty": ("x.csv", b"", "is empty"),
     "blank": ("x.csv", b" \n\n", "is empty"),
@@ -136,21 +130,13 @@ def test_a_file_that_may_not_be_read_is_refused(read, tmp_path, monkeypatch):
 
 DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
     "a unit that was damaged": (["z [æm]", *METRES], {}, r"'\[æm\]', from which the unit .*--unit"),
-    "another unit": (["z [pm]", *METRES], {}, "from which the unit of the heights is not clear"),
     "header against option": (["z [µm]", *NM], {"unit": "nm"}, "--unit is nm and the header"),
     "two units": (METRES, {"unit": "mm,um"}, "--unit is 'mm,um': with --heights it is one unit"),
-    "unknown unit": (METRES, {"unit": "furlong"}, "'furlong' is no unit of length"),
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
     "nan": ([*METRES[:5], "nan", *METRES[5:]], {}, "has no finite height on line 6: --heights"),
     "overflow": ([*METRES[:5], "-1e400", *METRES[5:]], {}, "has no finite height on line 6"),
     "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "has no finite height on line 6"),
     "nan at the beginning": (["1", "nan", *METRES], {}, "has no finite height on line 2"),
-    "words within": (
-        [*METRES[:5], "pause", *METRES[5:]],
-        {},
-        "line 6 of .* is 'pause': it ends the rows .* lines 1 to 5",
-    ),
-    "two rows": (METRES[:2], {}, "holds 2 rows of numbers: at least 3 are needed"),
 }
 
 

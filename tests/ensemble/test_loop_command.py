@@ -116,6 +116,7 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
     assert data["loss_over_work_of_adhesion"] == data["loss"] / GAMMA
     assert f"{data['loss']:.6g} J/m², {data['loss'] / GAMMA:.4g} γ (dimensionless" in text.out
     assert str(out) in text.out
+    assert "defaults" not in text.out  # of a profile, which heights take the place of
     assert "unloading" in text.err
 
 
@@ -349,12 +350,6 @@ def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(caps
     assert any(t.startswith("method      grid, ") for t in lines)
     assert "--period" not in line
     assert "--h-rms" not in line
-
-
-@pytest.mark.usefixtures("exact_method")
-def test_given_heights_take_no_defaults(wave_file, capsys):
-    assert run(*wave_words(wave_file, "--load-steps", 2, "--quiet")) == 0
-    assert "defaults" not in capsys.readouterr().out
 
 
 SCENE = [

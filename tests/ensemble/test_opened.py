@@ -109,8 +109,12 @@ def test_every_figure_of_the_report_has_a_method_that_returns_it(results):
     assert results.plot.loss_against_hurst().axes[-1].get_xlabel() == "Hurst exponent $H$"
 
 
-def test_every_figure_is_drawn_into_axes_that_are_given(tmp_path):
-    """A figure of a user's own has the curves, scales and labels of the one of the report."""
+def test_every_figure_is_drawn_into_axes_that_are_given(tmp_path, monkeypatch):
+    """A figure of a user's own has the curves, scales and labels of the one of the report.
+
+    What its layout is asked for: test_report_axes.py.
+    """
+    monkeypatch.setattr(Figure, "draw_without_rendering", lambda figure: None)
     plan = campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=4)
     results = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan)))
     names = [name for name in dir(results.plot) if name != "loss_along"]

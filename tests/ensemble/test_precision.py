@@ -27,7 +27,6 @@ from adhesis.ensemble.run.session import Options, run_campaign
 from benchmarks.precision_coverage import cells_of_the_study, of_the_study
 from tests.support import synthetic_results
 from tests.support.campaign_support import (
-    MPIRUN,
     adhesis,
     adhesis_here,
     campaign_text,
@@ -297,7 +296,6 @@ def test_failures_count_as_looked_at_and_may_be_computed_again(tmp_path):
 
 
 @pytest.mark.mpi
-@pytest.mark.skipif(shutil.which(MPIRUN) is None, reason="there is no mpirun here")
 def test_ranks_and_kills_change_no_bit_of_a_precision_campaign(tmp_path, finished):
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text())

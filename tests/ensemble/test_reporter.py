@@ -6,6 +6,7 @@ import time
 
 from adhesis.ensemble.reporter import bar, interval
 from adhesis.ensemble.run.progress import ProgressLine, Summary
+from tests.support.campaign_support import wait_until
 
 
 def test_what_takes_long_is_told_and_what_is_over_is_not(capsys, monkeypatch) -> None:
@@ -56,10 +57,7 @@ class _Terminal(io.StringIO):
 def test_a_run_on_a_terminal_has_one_line_and_failures_above_it() -> None:
     stream, counts = _Terminal(), Summary(total=3, done=1)
     with ProgressLine(counts, lambda: None, stream) as progress:
-        end = time.monotonic() + 20
-        while "1 of 3 tasks done" not in stream.getvalue():
-            assert time.monotonic() < end
-            time.sleep(0.005)
+        wait_until(lambda: "1 of 3 tasks done" in stream.getvalue())
         counts.failed = counts.failed_now = 1
         progress.failure("H = 0.8", "diverged")
         counts.done, counts.computed = 2, 1

@@ -1,5 +1,6 @@
 """A campaign in one process, by the command: resume, growth, stops, failures, bad input."""
 
+import itertools
 import json
 import os
 import re
@@ -13,8 +14,11 @@ import pytest
 import xarray
 
 from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
@@ -31,7 +35,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.fake_run import fake_engine
+from tests.support.fake_run import fake_engine, fake_result
 
 
 def run(folder, *words, fake="", **changes):
@@ -402,25 +406,28 @@ def test_a_hangup_stops_a_run_unless_it_is_ignored():
         signal.signal(signal.SIGHUP, before)
 
 
-def test_watching_a_run_until_it_is_done(tmp_path):
-    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    free = tmp_path / "free"
-    run_ = start("run", path, "--out", out, fake=f"step=0.2 hold=2 free={free}")
-    wait_until(lambda: done_rows(out) >= 2)
-    watch = start("status", out, "--watch", "--interval", "0.2", fake=None)
-    assert watch.stdout is not None
-    first = watch.stdout.readline()
-    free.touch()
-    rest, _ = watch.communicate(timeout=150)
-    run_.communicate(timeout=150)
-    assert watch.returncode == 0
-    lines = [first.rstrip(), *rest.splitlines()]
+def test_watching_a_run_until_it_is_done(tmp_path, monkeypatch, capsys):
+    """A run that writes two rows between two looks; status of a real one: above."""
+    campaign, out = load_campaign(write_campaign(tmp_path)), tmp_path / "r.h5"
+    create(out, campaign)
+    rows, waited = iter(enumerate(campaign.tasks())), []
+
+    def written_meanwhile(seconds):
+        waited.append(seconds)
+        with Writer(out) as writer:
+            for row, task in itertools.islice(rows, 2):
+                writer.write_result(row, fake_result(campaign, task))
+
+    monkeypatch.setattr("adhesis.ensemble.command.status.time.sleep", written_meanwhile)
+    assert main(["status", str(out), "--watch", "--interval", "200"]) == 0
+    assert waited == [200.0] * 4
+    lines = capsys.readouterr().out.splitlines()
     shown = [line for line in lines if " tasks, " in line]
-    assert "8 tasks, 2 done" in shown[0]
-    assert any("an hour, about" in line for line in shown[1:-1])
-    assert shown[-1].endswith("8 tasks, 8 done, 0 pending, 0 failed")
+    for done, line in zip((0, 2, 4, 6, 8), shown, strict=True):
+        assert line.startswith(f"{out}: 8 tasks, {done} done, {8 - done} pending, 0 failed")
+        assert ("an hour, about" in line) == (0 < done < 8)
     assert any(" ± " in line for line in lines[lines.index(shown[-1]) :])  # the table of losses
-    assert adhesis_here("status", out, "--watch", "--interval", "x").returncode == 2
+    assert main(["status", str(out), "--watch", "--interval", "x"]) == 2
 
 
 def test_the_losses_that_status_shows(whole):

@@ -102,9 +102,6 @@ CRAFTED: dict[str, Callable[[h5py.File, Path], object]] = {
     "one more link to a pipe": lambda file, folder: put(file, pipe(folder), "more"),
     "a link inside": moved,
     "external storage": lambda file, _: made(file, STRESS, external=[("/etc/passwd", 0, ALL)]),
-    "a pipe as storage": lambda file, folder: made(
-        file, STRESS, external=[(str(folder / "pipe"), 0, ALL)]
-    ),
     "a virtual dataset": lambda file, folder: virtual(
         file, STRESS, str(folder / "loop.nc"), "separation"
     ),

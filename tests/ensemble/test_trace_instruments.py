@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support import instrument_files
+from tests.support.campaign_support import run_python
 
 pytestmark = pytest.mark.skipif(
     not instrument.available(), reason="the optional package SurfaceTopography is not installed"
@@ -95,13 +95,11 @@ def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_reading_starts_no_mpi(tmp_path: Path) -> None:
-    import subprocess
-
     instrument_files.sdf(tmp_path / "a.sdf", STEP, Z)
     code = (
         "import sys\nfrom adhesis.ensemble.trace.reading.measured_trace import read_trace\n"
         f"read_trace({str(tmp_path / 'a.sdf')!r})\nassert 'mpi4py.MPI' not in sys.modules\n"
         "assert 'SurfaceTopography' in sys.modules\nimport mpi4py"
     )
-    root = Path(__file__).parents[2]
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=root)
+    done = run_python("-c", code)
+    assert done.returncode == 0, done.stderr

@@ -16,6 +16,7 @@ import pytest
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from tests.support.wrong_values import WithUnit
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -96,11 +97,6 @@ def test_names_of_positions_and_heights_have_units_in_many_languages(names, tmp_
         assert_right(read(tmp_path, [head, *rows("\t", decimal, 1e3, 1e6, ".7f")]))
 
 
-def test_units_by_option(tmp_path: Path) -> None:
-    assert_right(read(tmp_path, rows(" ", "."), unit="um"))
-    assert_right(read(tmp_path, rows(",", ".", 1e3, 1e9, ".7f"), unit="mm,nm"))
-
-
 def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path) -> None:
     heights = [f"{z * 1e6:.6f}" for z in Z]
     assert_right(read(tmp_path, ["Height (µm)", *heights], step=STEP))
@@ -110,13 +106,6 @@ def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path)
     assert_right(read(tmp_path, ["Schrittweite: 0,5 µm", "Höhe (µm)", *commas]))
     with pytest.raises(InputError, match="give step"):
         read(tmp_path, ["Height (µm)", *heights])
-
-
-def test_columns_are_chosen_where_there_are_more(tmp_path: Path) -> None:
-    lines = [f"{k},{row}" for k, row in enumerate(rows(",", "."))]
-    with pytest.raises(InputError, match=r"3 columns: give columns X,Z"):
-        read(tmp_path, ["n,x (um),z (um)", *lines])
-    assert_right(read(tmp_path, ["n,x (um),z (um)", *lines], columns=(2, 3)))
 
 
 def test_npy_of_one_column_and_of_two(tmp_path: Path) -> None:
@@ -192,12 +181,6 @@ def test_missing_heights_in_memory_are_gaps() -> None:
 WORDS = FRAME.assign(**{"z (um)": "high"})
 
 
-class WithUnit(np.ndarray):
-    """An array with a unit, as unyt and astropy have them."""
-
-    units = "um"
-
-
 REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {
     "no unit": (BOTH, {}, InputError, "array states no unit"),
     "no step": (Z, {"unit": "m"}, InputError, "array has heights without positions.*give step"),
@@ -212,22 +195,9 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "an empty stream": (io.BytesIO(b""), {}, InputError, "the stream is empty"),
     "a zip": (io.BytesIO(b"\x1f\x8b0"), {}, InputError, "the stream is compressed"),
     "booleans": (FRAME.assign(**{"z (um)": True}), {"columns": [1, 2]}, InputError, "holds bool"),
-    "complex heights": (FRAME.astype(complex), {"columns": [1, 2]}, InputError, "holds complex128"),
-    "dates": (
-        FRAME.astype("M8[s]"),
-        {"columns": [1, 2]},
-        InputError,
-        r"holds datetime64\[s\]: hei",
-    ),
     "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
     "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),
     "a unit that is none": (BOTH, {"unit": 5}, TypeError, "unit is 5: it must be a text"),
-    "columns as text": (
-        BOTH,
-        {"columns": "1,2"},
-        TypeError,
-        r"columns is '1,2': it must be a list",
-    ),
     "one column number": (BOTH, {"columns": 1}, TypeError, r"columns is 1: it must be a list"),
     "a text for a path": ("1,2\n3,4\n", {}, InputError, r"cannot read 1,2\\n3,4\\n: there is no"),
 }
@@ -293,14 +263,12 @@ SPIKED = [*rows(" ", ".")[:60], "25.0 0.1", *rows(" ", ".")[60:]]
 REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "no unit": (rows(" ", "."), {}, "states no unit.*give unit, as in um"),
     "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "states no unit"),
-    "a unit of one column": (["x (mm),z", *rows(",", ".")], {}, "of the positions alone"),
     "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit is mm for the pos"),
     "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* is no map, as"),
     "two rows": ([UM, "1;2", "2;3"], {}, "holds 2 rows of numbers"),
     "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
     "kilometres": ([UM.replace("µm", "m"), *rows(";", ".")], {}, "m long: is its unit right"),
     "heights in mm, positions in µm": (rows(" ", "."), {"unit": "um,mm"}, "in the same unit"),
-    "words within": ([UM, *rows(";", ".")[:50], "pause", *rows(";", ".")[50:]], {}, "line 52 of"),
     "turning back": (SPIKED, {"unit": "um"}, "positions turn back at line 61"),
     "twice the same place": (
         ["x (um) z (um)", "0.0 1.0", "0.0 1.0", *rows(" ", ".")[1:]],
@@ -323,14 +291,8 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
         "line 1 .* has '1.000,5', which is no number",
     ),
     "one number or two": ([f"{k % 7},{k % 3}" for k in range(99)], {"unit": "um"}, "give decimal"),
-    "four numbers or two": (
-        [f"{k},5,1,{k % 3}" for k in range(99)],
-        {"unit": "um"},
-        "give decimal",
-    ),
     "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),
     "flat": ([f"{k} 1.0" for k in range(99)], {"unit": "um"}, "flat trace has no loss"),
-    "no heights": ([f"{k} NaN" for k in range(99)], {"unit": "um"}, "holds 0 heights"),
 }
 
 

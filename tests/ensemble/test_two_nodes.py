@@ -22,7 +22,7 @@ from tests.support.campaign_support import (
     command,
     differences,
     done_rows,
-    environment,
+    started,
     wait_until,
     write_campaign,
 )
@@ -66,14 +66,7 @@ class Nodes:
         mca = [word for name, value in options.items() for word in ("--mca", name, value)]
         start = [MPIRUN, "--allow-run-as-root", *mca, "--host", "nodea:2,nodeb:2", "-n", "4"]
         program = command(words, ranks=4, fake=fake)[3:]  # without the launcher
-        return subprocess.Popen(
-            self.words([*start, *program]),
-            env=environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+        return started(self.words([*start, *program]))
 
     def kill(self, node: int) -> None:
         pids = subprocess.run(

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from markdown_it import MarkdownIt
 from PIL import Image
 
 from adhesis.ensemble import exit_codes
@@ -50,28 +51,12 @@ class Block:
 
 def blocks(page: Path) -> Iterator[Block]:
     """Every block, in order; paragraphs of an indented block are blocks of their own."""
-    language: str | None = None
-    kept: list[str] = []
-    before = ""
-    for line in [*page.read_text().splitlines(), ""]:
-        if language is not None:
-            if line == "```":
-                yield Block(page, language, "\n".join(kept) + "\n")
-                language, kept = None, []
-            else:
-                kept.append(line)
-        elif line.startswith("```"):
-            language = line[3:]
-        elif line.startswith("    ") and (kept or before == "" or before.startswith("#")):
-            kept.append(line[4:])
-        elif kept:
-            assert line == "", f"{page}: no empty line before {line!r}"
-            yield Block(page, "", "\n".join(kept) + "\n")
-            kept = []
-        else:
-            assert not line.startswith("    "), f"{page}: neither text nor a block: {line!r}"
-        before = line
-    assert language is None, f"{page}: a fence is not closed"
+    for token in MarkdownIt("commonmark").parse(page.read_text()):
+        if token.type == "fence":
+            yield Block(page, token.info, token.content)
+        elif token.type == "code_block":
+            for text in token.content.split("\n\n"):
+                yield Block(page, "", text.strip("\n") + "\n")
 
 
 def is_of_commands(block: Block) -> bool:
@@ -130,10 +115,6 @@ def example() -> str:
     return block.text
 
 
-def wrong_example() -> str:
-    return re.sub(r"hurst = .*", "hurst = [0.8, 1.2]", example())
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the commands run: with the files that they name."""
@@ -183,7 +164,8 @@ def test_commands_run(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.usefixtures("quick_figures")
 @pytest.mark.parametrize("page", LESSONS, ids=lambda page: str(page.relative_to(ROOT)))
 def test_lessons_print_what_their_pages_show(page, tmp_path, monkeypatch):
-    (tmp_path / "wrong.toml").write_text(wrong_example())
+    wrong = re.sub(r"hurst = .*", "hurst = [0.8, 1.2]", example())
+    (tmp_path / "wrong.toml").write_text(wrong)
     monkeypatch.chdir(tmp_path)
     pieces = list(transcripts.pieces(page.read_text()))
     shown = sum(is_transcript(block) for block in BLOCKS if block.page == page)

@@ -9,12 +9,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+
+from tests.support.campaign_support import started, wait_until
 
 ROOT = Path(__file__).parent.parent.parent
 # Distribution names that differ from what is imported, and what other packages need to find.
@@ -175,10 +176,7 @@ def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: P
         except OSError:
             return False
 
-    end = time.monotonic() + 10
-    while is_alive():
-        assert time.monotonic() < end
-        time.sleep(0.05)
+    wait_until(lambda: not is_alive())
 
 
 def test_local_script_asks_for_a_campaign() -> None:
@@ -196,21 +194,9 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Sign
     adhesis.parent.mkdir(parents=True)
     adhesis.write_text("#!/bin/bash\ntrap 'exit 75' USR1\ntouch begun\nsleep 60 & wait\n")
     adhesis.chmod(0o755)
-    before = signal.signal(number, signal.SIG_DFL)  # the tests may run under nohup
-    script = subprocess.Popen(
-        [tmp_path / "jobs" / "local.sh", "study.toml", "1"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    signal.signal(number, before)
+    script = started([tmp_path / "jobs" / "local.sh", "study.toml", "1"], tmp_path)
     try:
-        end = time.monotonic() + 20
-        while not (tmp_path / "begun").exists():
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        wait_until((tmp_path / "begun").exists)
         script.send_signal(number)
         assert script.wait(20) == 75
         assert script.stderr is not None

@@ -40,7 +40,7 @@ from adhesis.solver.checks import Bounds, counted, real, shown, whole
 from adhesis.solver.loading.cycle import check_cycle
 from adhesis.solver.method import MethodReport
 from tests.support.exact_wave import ExactWave
-from tests.support.wrong_values import outside
+from tests.support.wrong_values import WithUnit, outside
 
 PERIOD, AMPLITUDE = 1e-3, 1e-6
 WAVE = single_wave(AMPLITUDE, PERIOD)
@@ -82,12 +82,6 @@ def path(points: Any, **change: Any) -> PathResult:
 def answer(**change: Any) -> Any:
     prepared = change.pop("prepared", None) or prepare_trace(TRACE)
     return loss_of_trace(prepared, **{"half_space": SOLID, "work_of_adhesion": 0.04} | change)
-
-
-class WithUnit(np.ndarray):
-    """An array with a unit, as unyt and astropy have them."""
-
-    units = "MPa"
 
 
 NOT_NUMBERS: list[Any] = [
@@ -257,7 +251,6 @@ def one_path() -> PathResult:
 REFUSED = r"""
 # wrong order, wrong kind
 Problem(SOLID, WAVE, 0.04) -> TypeError: profile is a HalfSpace: it must be a Profile; make one
-Problem(WAVE, 1000000.0, 0.04) -> TypeError: half_space is 1000000.0: it must be a HalfSpace
 Problem(WAVE, SOLID, 0.04, 'load') -> TypeError: control is 'load': it must be a Control
 Problem(WAVE, HalfSpace, 0.04) -> TypeError: half_space is the class HalfSpace: it
 make_method('auto', WAVE) -> TypeError: problem is a Profile: it must be a Problem; make one with
@@ -291,7 +284,6 @@ path([-0.3]) -> ValueError: the path starts with -0.3: it must start with loadin
 path([0.5], out='no') -> TypeError: out is 'no': it must be True or False
 loop(preload=20.0, max_stress=20.0) -> ValueError: preload and max_stress are given
 loop(method=UNDER_LOAD, max_penetration=None, preload=20.0) -> ValueError: a weight or a machine
-loop(max_penetration=None, max_stress=20.0) -> ValueError: a weight or a machine
 loop(preload=20.0, max_penetration=1.0) -> ValueError: max_penetration is 1.0: it must be
 # interfaces
 Problem(WAVE, SOLID, 0.3, measure='projected') ->
@@ -301,16 +293,10 @@ Problem(WAVE, SOLID, 0.04, adhesion_range=1e-09, strength=1000000.0) ->
 Problem(WAVE, SOLID, 0.04, strength=1000.0) -> ValueError: strength is 1000 Pa: it must be at least
 Problem(WAVE, SOLID, 0.04, adhesion_range=0.001) ->
     ValueError: adhesion_range is 0.001 m: it must be at most
-Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=0.001) ->
-    ValueError: 0.001 J/m²: it must be at least the work of adhesion
 Problem(WAVE, SOLID, 0.0, work_of_adhesion_open=0.1) ->
     ValueError: it must be left out, as γ is 0
 Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0, strength=1000000.0) ->
     ValueError: beside a strength of 1e+06 Pa: give
-make_method('grid', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0)) ->
-    ValueError: method is 'grid' beside a work_of_adhesion_open
-make_method('grid', Problem(WAVE, SOLID, 0.004, adhesion_range=1e-9)) ->
-    ValueError: method is 'grid' beside a range or strength
 make_method('auto', Problem(WAVE, SOLID, 0.004, adhesion_range=1e-9), nodes_per_wave=64) ->
     ValueError: nodes_per_wave is 64 beside a range or strength
 make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), nodes_per_wave=32) ->
@@ -325,19 +311,11 @@ Problem(WAVE, SOLID, 0.004, strength=1e7, pattern=stripes(2, 0.1)) ->
 Problem(WAVE, SOLID, 0.0, pattern=stripes(2, 0.1)) ->
     ValueError: is given beside γ = 0: give one of them
 Problem(WAVE, SOLID, 0.004, pattern=0.3) -> TypeError: pattern is 0.3
-# units
-Problem(WAVE.scaled(1000000.0), SOLID, 0.04) ->
-    ValueError: rms slope is 4,443: it must be a positive number from 1e-12 to 100; are heights
-Problem(WAVE.scaled(1, 1e-09), SOLID, 0.04) -> ValueError: rms slope is 4.443e6: it must be
 # profiles
 profile_from_heights([2.0, 2.0, 2.0], 1.0) -> ValueError: the profile is flat (h_max = 0)
 profile_from_heights([1.0, 2.0], 1.0) -> ValueError: heights hold 2 value(s): at least 3
-profile_from_heights(pd.Series([0, None, 2], dtype='Int64'), 1.0) ->
-    ValueError: heights[1] is nan: every height must be a finite number
 profile_from_heights([0.0, 1e+200, 0.0], 1.0) -> ValueError: largest height is 1e+200: it must be
 profile_from_heights([0.0, 1e-200, 0.0], 1.0) -> ValueError: largest coefficient is 3.3
-profile_from_heights(np.array([1, 2j, 3]), 1.0) ->
-    TypeError: heights holds complex numbers: every height
 profile_from_heights([1, 2j, 3], 1.0) -> TypeError: heights[1] is 2j: it must be a real number
 Profile(1.0, np.zeros(3)) -> ValueError: the profile is flat
 Profile(1.0, [0, np.nan]) -> ValueError: coefficients[1] is (nan+0j): every coefficient
@@ -347,14 +325,12 @@ WAVE.at('a') -> TypeError: x is 'a': it must be a real number, or an array of th
 WAVE.at(MASKED) -> ValueError: x holds masked values
 WAVE.heights(2) -> ValueError: 2 nodes are too few
 single_wave(0.0, 1.0) -> ValueError: the profile is flat
-spectral(h_rms=None, c0='1') -> TypeError: c0 is '1': it must be a positive
 spectral(h_rms=None) -> ValueError: give exactly one of h_rms, m2 and c0; given: none
 spectral(ratio=10 ** 5) -> ValueError: n0 · ratio is 200000: it must be at most 100000
 spectral(rolloff=9) -> ValueError: rolloff is 9: it must be at most ratio (4)
 spectral(amplitudes='gauss') ->
     ValueError: amplitudes is 'gauss': it must be one of deterministic, rayleigh
 SOLID.layer_stiffness(0.001) -> ValueError: poisson is 0.5: a layer that is incompressible
-Control('load') -> TypeError: stiffness is 'load': it must be infinite, 0 or
 # results
 one_loop().states('up') -> ValueError: branch is 'up': it must be one of loading, unloading
 one_loop().on_axis('loading', one_loop().energy[:3]) ->
@@ -364,7 +340,6 @@ one_loop().at('loading', 'a', one_loop().energy) ->
 one_loop().to_dataframe('patches') -> ValueError: of is 'patches': it must be
 one_loop().save('loop.h5') -> InputError: the name must end in .nc
 one_loop().save(3) -> TypeError: path is 3
-one_loop().save('none/x.nc') -> InputError: path is none/x.nc: there is no directory none
 one_loop().film('a.avi') -> InputError: path is a.avi: the name must end in .html,
 one_loop().film(3) -> TypeError: path is 3
 one_loop().film(frames=1) -> ValueError: frames is 1: it must be
@@ -388,18 +363,13 @@ WAVE.coefficients.__setitem__(1, 1.0) -> ValueError: assignment destination is r
 adhesis.Campaign(3) -> TypeError: source is a int: it must be a dict
 adhesis.Campaign({'sweeps': {}}) -> InputError: campaign: 'sweeps' is unknown; the tables are
 adhesis.load(3) -> TypeError: path is 3: it must be a path
-adhesis.load('no.nc') -> InputError: path is no.nc: there is no such file
 # traces
 prepare_trace('file.csv') ->
     TypeError: trace is 'file.csv': it must be a Trace; make one with read_trace(source)
-prepare_trace(TRACE, degree=-1) -> InputError: degree is -1: it must be a whole number from 0 to 6
 prepare_trace(TRACE, degree='1') -> TypeError: degree is '1': it must be a whole number
 prepare_trace(TRACE, cut_off=-1e-06) -> InputError: cut_off is -1e-06: it must be a positive
-prepare_trace(TRACE, cut_off=1.0) -> InputError: cut_off is 1 m: it must lie between 2.2 steps
 prepare_trace(TRACE, tip_radius=np.nan) -> InputError: tip_radius is nan: it must be
 prepare_trace(TRACE, longest_gap=-1) -> InputError: longest_gap is -1: it must be a number from 0
-prepare_trace(TRACE, exclude=[(0.002, 0.001)]) ->
-    InputError: exclude holds the range from 2 mm to 1 mm: a range must begin at 0
 prepare_trace(TRACE, exclude=[(np.nan, 0.001)]) -> InputError: a range must begin at 0 or later
 prepare_trace(TRACE, exclude=[(0.005, 0.006)]) ->
     InputError: in which there is no height: t.csv reaches from 0 to 1.995 mm
@@ -407,7 +377,6 @@ prepare_trace(TRACE, exclude=[(0.0, 0.00195)]) ->
     InputError: exclude leaves 9 heights of t.csv: at least 32 must be left
 prepare_trace(TRACE, exclude=[(0.0002, 0.0008)]) -> InputError: % of its heights, with what exclude
 prepare_trace(TRACE, exclude='1mm:2mm') -> TypeError: it must hold pairs of positions in m, as in
-prepare_trace(TRACE, exclude=[('1mm', '2mm')]) -> TypeError: it must hold pairs of positions in m
 prepare_trace(TRACE, exclude=[(1.0,)]) -> TypeError: it must hold pairs of positions in m, as in
 prepare_trace(TRACE, invert='yes') -> TypeError: invert is 'yes': it must be True or False
 prepare_trace(TRACE, keep_outliers=1) -> TypeError: keep_outliers is 1: it must be True or
@@ -415,8 +384,6 @@ replace(TRACE, heights=np.full(400, np.nan)) -> InputError: t.csv holds 0 height
 Trace(['a'] * 99, 1e-06) -> InputError: array holds <U1 of 1 dimensions
 replace(TRACE, step='5um') -> TypeError: step is '5um': it must be a pos
 read_trace(3) -> TypeError: source is 3: it must be a path
-read_trace('no such file') -> InputError: cannot read no such file: there is no such file
-read_trace('/') -> InputError: / is a directory
 read_trace(__file__, step=-1) -> InputError: step is -1: it must be a positive number
 read_trace(__file__, columns=['a', 1]) -> TypeError: columns is 'a': it must be a whole number
 read_trace(__file__, row=-1) -> InputError: row is -1: it must be
@@ -428,18 +395,13 @@ answer(work_of_adhesion='0.04') ->
     TypeError: work_of_adhesion is '0.04': it must be a row of numbers
 answer(work_of_adhesion=[]) -> ValueError: work_of_adhesion is empty: it must hold one number
 answer(max_penetration=[0.5, 1.0]) -> ValueError: max_penetration is 1.0: it must be
-answer(method='magic') -> ValueError: method is 'magic': it must be one of
 answer(processes=-1) -> ValueError: processes is -1: it must be a whole number from 0 to 4096
-answer(control=Control(0), max_penetration=0.5) ->
-    ValueError: a path under a load turns at max_stress: give that, and no max_penetration
 answer(max_stress=500.0) -> ValueError: max_stress is given, but a path under a separation
-answer(max_stress=500.0, preload=500.0) -> ValueError: preload and max_stress are given
 answer(quick=1) -> TypeError: quick is 1: it must be True or False
 answer(watch=1) -> TypeError: watch is 1: it must be a function, or None
 # files
 adhesis.open(3) -> TypeError: path is 3: it must be a path
 adhesis.open('a.h5', beside='b.h5') -> TypeError: beside is 'b.h5': it must be a list of paths
-adhesis.open('no such file.h5') -> InputError: no such file.h5
 path([0.5, -50.0, 0.6]) -> PathError: contact is lost on the way to -50
 """
 CASES = [

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
+from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
 from adhesis.solver._kernels import (
     Descent,
     DescentEvent,
@@ -18,6 +18,7 @@ from adhesis.solver._kernels import (
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.dense import DenseSolution, dense_tangent, solve_densely
+from tests.support.scenes import loops_at
 
 SOLID = HalfSpace(1e6, 0.5)
 
@@ -151,16 +152,6 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
 
 
-def test_the_field_of_an_equilibrium_has_no_derivatives_at_fixed_edges(wave):
-    """Newton's iteration knows the potential, and asks for none of them: that was a crash."""
-    prescribed = 0.5 * 2 * np.pi * 1e-3
-    gaps = run(wave, NARROW, 0.5, 1000).gaps
-    point = wave.edges.equilibrium(gaps, prescribed, 0.05 * wave.edges.wave)
-    assert point is not None
-    with pytest.raises(ValueError, match="known potential"):
-        point.field.solution.by_prescribed()
-
-
 def test_a_step_after_which_a_gap_needs_more_nodes_is_judged():
     """Without that it passed a minimum 0.04 λ_min beyond a fold: one jump less, loss 3e-3 off."""
     profile = self_affine_profile(
@@ -168,16 +159,10 @@ def test_a_step_after_which_a_gap_needs_more_nodes_is_judged():
         amplitudes="deterministic",
     )  # fmt: skip
     problem = Problem(profile, SOLID, 56.953749479986186, strength=7.224849617527944e7)
-    loops = [
-        run_loop(
-            SharpMethod(problem, accuracy=accuracy),
-            max_penetration=0.8079232131592422,
-            load_steps=18,
-        )
-        for accuracy in (1e-3, 1e-4)
-    ]
-    assert [jump.kind for jump in loops[0].jumps] == [jump.kind for jump in loops[1].jumps]
-    assert abs(loops[0].loss - loops[1].loss) < loops[0].loss_error + loops[1].loss_error
+    path = {"max_penetration": 0.8079232131592422, "load_steps": 18}
+    coarse, fine = loops_at(problem, 1e-3, 1e-4, **path)
+    assert [jump.kind for jump in coarse.jumps] == [jump.kind for jump in fine.jumps]
+    assert abs(coarse.loss - fine.loss) < coarse.loss_error + fine.loss_error
 
 
 def test_a_patch_vanishes_where_the_surfaces_are_far_apart(wave):

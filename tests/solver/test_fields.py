@@ -38,7 +38,7 @@ def shares_of(method: Method, state: ContactState) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("name", "options", "accuracy"),
-    [("sharp", {"accuracy": 1e-5}, 5e-4), ("grid", {"nodes_per_wave": 2048}, 0.03)],
+    [("sharp", {"accuracy": 1e-5}, 5e-4), ("grid", {"nodes_per_wave": 1024}, 0.03)],
 )
 @pytest.mark.parametrize("alpha", [0.1, 0.4])
 def test_density_of_the_gap_is_that_of_johnsons_wave(name, options, accuracy, alpha):
@@ -90,7 +90,7 @@ def test_openings_of_both_methods_are_one():
     profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=8, seed=3, h_rms=1e-6)
     problem = Problem(profile, SOFT, 0.02)
     found = []
-    for name, options in (("sharp", {"accuracy": 1e-4}), ("grid", {"nodes_per_wave": 128})):
+    for name, options in (("sharp", {"accuracy": 1e-4}), ("grid", {"nodes_per_wave": 64})):
         method = make_method(name, problem, **options)
         state = loaded(method, 0.5)
         openings = method.openings(state)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from adhesis import Control, run_loop
-from adhesis.solver.sharp.method import SharpMethod
+from adhesis import Control
+from tests.support.scenes import loops_at
 from tools.hostile import draw, judge
 
 
@@ -42,12 +42,8 @@ def test_the_error_covers_a_loop_whose_loss_one_fold_makes(seed, number, max_str
     if max_stress:
         problem = replace(problem, control=Control(stiffness=0))
         turning_point = {"max_stress": max_stress}
-    loop, reference = (
-        run_loop(
-            SharpMethod(problem, accuracy=accuracy), **turning_point, load_steps=scene.load_steps
-        )
-        for accuracy in (scene.accuracy, 1e-2 * scene.accuracy)
-    )
+    path = {"load_steps": scene.load_steps, **turning_point}
+    loop, reference = loops_at(problem, scene.accuracy, 1e-2 * scene.accuracy, **path)
     assert abs(loop.loss - reference.loss_from_drops) < loop.loss_error
     assert loop.loss_error < scene.accuracy * loop.loss
 
@@ -55,13 +51,6 @@ def test_the_error_covers_a_loop_whose_loss_one_fold_makes(seed, number, max_str
 def test_an_edge_that_leaps_to_and_fro_over_a_minimum_comes_to_rest():
     """A lone edge, whose minimum the energy's trapezium misses."""
     scene = draw(308, 90)
-    problem = scene.problem()
-    loops = [
-        run_loop(
-            SharpMethod(problem, accuracy=accuracy),
-            max_penetration=scene.max_penetration,
-            load_steps=scene.load_steps,
-        )
-        for accuracy in (scene.accuracy, 0.1 * scene.accuracy)
-    ]
-    assert abs(loops[0].loss - loops[1].loss) < loops[0].loss_error
+    path = {"max_penetration": scene.max_penetration, "load_steps": scene.load_steps}
+    loop, finer = loops_at(scene.problem(), scene.accuracy, 0.1 * scene.accuracy, **path)
+    assert abs(loop.loss - finer.loss) < loop.loss_error

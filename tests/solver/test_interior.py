@@ -51,14 +51,10 @@ def loop_of(young: float, ratio: int = 8, seed: int = 0, gamma: float = 0.04) ->
     return run_loop(method_of(rough(ratio, seed), young, gamma), max_penetration=0.9, load_steps=20)
 
 
-def two_troughs() -> Profile:
-    """Two waves in a period, one trough deeper than the other."""
-    return Profile(PERIOD, np.array([0.0, 0.15 * np.exp(0.5j), 0.5]) * 1e-6)
-
-
 def nearly_full_contact():
-    """A state with the shallower trough closed and the deeper one nearly so."""
-    method = method_of(two_troughs(), 1e6, 0.05)
+    """A state of two waves with the shallower trough closed and the deeper one nearly so."""
+    waves = Profile(PERIOD, np.array([0.0, 0.15 * np.exp(0.5j), 0.5]) * 1e-6)
+    method = method_of(waves, 1e6, 0.05)
     state = method.detached(method.problem.profile.h_max)
     for penetration in (0.0, 0.5, 0.9, 0.97):
         state = method.follow(state, method.problem.separation(penetration)).states[-1]
@@ -126,7 +122,7 @@ def test_no_state_that_is_left_out_has_more_tension(young, seed):
 
 def test_grid_and_sharp_agree():
     sharp = loop_of(1e8, 4, 1)
-    method = method_of(rough(4, 1), 1e8, name="grid")
+    method = make_method("grid", sharp.problem, nodes_per_wave=64)
     grid = run_loop(method, max_penetration=0.9, load_steps=20)
     assert grid.valid_range == pytest.approx(sharp.valid_range, rel=0.03)
     assert sharp.interior is not None

@@ -6,19 +6,28 @@ import pytest
 from adhesis import Control, HalfSpace, Problem, make_method, run_path, self_affine_profile
 from adhesis.solver.loading.ledger import Ledger
 from adhesis.solver.model.jump import Jump
+from tests.support.scenes import UNEVEN
 
 SOLID = HalfSpace(1e6, 0.5)
 ROUGH = self_affine_profile(0.8, period=2e-3, n0=2, ratio=6, seed=3, h_rms=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "opened"), [(np.inf, None), (np.inf, 0.004), (1e9, None), (0.0, None)]
-)
-def test_every_interval_of_a_path_balances(stiffness, opened):
+INTERFACES = {
+    "separation": {},
+    "stiffness": {"control": Control(1e9)},
+    "stiff and uneven": {"control": Control(1e10), "pattern": UNEVEN},
+    "load": {"control": Control(0.0)},
+    "two works": {"work_of_adhesion_open": 0.004},
+    "uneven": {"pattern": UNEVEN},
+}
+
+
+@pytest.mark.parametrize("name", INTERFACES)
+def test_every_interval_of_a_path_balances(name):
     """Work is rise and loss: to the error of the loss in jumps and between them."""
-    control = Control(stiffness)
-    problem = Problem(ROUGH, SOLID, 0.002, control, work_of_adhesion_open=opened)
-    points = [800.0, 0.0, 400.0] if control.is_load else [0.7, 0.2, 0.5]
+    problem = Problem(ROUGH, SOLID, 0.002, **INTERFACES[name])
+    is_load = problem.control.is_load
+    points = [800.0, 0.0, 400.0] if is_load else [0.7, 0.2, 0.5]
     path = run_path(make_method("sharp", problem), points, load_steps=10)
     ledger = path.ledger
     rest = ledger.works - np.diff(ledger.stored) - ledger.losses
@@ -27,9 +36,16 @@ def test_every_interval_of_a_path_balances(stiffness, opened):
     assert path.loss_from_drops == ledger.loss
     drops = sum(jump.energy_drop for jump in path.jumps)
     assert ledger.losses[path.states_before_jumps()].sum() == pytest.approx(drops, rel=1e-12)
-    assert (path.friction > 0) == (opened is not None)
-    for minor in path.minor_loops:
-        assert minor.audit_residual == pytest.approx(0, abs=path.loss_error)
+    assert (path.friction > 0) == (name == "two works")
+    assert len(path.jumps) > 5
+    lost = path.jumps[-1:] if is_load else ()  # under a load it is U, of either sign
+    assert min(jump.energy_drop for jump in path.jumps if jump not in lost) >= 0
+    assert abs(path.audit_residual) < 1e-4
+    (minor,) = path.minor_loops
+    assert (minor.start, minor.turn, minor.branch) == (*points[1:], "loading")
+    assert minor.audit_residual == pytest.approx(0, abs=path.loss_error)
+    assert minor.loss >= -1e-6 * path.work
+    assert set(path.leg) == {0, 1, 2, 3}
 
 
 def test_a_ledger_states_work_jump_and_friction_of_each_interval():

@@ -16,13 +16,10 @@ from tests.support.scenes import HALF_SPACE
 PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11
 
 
-def flat_wave(alpha: float) -> SingleWave:
-    return SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, HALF_SPACE.modulus)
-
-
 def exact(alpha: float, **options) -> ExactWave:
-    gamma = flat_wave(alpha).work_of_adhesion
-    return ExactWave(Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, gamma), **options)
+    wave = SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, HALF_SPACE.modulus)
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave.work_of_adhesion)
+    return ExactWave(problem, **options)
 
 
 def test_audit_residual_falls_with_the_square_of_the_state_spacing():

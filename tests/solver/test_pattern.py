@@ -8,7 +8,6 @@ from scipy.optimize import brentq, minimize_scalar
 import adhesis
 from adhesis import (
     AdhesionPattern,
-    Control,
     HalfSpace,
     LoopResult,
     Problem,
@@ -22,11 +21,11 @@ from adhesis import (
 )
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.scenes import UNEVEN
 
 A, PERIOD, GAMMA, SOLID = 1e-6, 1e-4, 0.004, HalfSpace(1e6, 0.5)
 Q0 = 2 * np.pi / PERIOD
 ROUGH = self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, seed=3, h_rms=1e-6)
-UNEVEN = AdhesionPattern([0, 0.1 - 0.1j, 0, 0.05j, 0, 0, 0, 0.08])
 
 
 class StripedWave:
@@ -113,15 +112,6 @@ def test_many_stripes_pin_edges_as_two_works_of_adhesion_do(amplitude):
     assert 0.4 * off[0] < off[1] < 0
 
 
-@pytest.mark.parametrize("control", [Control(), Control(1e10)])
-def test_a_rough_loop_with_a_pattern_closes_its_audit(control):
-    problem = Problem(ROUGH, SOLID, 2e-3, control, pattern=UNEVEN)
-    loop = loop_of(problem, 1e-4, max_penetration=0.7)
-    assert loop.patches.max() > 2
-    assert abs(loop.audit_residual) < 1e-4
-    assert loop.loss == pytest.approx(loop.loss_from_drops, rel=1e-4)
-
-
 def test_a_step_over_a_stripe_with_equal_slopes_at_both_ends_is_not_too_long():
     """One step of this loop had them, and erred by 1.2e-4 of the loss at any accuracy."""
     heights = [0, -64.234 - 25.452j, 13.999 - 1.061j, -1.9 - 6.824j, -8.912 - 2.201j]
@@ -147,7 +137,7 @@ def test_two_works_and_a_pattern_share_their_variation_and_are_kept_in_a_file(tm
 
 def test_both_methods_agree_on_a_pattern():
     sharp = loop_of(Problem(ROUGH, SOLID, 2e-3, pattern=UNEVEN), max_penetration=0.7, load_steps=10)
-    method = make_method("grid", sharp.problem, nodes_per_wave=128)
+    method = make_method("grid", sharp.problem, nodes_per_wave=64)
     grid = run_loop(method, max_penetration=0.7, load_steps=10)
     even = loop_of(Problem(ROUGH, SOLID, 2e-3), max_penetration=0.7, load_steps=10)
     assert abs(grid.loss - sharp.loss) < grid.loss_error + sharp.loss_error

@@ -46,7 +46,7 @@ def of_wave(control: Control = FIXED) -> Problem:
 def method_of(name: str, problem: Problem) -> Method:
     if name == "exact":
         return ExactWave(problem)
-    return make_method(name, problem, nodes_per_wave=256 if name == "grid" else None)
+    return make_method(name, problem, nodes_per_wave=128 if name == "grid" else None)
 
 
 def stress_range() -> tuple[float, float]:

@@ -11,7 +11,6 @@ from adhesis.solver._kernels import (
     set_up_response,
     solve_field,
 )
-from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.edge_problem import FIXED_SEPARATION
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -19,6 +18,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support import next_to_a_fold
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
+from tests.support.scenes import loops_at
 
 
 @pytest.fixture(scope="module")
@@ -164,25 +164,6 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     assert np.abs(back.field.opening - anew.field.opening).max() < 1e-5 * scale
 
 
-def test_gaps_that_come_to_need_more_nodes_take_them_in_the_response_that_is_known(many_gaps):
-    """A patch narrows to a third, and widens again: with more nodes, to the same state."""
-    edges, point = many_gaps
-    gaps, d = point.gaps, point.d
-    edges.forget()
-    anew = edges.equilibrium(gaps, d, edges.wave)
-    known = edges.response_at(gaps, d)
-    orders, narrowed = known.orders, gaps.copy()
-    left, right = gaps[2, 1], gaps[3, 0]
-    middle = 0.5 * (left + right)
-    narrowed[2, 1], narrowed[3, 0] = np.array([left, right]) + 0.7 * (middle - [left, right])
-    assert edges.response_at(narrowed, d) is known
-    assert np.flatnonzero(known.orders > orders).tolist() == [3]
-    back = edges.equilibrium(gaps, d, edges.wave)
-    assert edges.response_at(back.gaps, d) is known
-    assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.field_error
-    assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
-
-
 def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):
     """A patch less, and one more: with the same result as without any response."""
     edges, point = many_gaps
@@ -207,14 +188,8 @@ def test_no_step_leads_to_another_branch():
     )
     half_space = HalfSpace(young=1e6, poisson=0.5)
     gamma = 0.5935246633443851 * half_space.modulus * 1e-12 * profile.q0 * 14
-    coarse, fine = (
-        run_loop(
-            SharpMethod(Problem(profile, half_space, gamma), accuracy=accuracy),
-            max_penetration=0.6572167384925119,
-            load_steps=28,
-        )
-        for accuracy in (1e-3, 3e-4)
-    )
+    path = {"max_penetration": 0.6572167384925119, "load_steps": 28}
+    coarse, fine = loops_at(Problem(profile, half_space, gamma), 1e-3, 3e-4, **path)
     assert abs(coarse.loss - fine.loss) < coarse.loss_error
     assert abs(coarse.audit_residual) < 1e-4
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from adhesis import (
-    AdhesionPattern,
     Control,
     HalfSpace,
     Problem,
@@ -18,6 +17,7 @@ from adhesis.solver.model.problem import Measure
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import MethodName
 from tests.support.grids import grid_of
+from tests.support.scenes import UNEVEN
 
 SOFT = HalfSpace(1e6, 0.5)
 SHIFT = np.exp(1e-7j)
@@ -27,11 +27,11 @@ def rough(n0: int, ratio: int, seed: int) -> Profile:
     return self_affine_profile(0.8, period=2e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
 
 
-UNEVEN = AdhesionPattern([0, 0.1 - 0.1j, 0, 0.05j, 0, 0, 0, 0.08])
 DEEP = {"max_penetration": 0.7}
 # Problem, turning point, and how near the losses are: by the accuracy with which jumps are found.
 SCENES: dict[str, tuple[Problem, dict[str, float], float]] = {
     "stiff": (Problem(rough(2, 8, 0), HalfSpace(1e8, 0.5), 0.04), DEEP, 1e-3),
+    "range": (Problem(rough(3, 5, 1), HalfSpace(1e8, 0.5), 0.04, strength=2e6), DEEP, 1e-4),
     "opens": (Problem(rough(2, 8, 0), HalfSpace(1e9, 0.5), 0.04, strength=4e6), DEEP, 1e-3),
     "separation": (Problem(rough(3, 8, 4), SOFT, 0.01), DEEP, 1e-5),
     "stiffness": (Problem(rough(3, 8, 4), SOFT, 0.01, Control(1e10)), DEEP, 1e-5),
@@ -141,7 +141,7 @@ def test_grid_takes_mirror_images_one_after_the_other_too():
     problem = Problem(profile, SOFT, 2e-4)
     sharp, grid = (
         run_loop(method, max_penetration=0.5, load_steps=10)
-        for method in (make_method("sharp", problem), grid_of(problem, nodes=1024))
+        for method in (make_method("sharp", problem), grid_of(problem, nodes=512))
     )
     for loop in (sharp, grid):
         assert loop.jumps[0].patches_after == 1

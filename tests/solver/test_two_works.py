@@ -1,14 +1,12 @@
 """Two works of adhesion: an edge advances at γ, recedes at γ_open, and is pinned between both."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from adhesis import PathError
 from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import run_path
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -19,6 +17,7 @@ from adhesis.solver.registry import make_method
 from adhesis.solver.sharp.continuation.branch import StableBranch
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.errors import NoState
+from tests.support.scenes import loops_at
 from tools.hostile import draw
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
@@ -48,14 +47,6 @@ def closed_form(ratio: float, depth: float) -> tuple[float, float]:
     gained = closes.energy(closes.half_width(A))
     lost = opens.energy(opens.fold_half_width)
     return float((lost - gained + friction) / PERIOD), float(friction / PERIOD)
-
-
-@cache
-def rough_loop() -> LoopResult:
-    problem = Problem(Profile(PERIOD, ROUGH), SOLID, 1e-3, work_of_adhesion_open=2e-3)
-    return run_loop(
-        make_method("sharp", problem, accuracy=1e-4), max_penetration=0.6, load_steps=20
-    )
 
 
 @pytest.mark.parametrize("depth", [0.3, 0.6])
@@ -109,10 +100,8 @@ def test_a_fold_of_receding_edges_is_not_passed():
     problem = Problem(
         Profile(PERIOD, heights), SOLID, 0.003851, work_of_adhesion_open=0.005139147130894255
     )
-    coarse, fine, finest = (
-        run_loop(make_method("sharp", problem, accuracy=a), max_penetration=0.8668, load_steps=20)
-        for a in (1e-3, 1e-4, 1e-5)
-    )
+    path = {"max_penetration": 0.8668, "load_steps": 20}
+    coarse, fine, finest = loops_at(problem, 1e-3, 1e-4, 1e-5, **path)
     assert abs(coarse.loss - finest.loss) < coarse.loss_error + finest.loss_error
     assert abs(fine.loss - finest.loss) < fine.loss_error + finest.loss_error
 
@@ -129,7 +118,8 @@ def test_a_loop_of_many_patches_closes_its_audit():
 
 
 def test_friction_only_grows():
-    loop = rough_loop()
+    problem = Problem(Profile(PERIOD, ROUGH), SOLID, 1e-3, work_of_adhesion_open=2e-3)
+    (loop,) = loops_at(problem, 1e-4, max_penetration=0.6, load_steps=20)
     assert np.all(np.diff(loop.edge_friction) >= 0)
     assert loop.to_dataframe().attrs["units"]["edge_friction"] == "J/m"
     data = loop.to_xarray()
@@ -188,10 +178,7 @@ def test_edges_that_begin_to_move_together_do_not_hold_each_other_back(monkeypat
     monkeypatch.setattr(StableBranch, "advance", counted)
     scene = draw(9001, 0, "open")
     problem = scene.problem()
-    coarse, fine = (
-        run_loop(make_method("sharp", problem, accuracy=accuracy), **scene.turn(problem))
-        for accuracy in (1e-4, 1e-6)
-    )
+    coarse, fine = loops_at(problem, 1e-4, 1e-6, **scene.turn(problem))
     assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error
 
 
@@ -199,14 +186,8 @@ def test_edges_that_move_by_less_than_newtons_tolerance_are_followed():
     """One that receded so little had the opening of one that advances, and the path was refused."""
     scene = draw(5202, 90, "open")
     problem = scene.problem()
-    coarse, fine = (
-        run_loop(
-            make_method("sharp", problem, accuracy=accuracy),
-            load_steps=scene.load_steps,
-            **scene.turn(problem),
-        )
-        for accuracy in (scene.accuracy, 1e-5)
-    )
+    path = {"load_steps": scene.load_steps, **scene.turn(problem)}
+    coarse, fine = loops_at(problem, scene.accuracy, 1e-5, **path)
     assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error + fine.loss_error
 
 
@@ -214,14 +195,8 @@ def test_an_edge_that_turns_back_within_a_step_is_pinned_where_it_was_furthest()
     """A jump of unloading came 9e-5 h_max early: the loss was 5.9e-5 off, 3.4e-5 was stated."""
     scene = draw(5202, 32, "open")
     problem = scene.problem()
-    coarse, fine = (
-        run_loop(
-            make_method("sharp", problem, accuracy=accuracy),
-            load_steps=scene.load_steps,
-            **scene.turn(problem),
-        )
-        for accuracy in (1e-4, 1e-6)
-    )
+    path = {"load_steps": scene.load_steps, **scene.turn(problem)}
+    coarse, fine = loops_at(problem, 1e-4, 1e-6, **path)
     assert coarse.loss == pytest.approx(fine.loss, rel=1e-5)
     assert coarse.loss_from_drops == pytest.approx(fine.loss_from_drops, rel=1e-5)
     assert coarse.loss_error < 2e-5 * coarse.loss

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -147,14 +147,14 @@ def start(
     *words: object, ranks: int = 0, fake: str | None = None, cwd: Path | None = None
 ) -> subprocess.Popen[str]:
     """Start a command in a process group of its own."""
+    return started(command(words, ranks, fake), cwd)
+
+
+def started(line: Sequence[str | Path], cwd: Path | None = None) -> subprocess.Popen[str]:
+    """Start a command line in a process group of its own."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(
-        command(words, ranks, fake),
-        env=environment(),
-        cwd=cwd,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        line, env=environment(), cwd=cwd, **pipes, text=True, start_new_session=True
     )
 
 

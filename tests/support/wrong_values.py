@@ -1,9 +1,17 @@
-"""Numbers that break a rule, made from its bounds."""
+"""Numbers that break a rule, made from its bounds; an array that is more than numbers."""
 
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from adhesis.solver.checks import Bounds
+
+
+class WithUnit(np.ndarray):
+    """An array with a unit, as unyt and astropy have them."""
+
+    units = "um"
 
 
 def outside(bounds: Bounds) -> Iterator[float]:
