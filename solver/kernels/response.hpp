@@ -71,6 +71,9 @@ struct LinearResponse {
   int gap_count() const { return nodes.gap_count(); }
 
   // Compute the response of gap k about its reference, between given edges.
+  //
+  // A moving edge leaves a singular opening. The edge's own term follows from the translation of
+  // the whole gap through its own loads and the potential of the others.
   void linearise(int k, const EdgeLaw& law);
 
   // Linearise gap k about its potential in the last solution.

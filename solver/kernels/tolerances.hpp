@@ -176,4 +176,11 @@ inline constexpr double CUBIC_OF_OTHERS_TRUSTED = 1.5;
 // of 25 to 120 patches took 4 % more fields.
 inline constexpr double LEADING_SHARE = 0.2;
 
+// Share of the distance to a fold that is left to the next step.
+inline constexpr double LEFT_BEFORE_FOLD = 0.1;
+
+// Of the resolution of a jump: so far beyond a fold there is surely no equilibrium, and so much
+// before it is left at least to the next step.
+inline constexpr double BEYOND_FOLD = 0.2;
+
 }  // namespace adhesis

@@ -96,11 +96,6 @@ come in either order. Of 400 loops with 20 to 80 patches two were wrong, by 0.09
 order was not that at a finer accuracy: they were 0.5 and 4.5 times that apart. Where all folds
 less than a resolution apart counted, half of the loops with 20 to 80 patches had races, instead of
 a tenth."""
-LEFT_BEFORE_FOLD = 0.1
-"""Share of the distance to a fold that is left to the next step."""
-BEYOND_FOLD = 0.2
-"""Of the resolution of a jump: so far beyond a fold there is surely no equilibrium, and so much
-before it is left at least to the next step."""
 TRAPEZOID_FAR = 4.0
 """Of the allowed error of the trapezoidal rule: a step with more is halved."""
 QUIET_STRESS = 0.05

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver._kernels import COMPARABLE, STEP_GROWTH, STEP_REDUCTION, shortest_length
+from adhesis.solver._kernels import (
+    COMPARABLE,
+    STEP_GROWTH,
+    STEP_REDUCTION,
+    Predictor,
+    shortest_length,
+)
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.gap.ends import signs_of, without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.output.contact_states import States
@@ -167,7 +172,7 @@ class StableBranch:
         self.trail = [point]
         self.finest, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
-        self._predictor = Predictor(point)
+        self._predictor = beyond(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
         self._work_of_fields = 0.0  # largest difference that a shorter step did not reduce
         self._free_step, self._begins_to_move = 0.0, False  # with two works of adhesion
@@ -198,10 +203,9 @@ class StableBranch:
     def fold_ahead(self) -> tuple[float, float]:
         """Return d of the fold that is predicted, or infinity, and of a place beyond it."""
         predictor = self._predictor
-        way = self._target.d - predictor.point.d
-        distances = predictor.fold_distance, predictor.across(self._resolution.jump)
-        fold, beyond = (predictor.point.d + math.copysign(x, way) for x in distances)
-        return fold, beyond
+        way, distance = self._target.d - predictor.d, predictor.fold.distance
+        across = predictor.across(distance, self._resolution.jump)
+        return predictor.d + math.copysign(distance, way), predictor.d + math.copysign(across, way)
 
     def refine(self, finest: float) -> None:
         """Locate the fold ahead to ``finest``."""
@@ -210,7 +214,7 @@ class StableBranch:
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.append(point)
-        self.point, self._predictor = point, Predictor(point)
+        self.point, self._predictor = point, beyond(point)
 
     def _next_step(self) -> float:
         """Return the next step in d: the leading edge is not to move far, nor the target be passed.
@@ -222,7 +226,7 @@ class StableBranch:
         predictor = self._predictor
         motion = PREDICTED_MOTION if predictor.way else LONGEST_STEP * STEP_REDUCTION
         size = min(self._longest, predictor.reach(motion * self._edges.wave, self.finest))
-        if not predictor.fold_distance < self.finest:
+        if not predictor.fold.distance < self.finest:
             size = max(size, self.finest)
         left = self._target.d - self.point.d
         step = left if size >= abs(left) else math.copysign(size, left)
@@ -274,7 +278,7 @@ class StableBranch:
         if point.d != self._target.d:
             # what lies before a kink predicts nothing beyond it
             kink = self._begins_to_move
-            self._predictor = Predictor(point.with_previous(None) if kink else point)
+            self._predictor = beyond(point.with_previous(None) if kink else point)
             self._look_for_two_folds()
             self._longest = STEP_GROWTH * abs(self._free_step if kink else step)
         return Accepted(point, is_output, remaining)
@@ -289,14 +293,14 @@ class StableBranch:
         other = predictor.other_fold()
         if math.isinf(other.distance):
             return
-        now = other.distance - predictor.fold_distance
+        now = other.distance - predictor.fold.distance
         apart, self._folds_apart = min(now, self._folds_apart), now
         self._two_folds = None
         if apart < resolution:
-            way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
-            rate, edges = predictor.point.rate, (predictor.leading.edge, other.edge)
+            way = math.copysign(predictor.across(other.distance, resolution), predictor.way)
+            rate, edges = predictor.rate, (predictor.fold.edge, other.edge)
             ahead = tuple((edge, float(np.sign(rate[edge] * way))) for edge in edges)
-            self._two_folds = TwoFolds(ahead, predictor.point.d + way, apart)
+            self._two_folds = TwoFolds(ahead, predictor.d + way, apart)
 
     def _trapezoid_error(self, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed.
@@ -346,8 +350,13 @@ def correct(edges: EdgeMechanics, predictor: Predictor, d: float) -> Point | Non
 
     None, too, where an edge is predicted to move far: what is found there may be another branch.
     """
-    gaps = predictor.gaps(d)
+    gaps = predictor.predict_gaps(d)
     # not written as > : a prediction that is no number is none
-    if not np.abs(gaps - predictor.point.gaps).max() <= COMPARABLE * edges.wave:
+    if not np.abs(gaps - predictor.gaps).max() <= COMPARABLE * edges.wave:
         return None
-    return edges.equilibrium(gaps, d, edges.longest_step, memory=predictor.point.gaps)
+    return edges.equilibrium(gaps, d, edges.longest_step, memory=predictor.gaps)
+
+
+def beyond(point: Point) -> Predictor:
+    """Return the predictor of the branch beyond a point."""
+    return Predictor(point.d, point.gaps, point.rate, point.previous)
