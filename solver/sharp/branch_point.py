@@ -83,23 +83,6 @@ class Point:
         """Return this point with the one before it."""
         return with_values(self, previous=previous)
 
-    def fold_displacement(self, change: Array, by_prescribed: Array) -> float:
-        """Estimate how far in d the next fold moves when the openings C change.
-
-        At a fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
-        vector. Scaled by sqrt(C_e/C_f) it is symmetric, so its left null vector is
-        ψ_e = C_e dn_e/dd. In first order the fold is moved to where ψ·(δC + δd ∂C/∂d) = 0.
-
-        Parameters
-        ----------
-        change, by_prescribed : array, shape (2L,)
-            δC, and ∂C/∂d at fixed edges.
-        """
-        left = self.field.opening.ravel() * self.rate
-        if not left.any():
-            return 0.0  # all edges are pinned
-        return -float(left @ change / (left @ by_prescribed))
-
     def extrapolate(self, d: float) -> Array:
         """Extrapolate the gaps to ``d``, along the tangent."""
         return move_edges(self.gaps, self.rate * (d - self.d))

@@ -33,7 +33,7 @@ from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
 from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
-from adhesis.solver.sharp.continuation.jump import History
+from adhesis.solver.sharp.continuation.jump import Event, History
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -61,7 +61,7 @@ from adhesis.solver.sharp.tolerances import (
 
 @dataclass(frozen=True)
 class SharpReport(MethodReport):
-    """Relative accuracy of loss and field, resolution of jumps, and ``edge_problem.Counters``.
+    """Relative accuracy of loss and field, resolution of jumps, and ``mechanics.Counters``.
 
     A jump is located to that part of h_max, under a load to that σ~.
     """
@@ -250,9 +250,10 @@ class SharpMethod(Method):
                 history.states.append(self.detached(apart))
                 return history
             d = first
-            before, gaps = self.states.detached(touch), np.empty((0, 2))
-            jump = self.jumps.compute(before, gaps, d, target.branch, highest)
-            point = history.commit(jump)
+            gaps = np.empty((0, 2))
+            start = self.nucleation.insert_seeds(gaps, highest)
+            event = Event(self.states.detached(touch), d, gaps, start)
+            point = history.commit(self.jumps.compute(event, target.branch))
         else:
             gaps = state.internal.gaps
             if point is None:
@@ -262,7 +263,8 @@ class SharpMethod(Method):
             if point is None:
                 field = self.edges.field(gaps, d)
                 before = self.states.of_point(Point(d, field, np.zeros(gaps.size), math.nan))
-                point = history.commit(self.jumps.compute(before, gaps, d, target.branch))
+                event = Event(before, d, gaps, gaps)
+                point = history.commit(self.jumps.compute(event, target.branch))
             elif d == target.d:
                 history.states.append(state)
         while point is not None and d != target.d:

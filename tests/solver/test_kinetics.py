@@ -7,8 +7,8 @@ import pytest
 
 from adhesis import Control, HalfSpace, Problem, Profile, run_loop, run_loops, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
+from adhesis.solver.sharp.continuation.descent import leaving_step
 from adhesis.solver.sharp.continuation.jump import Jumps
-from adhesis.solver.sharp.mechanics import leaving_step
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.grids import grid_of
 
@@ -77,8 +77,10 @@ def test_finer_steps_that_end_with_more_energy_are_a_race():
     """The scene above: finer steps end where equal speeds lead, and equal speeds do not."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, seed=1, h_rms=1e-6)
     method = SharpMethod(Problem(profile, SOLID, 0.04), accuracy=1e-5)
-    relax = method.edges.relax
-    method.edges.relax = lambda gaps, d, share=1.0, **_: relax(gaps, d, equal_speeds=share < 1)
+    relax = method.jumps.descents.relax
+    method.jumps.descents.relax = lambda gaps, d, share=1.0, **_: relax(
+        gaps, d, equal_speeds=share < 1
+    )
     loop = run_loop(method, max_penetration=0.9)
     assert loop.loss == pytest.approx(0.122149467, abs=loop.loss_error + 6.5e-8)
     assert loop.races == 1
@@ -88,8 +90,8 @@ def test_under_a_load_the_speeds_of_the_edges_decide_nothing():
     """There the advance of one edge helps all others (docs/paths.md)."""
     problem = replace(race(), work_of_adhesion=0.01, control=Control(0.0))
     methods = [SharpMethod(problem) for _ in range(2)]
-    relax = methods[1].edges.relax
-    methods[1].edges.relax = lambda *where, **how: relax(*where, equal_speeds=True)
+    relax = methods[1].jumps.descents.relax
+    methods[1].jumps.descents.relax = lambda *where, **how: relax(*where, equal_speeds=True)
     one, other = (run_loop(method, max_stress=2e3, load_steps=6) for method in methods)
     assert len(one.jumps) == len(other.jumps) > 2
     assert other.loss == pytest.approx(one.loss, rel=1e-7)

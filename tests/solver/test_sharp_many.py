@@ -13,9 +13,9 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.branch_point import Point
-from adhesis.solver.sharp.edge_problem import FIXED_SEPARATION
+from adhesis.solver.sharp.continuation.descent import Descents
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import FIXED_SEPARATION, EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support import next_to_a_fold
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
@@ -188,7 +188,7 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
     edges, point = many_gaps
     gaps, d = point.gaps, point.d
     fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
-    end, _ = edges.relax(fewer, d)
+    end, _ = Descents(edges, None).relax(fewer, d)
     assert len(end.gaps) < len(gaps)
     for known, wanted in ((gaps, end.gaps), (end.gaps, gaps)):
         edges.forget()
@@ -230,10 +230,10 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
         h_rms=1e-6,
     )
     problem = Problem(profile, HalfSpace(1e6, 0.5), next_to_a_fold.WORK_OF_ADHESION)
-    edges = SharpMethod(problem).edges
-    found, _ = edges.relax(next_to_a_fold.GAPS, next_to_a_fold.SEPARATION)
+    method = SharpMethod(problem)
+    found, _ = method.jumps.descents.relax(next_to_a_fold.GAPS, next_to_a_fold.SEPARATION)
     assert isinstance(found, Point)
-    assert edges.count.fields < 2000
+    assert method.edges.count.fields < 2000
 
 
 def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():

@@ -224,7 +224,7 @@ def test_edges_that_are_no_numbers_have_no_field():
         _ = method.edges.field(gaps, 1e-3).solution
     assert method.edges.equilibrium(gaps, 1e-3, 0.1) is None
     with pytest.raises(PathError, match="no field"):
-        method.edges.relax(gaps, 1e-3)
+        method.jumps.descents.relax(gaps, 1e-3)
 
 
 def test_the_error_told_covers_the_error_made_on_random_scenes():

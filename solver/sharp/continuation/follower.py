@@ -20,7 +20,13 @@ from adhesis.solver.sharp.continuation.branch import (
     StableBranch,
     Target,
 )
-from adhesis.solver.sharp.continuation.jump import ComputedJump, EventOrders, History, Jumps
+from adhesis.solver.sharp.continuation.jump import (
+    ComputedJump,
+    Event,
+    EventOrders,
+    History,
+    Jumps,
+)
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -107,7 +113,8 @@ class Follower:
             jump = self._nucleation_jump(branch, target)
         if jump is None and event.remaining is not None:
             before = output or self.states.of_point(point)
-            return self.jumps.compute(before, event.remaining, point.d, target.branch, known=point)
+            vanished = Event(before, point.d, point.gaps, event.remaining)
+            return self.jumps.compute(vanished, target.branch)
         if output is not None:
             onwards = -1.0 if target.branch == "loading" else 1.0
             if jump is None or onwards * (self.states.prescribed_of(output) - jump.d) < 0:
@@ -201,19 +208,19 @@ class Follower:
 
     def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
         """Compute the jump from a point at which patches open inside."""
-        point, gaps = opened.point, opened.point.field.gaps
-        before = self.states.of_point(point)
-        jump = self.jumps.compute(
-            before,
-            self.cracks.insert_seeds(gaps, opened.seeds),
+        point = opened.point
+        event = Event(
+            self.states.of_point(point),
             point.d,
-            target.branch,
-            known=point,
+            point.gaps,
+            self.cracks.insert_seeds(point.gaps, opened.seeds),
             barrier=sum(crack.barrier for crack in opened.seeds),
+            late=opened.late,
         )
-        if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
+        jump = self.jumps.compute(event, target.branch)
+        if jump.point is not None and self.jumps.descents.is_same(jump.point.gaps, point.gaps):
             raise NoState("a crack that grows at both tips closes again", point.d)
-        return replace(jump, misplaced=self.states.work(before, jump.states[-1], opened.late))
+        return jump
 
     def _touch_jump(
         self, touched: Located[Touch], beyond: float | None, target: Target
@@ -226,18 +233,23 @@ class Follower:
         point = touched.point
         if self.edges.critical > 0 and touched.seeds[0].opening < -self.nucleation.tolerance:
             raise NoState("surfaces overlap, and no first touch is found", point.d)
-        before = self.states.of_point(point)
         since = self.nucleation.way_since_healed(touched.seeds, point.d)
-        jump = self.jumps.compute(
-            before, point.field.gaps, point.d, target.branch, touched.seeds, point,
-            event_orders=None if beyond is None else EventOrders(beyond, (point.field.gaps,)),
-        )  # fmt: skip
+        event = Event(
+            self.states.of_point(point),
+            point.d,
+            point.gaps,
+            self.nucleation.insert_seeds(point.gaps, touched.seeds),
+            late=touched.late,
+            orders=None if beyond is None else EventOrders(beyond, (point.gaps,)),
+        )
+        jump = self.jumps.compute(event, target.branch)
         gained = self.jumps.has_gained(point, jump.point, touched.seeds)
         if not gained and self.nucleation.heal(touched.seeds, point.d):
             return None
         # they hold from somewhere since they last did not, where no energy is lost
-        late, since = (self.states.work(before, jump.states[-1], x) for x in (touched.late, since))
-        return replace(jump, misplaced=late + min(since, abs(jump.jump.energy_drop)))
+        healed = self.states.work(event.before, jump.states[-1], since)
+        more = min(healed, abs(jump.jump.energy_drop))
+        return replace(jump, misplaced=jump.misplaced + more)
 
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float
@@ -249,18 +261,15 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             states = (self.states.of_point(point),)
         before = self.states.of_point(point, held=(fold.d, self.edges.solve_finer(point)))
-        start, event_orders = self._start_at_fold(fold)
-        jump = self.jumps.compute(
-            before, start, fold.d, target.branch, known=point, event_orders=event_orders
-        )
-        after = jump.states[-1]
-        late = self.states.work(before, after, way)
-        drop = jump.jump.energy_drop
+        start, orders = self._start_at_fold(fold)
+        event = Event(before, fold.d, point.gaps, start, late=way, orders=orders)
+        jump = self.jumps.compute(event, target.branch)
+        after, drop = jump.states[-1], jump.jump.energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
-        if late > allowed and finest > self.resolution.finest:
+        if jump.misplaced > allowed and finest > self.resolution.finest:
             return None
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
-        misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
+        misplaced = jump.misplaced + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
         return replace(jump, states=states + jump.states, misplaced=misplaced)
@@ -293,7 +302,9 @@ class Follower:
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
-            ways = self.edges.ways_off_saddle(saddle.gaps, fold.d, self.edges.law_at(point.gaps))
+            ways = self.jumps.descents.ways_off_saddle(
+                saddle.gaps, fold.d, self.edges.law_at(point.gaps)
+            )
             if ways:
                 return ways[0], EventOrders(fold.d, tuple(ways))
         rate = np.abs(point.rate)

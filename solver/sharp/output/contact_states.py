@@ -13,9 +13,9 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.edge_problem import EdgeProblem
 from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import patches_between
+from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.values import with_values
 
 
@@ -53,7 +53,7 @@ def loading_device(problem: Problem) -> LoadingDevice:
 class States:
     """Contact states and conversions of units of one problem."""
 
-    def __init__(self, problem: Problem, edges: EdgeProblem) -> None:
+    def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.adhesion, self.count = problem, edges.adhesion, edges.count
         profile = problem.profile
         self.q0 = profile.q0
