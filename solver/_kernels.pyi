@@ -11,7 +11,9 @@ COMPILER: str
 
 CLOSING_SHARE: float
 
-COMPARABLE: float
+ELSEWHERE: float
+
+EQUAL: float
 
 SHAPE_NODES: float
 
@@ -69,7 +71,7 @@ class PythonAdhesion(Adhesion):
 
 class EdgeLaw:
     @overload
-    def __init__(self, *, adhesion: Adhesion, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, rough_rate: float, force_error: float) -> None: ...
+    def __init__(self, *, adhesion: Adhesion, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, rough_rate: float, force_error: float, highest: float) -> None: ...
 
     @overload
     def __init__(self, arg: EdgeLaw, /) -> None: ...
@@ -238,7 +240,7 @@ class LinearResponse:
 def set_up_response(gaps: numpy.typing.NDArray[numpy.float64], prescribed: float, law: EdgeLaw, model: FieldModel) -> LinearResponse | None: ...
 
 class SearchLengths:
-    def __init__(self, *, wave: float, closing_per_motion: float, surface: float, narrowest: float, widest: float, range: float) -> None: ...
+    def __init__(self, *, wave: float, closing_per_motion: float, surface: float, narrowest: float, longest_step: float, range: float) -> None: ...
 
     def seed_widths(self, curvature: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 

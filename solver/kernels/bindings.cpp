@@ -16,7 +16,6 @@
 #include "descent.hpp"
 #include "edge_model.hpp"
 #include "grid.hpp"
-#include "newton.hpp"
 #include "predictor.hpp"
 
 namespace nb = nanobind;
@@ -230,9 +229,10 @@ void bind_model(nb::module_& m) {
            "largest"_a, "work"_a, "work_up_to"_a);
   nb::class_<EdgeLaw>(m, "EdgeLaw")
       .def(nb::init<std::shared_ptr<const Adhesion>, double, double, double, double, double, double,
-                    double, double>(),
+                    double, double, double>(),
            nb::kw_only(), "adhesion"_a, "critical"_a, "newton_tolerance"_a, "field_error"_a,
-           "rest_step"_a, "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a)
+           "rest_step"_a, "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a,
+           "highest"_a)
       .def(nb::init<const EdgeLaw&>())
       .def_ro("critical", &EdgeLaw::critical)
       .def_ro("rest_step", &EdgeLaw::rest_step)
@@ -415,7 +415,7 @@ void bind_response(nb::module_& m) {
 void bind_nucleation(nb::module_& m) {
   nb::class_<SearchLengths>(m, "SearchLengths")
       .def(nb::init<double, double, double, double, double, double>(), nb::kw_only(), "wave"_a,
-           "closing_per_motion"_a, "surface"_a, "narrowest"_a, "widest"_a, "range"_a)
+           "closing_per_motion"_a, "surface"_a, "narrowest"_a, "longest_step"_a, "range"_a)
       .def(
           "seed_widths",
           [](const SearchLengths& lengths, Vector curvature) {
@@ -531,7 +531,8 @@ NB_MODULE(_kernels, m) {
   m.doc() = "Kernels of the methods sharp and grid.";
   m.attr("COMPILER") = ADHESIS_COMPILER;
   m.attr("CLOSING_SHARE") = adhesis::CLOSING_SHARE;
-  m.attr("COMPARABLE") = adhesis::COMPARABLE;
+  m.attr("ELSEWHERE") = adhesis::ELSEWHERE;
+  m.attr("EQUAL") = adhesis::EQUAL;
   m.attr("SHAPE_NODES") = adhesis::SHAPE_NODES;
   m.attr("STEP_GROWTH") = adhesis::STEP_GROWTH;
   m.attr("STEP_REDUCTION") = adhesis::STEP_REDUCTION;

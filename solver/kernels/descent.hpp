@@ -10,7 +10,7 @@
 #pragma once
 
 #include "edge_model.hpp"
-#include "renewal.hpp"
+#include "equilibrium.hpp"
 
 namespace adhesis {
 

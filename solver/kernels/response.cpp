@@ -80,7 +80,7 @@ LinearResponse::LinearResponse(Nodes given, Equations given_equations, Tree give
   softness.assign(count, 1);
   is_stale.assign(count, true);
   for (Vector* values : {&about, &scaled_opening, &mean_by_potential}) values->resize(n);
-  for (Pair* pair : {&opening_by_potential, &charge_by_edge, &held_charge, &motion_by_potential})
+  for (Pair* pair : {&closing_by_potential, &charge_by_edge, &held_charge, &motion_by_potential})
     for (Vector& values : *pair) values.resize(n);
   for (Vector& values : potential) values.resize(tree.size());
 }
@@ -108,7 +108,7 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law) {
     opening[side][by_field] -= scale * end_terms[side][0];
     opening[side][by_motion] -= scale * end_terms[side][1];
     strength[side] = -opening[side][by_field] * std::sqrt(nodes.slope[k][side] / 8);
-    double* by_potential = &opening_by_potential[side][first];
+    double* by_potential = &closing_by_potential[side][first];
     std::fill_n(by_potential, m, 0.0);
     for (int i = 0; i < m; ++i) add_scaled(scale * end_values[i], own + i * m, by_potential, m);
     for (int j = 0; j < m; ++j) by_potential[j] *= rule.weights[j];
@@ -118,7 +118,7 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law) {
     Edge& edge = edges[2 * k + side];
     auto [critical, drift] = critical_opening(nodes.gaps[k].end[side], law);
     edge.opening = opening[side][by_field];
-    edge.opening_by_pressure = opening[side][by_pressure];
+    edge.closing_by_pressure = opening[side][by_pressure];
     edge.residual = edge.opening - critical;
     if (law.pins()) {
       const auto [range, by_theta] = pinning_range(nodes.gaps[k].end[side], law);
@@ -174,15 +174,15 @@ WIDE void LinearResponse::condense(int k) {
   const double pull_left = -residual_left - a * left.here - b * right.here;
   const double pull_right = -residual_right - c * left.here - d * right.here;
   const double* potential_here = &about[first];
-  const double *by_left = &opening_by_potential[0][first],
-               *by_right = &opening_by_potential[1][first];
+  const double *by_left = &closing_by_potential[0][first],
+               *by_right = &closing_by_potential[1][first];
   for (int side = 0; side < 2; ++side) {
     Edge& edge = edges[2 * k + side];
     auto [x, y] = edge.compliance;
     double* follows = &motion_by_potential[side][first];
     for (int j = 0; j < m; ++j) follows[j] = x * by_left[j] + y * by_right[j];
     edge.isolated_correction = edge.here + x * pull_left + y * pull_right;
-    edge.motion[1] = x * left.opening_by_pressure + y * right.opening_by_pressure;
+    edge.motion[1] = x * left.closing_by_pressure + y * right.closing_by_pressure;
     edge.motion[0] =
         edge.isolated_correction - edge.motion[1] * pressure - dot(follows, potential_here, m);
   }
@@ -272,7 +272,7 @@ void LinearResponse::update_softness(const Pair& motion, double by_pressure, con
   for (int e = 0; e < 2 * count; ++e) {
     const Edge& edge = edges[e];
     double stiff = std::max(law.rough_rate, std::abs(edge.tangent[0]) + std::abs(edge.tangent[1]));
-    double soft = more * stiff * std::abs(motion[1][e] / edge.opening_by_pressure);
+    double soft = more * stiff * std::abs(motion[1][e] / edge.closing_by_pressure);
     for (int beside : {count - 1, 0, 1}) {
       double& of_gap = softness[(e / 2 + beside) % count];
       of_gap = std::max(of_gap, soft);

@@ -1,9 +1,13 @@
-"""Mechanics of the contact edges of one problem: fields and equilibria of its gaps."""
+"""Mechanics of the contact edges of one problem: fields and equilibria of its gaps.
+
+Equilibria are the points of a branch, with the rates of the edges there and before.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -21,8 +25,8 @@ from adhesis.solver._kernels import (
     solve_field,
 )
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import PinnedEdges, Point
 from adhesis.solver.sharp.field.gap_field import GapField, check_definite
+from adhesis.solver.sharp.gap.ends import move_edges
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
     BY_FIELD,
@@ -34,8 +38,74 @@ from adhesis.solver.sharp.tolerances import (
     SMALLEST_LENGTH,
     SMALLEST_OF_SEED,
 )
+from adhesis.solver.values import with_values
 
 FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
+
+
+class PreviousPoint(NamedTuple):
+    """d, and rate and place of every edge, at the point before one; see :class:`Point`."""
+
+    d: float
+    rate: Array
+    gaps: Array
+
+
+class PinnedEdges(NamedTuple):
+    """Place of C of every pinned edge between both critical openings, and its derivative by d.
+
+    It is 0 where an edge begins to advance and 1 where it begins to recede; NaN for other edges.
+    """
+
+    share: Array
+    rate: Array
+
+    def distance(self, step: float) -> float:
+        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
+        rate = self.rate * np.sign(step)
+        left = np.where(rate > 0, 1 - self.share, self.share)
+        moving = np.isfinite(rate) & (rate != 0) & (left > 0)
+        return float((left[moving] / np.abs(rate[moving])).min(initial=np.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An equilibrium of edges, stable on a branch, or the field of edges next to one.
+
+    Attributes
+    ----------
+    d : float
+        What is prescribed: q0 s at fixed separation.
+    field : GapField
+    rate : array, shape (2L,)
+        dn/dd of every edge along the branch, n the outward motion of the contact.
+    slope : float
+        dY/dd along the branch: Y is p, under a load q0 s.
+    previous : PreviousPoint, optional
+        The point before it on its branch.
+    pinned : PinnedEdges, optional
+        With two works of adhesion.
+    """
+
+    d: float
+    field: GapField
+    rate: Array
+    slope: float
+    previous: PreviousPoint | None = None
+    pinned: PinnedEdges | None = None
+
+    @property
+    def gaps(self) -> Array:
+        """Gap ends, shape (L, 2)."""
+        return self.field.gaps
+
+    def with_previous(self, previous: PreviousPoint | None) -> Self:
+        """Return this point with the one before it."""
+        return with_values(self, previous=previous)
+
+    def extrapolate(self, d: float) -> Array:
+        """Extrapolate the gaps to ``d``, along the tangent."""
+        return move_edges(self.gaps, self.rate * (d - self.d))
 
 
 @dataclass
@@ -66,8 +136,8 @@ class EdgeMechanics:
     newton_tolerance, field_error : float
         Correction that ends Newton's iteration; displacement of an equilibrium that the error of
         the field can cause.
-    smallest : float
-        Narrower patches and gaps are removed.
+    smallest, narrowest : float
+        Narrower patches and gaps are removed; width of the narrowest patch or gap that is put.
     surface : float
         Γ = 2γ q0/E* where adhesion is weakest.
     """
@@ -94,6 +164,7 @@ class EdgeMechanics:
         self.smallest = SMALLEST_LENGTH * self.wave
         if critical > 0:
             self.smallest = min(self.smallest, SMALLEST_OF_SEED * seed)
+        self.narrowest = float(3 * self.smallest)
         self.law = EdgeLaw(
             adhesion=self.adhesion,
             critical=float(critical),
@@ -104,6 +175,7 @@ class EdgeMechanics:
             smallest=float(self.smallest),
             rough_rate=float(max(critical, np.sqrt(source.m2 * self.wave)) / self.wave),
             force_error=float(tolerance * critical**2),
+            highest=float(source.highest),
         )
         self.model = FieldModel(
             device=device,

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Fold, Resolution, StableBranch, Target
+from adhesis.solver.sharp.mechanics import Point
 
 WAVE, FOLD = 1.0, 0.2
 

@@ -25,7 +25,8 @@ from adhesis.solver.model.problem import griffith_length
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
 from adhesis.solver.sharp.continuation.branch import StableBranch
-from adhesis.solver.sharp.nucleation.opening import Crack, judge_maximum
+from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.nucleation.crack import Crack, judge_maximum
 from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
 
 PERIOD = 2e-3
@@ -63,7 +64,7 @@ def troughs_problem(strength: float = STRENGTH) -> Problem:
 
 
 def test_the_largest_excess_opens_first_with_what_equals_it():
-    choose = make_method("sharp", troughs_problem()).follower.cracks.choose_seeds
+    choose = make_method("sharp", troughs_problem()).follower.cracks.choose
     cracks = [Crack(float(i), value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
     assert [crack.position for crack in choose(cracks)] == [1.0, 3.0]
     assert choose(cracks[:1]) == []
@@ -151,6 +152,25 @@ def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
         StableBranch._work_error(branch, SimpleNamespace(d=d))
     branch._work_before = (0.0, math.inf)  # the step was accepted
     assert StableBranch._work_error(branch, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
+
+
+def test_patches_that_open_from_the_same_edges_again_end_the_path():
+    """They would without end, unless a touch that did not hold meanwhile is not tried again."""
+    follower = make_method("sharp", troughs_problem()).follower
+    gaps = np.array([[1.0, 6.0]])
+    points = [SimpleNamespace(d=0.5, gaps=gaps + by, field=None) for by in (0.0, 0.2, 1e-5, 2e-5)]
+    follower.cracks = SimpleNamespace(
+        is_possible=True, minimum=lambda field: (-1.0, []), choose=lambda found: []
+    )
+    follower._crack_jump = lambda located, target: located.point
+    for point in points[:2]:
+        assert follower._cracks_at(point, None) is point
+    follower.nucleation.heals += 1
+    assert follower._cracks_at(points[2], None) is points[2]
+    with pytest.raises(NoState, match="open and close in turn"):
+        follower._cracks_at(points[3], None)
+    points[3].d = 0.4
+    assert follower._cracks_at(points[3], None) is points[3]
 
 
 def test_work_and_energy_agree_between_openings():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.solver._kernels import (
-    COMPARABLE,
+    ELSEWHERE,
     STEP_GROWTH,
     STEP_REDUCTION,
     Predictor,
@@ -17,9 +17,8 @@ from adhesis.solver._kernels import (
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import signs_of, without_small
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics, PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
@@ -27,18 +26,17 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
-    WORK_RESOLVED,
     WORK_STALLED,
 )
 
 
 @dataclass(frozen=True)
 class Target:
-    """End of a load step: d, the same value in m or Pa without rounding, and the branch."""
+    """End of a load step: d, the same value in m or Pa without rounding, and the way there."""
 
     d: float
     prescribed: float
-    branch: Branch
+    direction: Branch
 
 
 @dataclass(frozen=True)
@@ -56,8 +54,8 @@ class Resolution:
         roughness opens patches from inside; infinite where it does not.
     h_max : float
         q0 h_max.
-    finest : float
-        No jump is located more finely than this.
+    field_limit : float
+        Nearer to a fold the error of the field hides it: no jump is located more finely.
     late : float
         Work that a jump may add to the loss by being found late, in units of its drop.
     least_drop : float
@@ -70,7 +68,7 @@ class Resolution:
     bend: float
     work: float
     h_max: float
-    finest: float
+    field_limit: float
     late: float
     least_drop: float
     field_share: float
@@ -149,7 +147,7 @@ class StableBranch:
         The last accepted point.
     trail : list of Point
         Accepted points from that at which touches were last searched for.
-    finest : float
+    smallest_step : float
         Separation to which a jump is located, in d: the smallest step, but across a fold or to the
         target.
     """
@@ -170,7 +168,7 @@ class StableBranch:
         self.point = self._output = point  # the last one whose state belongs to the path
         self._at_output: ContactState | None = None  # the state there, where work is compared
         self.trail = [point]
-        self.finest, self._longest = resolution.jump, math.inf  # step
+        self.smallest_step, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = beyond(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
@@ -189,15 +187,15 @@ class StableBranch:
             if reached is not None:
                 error = max(self._trapezoid_error(reached), self._work_error(reached))
                 share = 0.5 if error > TRAPEZOID_FAR else self._share_to_turn(reached, step)
-                if share == 1 or abs(step) <= 2 * self._resolution.finest:
+                if share == 1 or abs(step) <= 2 * self._resolution.field_limit:
                     return self._accept(reached, step, error)
                 # a branch may bend more sharply than jumps are located
                 self._longest = share * abs(step)
-                self.finest = min(self.finest, self._longest)
-            elif abs(step) <= self.finest:
+                self.smallest_step = min(self.smallest_step, self._longest)
+            elif abs(step) <= self.smallest_step:
                 return Fold(self.point, d, self._two_folds)
             else:
-                self._longest = max(STEP_REDUCTION * abs(step), self.finest)
+                self._longest = max(STEP_REDUCTION * abs(step), self.smallest_step)
 
     @property
     def fold_ahead(self) -> tuple[float, float]:
@@ -207,9 +205,9 @@ class StableBranch:
         across = predictor.across(distance, self._resolution.jump)
         return predictor.d + math.copysign(distance, way), predictor.d + math.copysign(across, way)
 
-    def refine(self, finest: float) -> None:
-        """Locate the fold ahead to ``finest``."""
-        self.finest = self._longest = finest
+    def refine(self) -> None:
+        """Locate the fold ahead as finely as the field resolves it."""
+        self.smallest_step = self._longest = self._resolution.field_limit
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
@@ -219,15 +217,15 @@ class StableBranch:
     def _next_step(self) -> float:
         """Return the next step in d: the leading edge is not to move far, nor the target be passed.
 
-        A step that leads across a fold may be shorter than the finest. The first one after a jump
+        A step that leads across a fold may be shorter than the smallest. The first one after a jump
         follows the tangent: where it was longer, more than a half of them failed in a loop of 120
         patches.
         """
         predictor = self._predictor
         motion = PREDICTED_MOTION if predictor.way else LONGEST_STEP * STEP_REDUCTION
-        size = min(self._longest, predictor.reach(motion * self._edges.wave, self.finest))
-        if not predictor.fold.distance < self.finest:
-            size = max(size, self.finest)
+        size = min(self._longest, predictor.reach(motion * self._edges.wave, self.smallest_step))
+        if not predictor.fold.distance < self.smallest_step:
+            size = max(size, self.smallest_step)
         left = self._target.d - self.point.d
         step = left if size >= abs(left) else math.copysign(size, left)
         self._free_step, self._begins_to_move = step, False
@@ -238,12 +236,12 @@ class StableBranch:
 
         The branch has a kink there, and the state on either side belongs to the path.
         """
-        finest = self.finest
+        near = self.smallest_step
         distance = pinned.distance(step)
-        if not distance < abs(step) + finest:
+        if not distance < abs(step) + near:
             return step
         self._begins_to_move = True
-        size = distance - finest if distance > 2 * finest else distance + finest
+        size = distance - near if distance > 2 * near else distance + near
         return step if size >= abs(step) else math.copysign(size, step)
 
     def _share_to_turn(self, reached: Point, step: float) -> float:
@@ -313,25 +311,25 @@ class StableBranch:
         # p = q0 h_max is σ~ = 1
         h_max = self._resolution.h_max
         load = self._edges.is_load
-        conjugate = point.separation - h_max if load else point.pressure
+        which = 1 if load else 0  # of p and q0 s
+        before, here = (p.field.nearly[which] for p in (output, point))
+        conjugate = here - h_max if load else here
         scale = max(abs(conjugate), QUIET_STRESS * h_max)
         change = abs(way) * abs(point.slope - output.slope)
         if self._edges.source.is_patterned or self._edges.pins:
-            before, here = (p.separation if load else p.pressure for p in (output, point))
             change = max(change, *(abs(here - before - way * p.slope) for p in (output, point)))
         return float(change / 12 / (self._resolution.bend * scale))
 
     def _work_error(self, point: Point) -> float:
         """Difference of work and energy since the last output, in units of what is allowed.
 
-        Zero for steps much shorter than the resolution of jumps. A difference that a shorter step
-        does not reduce is no error of the step: energies differ by it where the number of modes of
-        a gap changes. No smaller one halves a further step of the branch.
+        A difference that a shorter step does not reduce is no error of the step: energies differ by
+        it where the number of modes of a gap changes. No smaller one halves a further step of the
+        branch.
         """
-        span = abs(point.d - self._output.d)
-        short = span < WORK_RESOLVED * self._resolution.jump
-        if math.isinf(self._resolution.work) or short:
+        if math.isinf(self._resolution.work):
             return 0.0
+        span = abs(point.d - self._output.d)
         if self._at_output is None:
             self._at_output = self._states.of_point(self._output)
         residual = self._states.energy_residual(self._at_output, self._states.of_point(point))
@@ -352,7 +350,7 @@ def correct(edges: EdgeMechanics, predictor: Predictor, d: float) -> Point | Non
     """
     gaps = predictor.predict_gaps(d)
     # not written as > : a prediction that is no number is none
-    if not np.abs(gaps - predictor.gaps).max() <= COMPARABLE * edges.wave:
+    if not np.abs(gaps - predictor.gaps).max() <= ELSEWHERE * edges.longest_step:
         return None
     return edges.equilibrium(gaps, d, edges.longest_step, memory=predictor.gaps)
 

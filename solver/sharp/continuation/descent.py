@@ -11,10 +11,9 @@ from contextlib import suppress
 
 import numpy as np
 
-from adhesis.solver._kernels import CLOSING_SHARE, DescentEvent, EdgeLaw
+from adhesis.solver._kernels import CLOSING_SHARE, EQUAL, DescentEvent, EdgeLaw
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.threads import one_thread
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.gap.ends import (
     lengths_of,
@@ -23,11 +22,10 @@ from adhesis.solver.sharp.gap.ends import (
     step_limits,
     without_small,
 )
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     ENDLESS,
-    EQUAL,
     FINER_STEPS,
     OTHER_MINIMUM,
     RESTS,

@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.solver._kernels import SearchedGaps
+from adhesis.solver._kernels import EQUAL, SearchedGaps
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import (
     Accepted,
     Fold,
@@ -29,12 +28,11 @@ from adhesis.solver.sharp.continuation.jump import (
 )
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
-from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import Located, locate
-from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Crack, Cracks
+from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
+from adhesis.solver.sharp.nucleation.crack import Crack, Cracks
+from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation, Touch, locate
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import EQUAL, MOST_OPENINGS, SECOND_FOLD_DISPLACED
+from adhesis.solver.sharp.tolerances import SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 
@@ -48,11 +46,12 @@ class Follower:
         self.nucleation, self.cracks = Nucleation(problem, edges), Cracks(problem, edges)
         self.jumps = Jumps(edges, self.nucleation, states)
         self._came_on: Branch | None = None
+        self._opened: list[tuple[Point, int]] = []  # points that patches opened from, and heals
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
         self.nucleation.healed = []
-        self.nucleation.searched, self._came_on = SearchedGaps(), None
+        self.nucleation.searched, self._came_on, self._opened = SearchedGaps(), None, []
         if data is None or data.stopped is None:
             return None
         d, nearly, rate, slope, previous, pinned, searched, name = data.stopped
@@ -68,13 +67,13 @@ class Follower:
         d, point
             d reached and the stable point there, None if no contact is left.
         """
-        if self.edges.pins and self._came_on not in (None, target.branch):
+        if self.edges.pins and self._came_on not in (None, target.direction):
             # where a path turns back all its edges are pinned at first
             turned = self.edges.equilibrium(point.gaps, point.d, self.edges.newton_tolerance)
             point = point.with_previous(None) if turned is None else turned
             history.states.append(self.states.of_point(point))
         self._came_on = None
-        jump = self._opening_at(history, point, target)
+        jump = self._cracks_at(point, target)
         if jump is not None:
             return jump.d, history.commit(jump)
         branch = StableBranch(self.edges, self.resolution, self.states, point, target)
@@ -86,7 +85,7 @@ class Follower:
                 jump = self._handle_accepted(history, branch, event, target)
             if jump is not None:
                 return jump.d, history.commit(jump)
-        self._remember(history, branch, target.branch)
+        self._remember(history, branch, target.direction)
         return target.d, branch.point
 
     def _remember(self, history: History, branch: StableBranch, name: Branch) -> None:
@@ -114,9 +113,9 @@ class Follower:
         if jump is None and event.remaining is not None:
             before = output or self.states.of_point(point)
             vanished = Event(before, point.d, point.gaps, event.remaining)
-            return self.jumps.compute(vanished, target.branch)
+            return self.jumps.compute(vanished, target.direction)
         if output is not None:
-            onwards = -1.0 if target.branch == "loading" else 1.0
+            onwards = -1.0 if target.direction == "loading" else 1.0
             if jump is None or onwards * (self.states.prescribed_of(output) - jump.d) < 0:
                 history.states.append(output)
         return jump
@@ -134,9 +133,9 @@ class Follower:
             if jump is not None:
                 return replace(jump, states=(self.states.of_point(fold.point), *jump.states))
         last = history.states[-1] if history.states else None
-        jump = self._fold_jump(last, fold, target, branch.finest)
+        jump = self._fold_jump(last, fold, target, branch.smallest_step)
         if jump is None:
-            branch.refine(self.resolution.finest)
+            branch.refine()
             return None
         after = jump.point
         goes_on = fold.d != target.d and self._is_near(fold.point, after)
@@ -165,16 +164,17 @@ class Follower:
             return None
         branch.trail = [branch.point]
         fold, beyond = branch.fold_ahead
-        for _ in range(MOST_OPENINGS):
-            finest = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
-            touched = locate(self.nucleation, self.edges, trail, finest)
+        # This ends: a touch that does not hold is found again only where its gap closes further.
+        while True:
+            near = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
+            touched = locate(self.nucleation, self.edges, trail, near)
             opened = None
             if self.cracks.is_possible:
-                opened = locate(self.cracks, self.edges, trail, self.resolution.finest)
+                opened = locate(self.cracks, self.edges, trail, self.resolution.field_limit)
             if opened is not None and (
                 touched is None or abs(opened.point.d - start) < abs(touched.point.d - start)
             ):
-                return self._opening_jump(opened, target)
+                return self._crack_jump(opened, target)
             if touched is None:
                 return None
             apart = math.copysign(1.0, target.d - start) * (fold - touched.point.d)
@@ -184,40 +184,42 @@ class Follower:
             jump = self._touch_jump(touched, beyond if may_fold else None, target)
             if jump is not None:
                 return jump
-        raise NoState("contact nucleates, and goes back in turn", trail[-1].d)
 
-    def _opening_at(self, history: History, point: Point, target: Target) -> ComputedJump | None:
+    def _cracks_at(self, point: Point, target: Target) -> ComputedJump | None:
         """Compute the jump at the start of a branch where patches open at once; else None.
 
         Raises
         ------
         NoState
-            If patches open and close without end.
+            If they have opened from the same edges at this d before, and closed again: they would
+            without end.
         """
         if not self.cracks.is_possible:
             return None
         least, found = self.cracks.minimum(point.field)
         if least > 0:
             return None
-        jump = self._opening_jump(Located(point, self.cracks.choose_seeds(found), 0.0), target)
-        last = history.jumps[-MOST_OPENINGS:]
-        here = jump.jump.separation
-        if len(last) == MOST_OPENINGS and all(one.separation == here for one in last):
-            raise NoState("patches open and close in turn", jump.d)
-        return jump
+        # touches that did not hold since then are not tried again: another end is possible
+        heals = self.nucleation.heals
+        self._opened = [opened for opened in self._opened if opened[0].d == point.d]
+        for other, heals_then in self._opened:
+            if heals_then == heals and self.jumps.descents.is_same(other.gaps, point.gaps):
+                raise NoState("patches open and close in turn", point.d)
+        self._opened.append((point, heals))
+        return self._crack_jump(Located(point, self.cracks.choose(found), 0.0), target)
 
-    def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
+    def _crack_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
         """Compute the jump from a point at which patches open inside."""
         point = opened.point
         event = Event(
             self.states.of_point(point),
             point.d,
             point.gaps,
-            self.cracks.insert_seeds(point.gaps, opened.seeds),
-            barrier=sum(crack.barrier for crack in opened.seeds),
+            self.cracks.insert(point.gaps, opened.places),
+            barrier=sum(crack.barrier for crack in opened.places),
             late=opened.late,
         )
-        jump = self.jumps.compute(event, target.branch)
+        jump = self.jumps.compute(event, target.direction)
         if jump.point is not None and self.jumps.descents.is_same(jump.point.gaps, point.gaps):
             raise NoState("a crack that grows at both tips closes again", point.d)
         return jump
@@ -231,20 +233,20 @@ class Follower:
         d.
         """
         point = touched.point
-        if self.edges.critical > 0 and touched.seeds[0].opening < -self.nucleation.tolerance:
+        if self.edges.critical > 0 and touched.places[0].opening < -self.nucleation.tolerance:
             raise NoState("surfaces overlap, and no first touch is found", point.d)
-        since = self.nucleation.way_since_healed(touched.seeds, point.d)
+        since = self.nucleation.way_since_healed(touched.places, point.d)
         event = Event(
             self.states.of_point(point),
             point.d,
             point.gaps,
-            self.nucleation.insert_seeds(point.gaps, touched.seeds),
+            self.nucleation.insert(point.gaps, touched.places),
             late=touched.late,
             orders=None if beyond is None else EventOrders(beyond, (point.gaps,)),
         )
-        jump = self.jumps.compute(event, target.branch)
-        gained = self.jumps.has_gained(point, jump.point, touched.seeds)
-        if not gained and self.nucleation.heal(touched.seeds, point.d):
+        jump = self.jumps.compute(event, target.direction)
+        gained = self.jumps.has_gained(point, jump.point, touched.places)
+        if not gained and self.nucleation.heal(touched.places, point.d):
             return None
         # they hold from somewhere since they last did not, where no energy is lost
         healed = self.states.work(event.before, jump.states[-1], since)
@@ -252,7 +254,7 @@ class Follower:
         return replace(jump, misplaced=jump.misplaced + more)
 
     def _fold_jump(
-        self, last: ContactState | None, fold: Fold, target: Target, finest: float
+        self, last: ContactState | None, fold: Fold, target: Target, located: float
     ) -> ComputedJump | None:
         """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
@@ -263,10 +265,10 @@ class Follower:
         before = self.states.of_point(point, held=(fold.d, self.edges.solve_finer(point)))
         start, orders = self._start_at_fold(fold)
         event = Event(before, fold.d, point.gaps, start, late=way, orders=orders)
-        jump = self.jumps.compute(event, target.branch)
+        jump = self.jumps.compute(event, target.direction)
         after, drop = jump.states[-1], jump.jump.energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
-        if jump.misplaced > allowed and finest > self.resolution.finest:
+        if jump.misplaced > allowed and located > self.resolution.field_limit:
             return None
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = jump.misplaced + max(0.0, displaced - self.resolution.field_share * abs(drop))

@@ -10,10 +10,9 @@ import numpy as np
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.descent import Descents, Rival
 from adhesis.solver.sharp.errors import FullContact, NoState
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import ENDLESS, OTHER_MINIMUM
@@ -138,14 +137,12 @@ class Jumps:
             return False
         d = 0.0 if self.edges.is_load else separation
         try:
-            point, _ = self.descents.relax(
-                self.nucleation.insert_seeds(np.empty((0, 2)), touches), d
-            )
+            point, _ = self.descents.relax(self.nucleation.insert(np.empty((0, 2)), touches), d)
         except FullContact:
             return True
         return point is not None and self.states.of_point(point).potential < 0
 
-    def compute(self, event: Event, branch: Branch) -> ComputedJump:
+    def compute(self, event: Event, direction: Branch) -> ComputedJump:
         """Descend from an event to the next state in which nothing touches.
 
         The point of the result is the minimum as it was found: next to a fold it may not be found
@@ -174,7 +171,7 @@ class Jumps:
             at_stake = 0.0
         if at_stake is None and point is not None and self.mirror.is_broken(event.left, point.gaps):
             at_stake = 0.0
-        jump = self.states.jump(before, after, branch, at_stake, event.barrier)
+        jump = self.states.jump(before, after, direction, at_stake, event.barrier)
         misplaced = self.states.work(before, after, event.late)
         return ComputedJump(d, (before, after), jump, point, misplaced)
 
@@ -236,15 +233,15 @@ class Jumps:
                 touch, touches = self.first_touch()
                 if not (adhesive and self.states.attracts_when_detached(d, touch)):
                     return None
-                point = descend(self.nucleation.insert_seeds(np.empty((0, 2)), touches))
+                point = descend(self.nucleation.insert(np.empty((0, 2)), touches))
                 if point is None and not self.states.attracts_when_detached(d):
                     return None
                 continue
             least, minima = self.nucleation.minimum(point.field)
             if least > 0:
                 return point
-            seeds = self.nucleation.choose_seeds(minima)
-            grown = descend(self.nucleation.insert_seeds(point.gaps, seeds))
+            seeds = self.nucleation.choose(minima)
+            grown = descend(self.nucleation.insert(point.gaps, seeds))
             if self.has_gained(point, grown, seeds):
                 point = grown
             elif not self.nucleation.heal(seeds, d):
