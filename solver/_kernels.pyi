@@ -13,8 +13,6 @@ CLOSING_SHARE: float
 
 ELSEWHERE: float
 
-EQUAL: float
-
 SHAPE_NODES: float
 
 STEP_GROWTH: float
@@ -71,7 +69,7 @@ class PythonAdhesion(Adhesion):
 
 class EdgeLaw:
     @overload
-    def __init__(self, *, adhesion: Adhesion, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, rough_rate: float, force_error: float, highest: float) -> None: ...
+    def __init__(self, *, adhesion: Adhesion, critical: float, newton_tolerance: float, field_error: float, rest_step: float, longest_step: float, smallest: float, rough_rate: float, force_error: float) -> None: ...
 
     @overload
     def __init__(self, arg: EdgeLaw, /) -> None: ...

@@ -229,10 +229,9 @@ void bind_model(nb::module_& m) {
            "largest"_a, "work"_a, "work_up_to"_a);
   nb::class_<EdgeLaw>(m, "EdgeLaw")
       .def(nb::init<std::shared_ptr<const Adhesion>, double, double, double, double, double, double,
-                    double, double, double>(),
+                    double, double>(),
            nb::kw_only(), "adhesion"_a, "critical"_a, "newton_tolerance"_a, "field_error"_a,
-           "rest_step"_a, "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a,
-           "highest"_a)
+           "rest_step"_a, "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a)
       .def(nb::init<const EdgeLaw&>())
       .def_ro("critical", &EdgeLaw::critical)
       .def_ro("rest_step", &EdgeLaw::rest_step)
@@ -532,7 +531,6 @@ NB_MODULE(_kernels, m) {
   m.attr("COMPILER") = ADHESIS_COMPILER;
   m.attr("CLOSING_SHARE") = adhesis::CLOSING_SHARE;
   m.attr("ELSEWHERE") = adhesis::ELSEWHERE;
-  m.attr("EQUAL") = adhesis::EQUAL;
   m.attr("SHAPE_NODES") = adhesis::SHAPE_NODES;
   m.attr("STEP_GROWTH") = adhesis::STEP_GROWTH;
   m.attr("STEP_REDUCTION") = adhesis::STEP_REDUCTION;

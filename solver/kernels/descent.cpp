@@ -9,10 +9,8 @@ namespace adhesis {
 namespace {
 
 // Let the softest edge run where the others are not stable; false if all are held. It is sought
-// among the gaps of the smallest run of the tree that is not stable; of edges that are equally soft
-// it is the first to the right of the highest crest.
-bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolution& now,
-                 const EdgeLaw& law) {
+// among the gaps of the smallest run of the tree that is not stable.
+bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolution& now) {
   std::array<int, 2> range = {0, response.gap_count() - 1};
   for (const Run& run : response.tree.runs) {
     if (run.count.negative > 0) {
@@ -20,24 +18,16 @@ bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolu
       break;
     }
   }
-  Vector softness(runs.size(), -1.0);  // negative where an edge is held
+  int weakest = -1;
   double softest = -1;
   for (int e = 2 * range[0]; e < 2 * range[1] + 2; ++e) {
     const Edge& edge = response.edges[e];
     if (edge.held) continue;
     const double stiff = std::abs(edge.tangent[0]) + std::abs(edge.tangent[1]);
-    softness[e] = std::abs(now.by_pressure[e] / edge.closing_by_pressure) * stiff;
-    if (softness[e] > softest) softest = softness[e];
-  }
-  int weakest = -1;
-  double first = infinity;
-  for (int e = 0; e < int(softness.size()); ++e) {
-    if (softest < 0 || !(softness[e] >= (1 - EQUAL) * softest)) continue;
-    const double away = response.nodes.gaps[e / 2].end[e % 2] - law.highest;
-    const double right = away - 2 * pi * std::floor(away / (2 * pi));
-    if (right < first) {
+    const double soft = std::abs(now.by_pressure[e] / edge.closing_by_pressure) * stiff;
+    if (soft > softest) {
       weakest = e;
-      first = right;
+      softest = soft;
     }
   }
   if (weakest >= 0) runs[weakest] = true;
@@ -363,7 +353,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       }
     }
     const bool none = law.critical > 0 && out.steps > 1 && indices(runs).empty();
-    bool more = (none || !now.stable) && run_weakest(runs, response, now, law), is_cut = false;
+    bool more = (none || !now.stable) && run_weakest(runs, response, now), is_cut = false;
     if (!(now.stable || more)) {
       out.event = DescentEvent::no_field;
       break;

@@ -101,7 +101,6 @@ struct EdgeLaw {
   double smallest;          // narrower patches and gaps are removed
   double rough_rate;        // of an opening over a shortest wave, by roughness or by C_c
   double force_error;       // a force C_c² - C² this small is the error of the field
-  double highest;           // θ of the highest crest: of equal edges the first to its right leads
   Vector memory = {};       // ends at the last state; empty unless edges are pinned
 
   bool pins() const { return adhesion->pins; }

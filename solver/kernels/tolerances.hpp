@@ -91,10 +91,6 @@ inline constexpr double STEP_REDUCTION = 0.25;
 
 // ---------------------------------------------------------------- descent in energy
 
-// Share by which stiffnesses, amplitudes, rates and gains of energy of edges that are mirror images
-// may differ and count as equal: of equal edges the first one leads.
-inline constexpr double EQUAL = 1e-3;
-
 // C_c². Runners that take less force than this from each other do not race.
 inline constexpr double HELD_BACK = 0.03;
 

@@ -175,7 +175,6 @@ class EdgeMechanics:
             smallest=float(self.smallest),
             rough_rate=float(max(critical, np.sqrt(source.m2 * self.wave)) / self.wave),
             force_error=float(tolerance * critical**2),
-            highest=float(source.highest),
         )
         self.model = FieldModel(
             device=device,

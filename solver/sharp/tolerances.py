@@ -44,6 +44,13 @@ side of a separatrix: a loop (γ = 0.04, seed 1, accuracy 1e-5) lost 5e-5 less. 
 there, too, so that no race was flagged. With half of them the loss is wrong as well; with 0.3 and
 0.1 it is right."""
 
+# The way off a saddle.
+EQUAL = 1e-3
+"""Share by which stiffnesses, amplitudes, rates and gains of energy of edges that are mirror images
+may differ and count as equal: of equal edges the first one leads. So much of the largest stiffness
+a mode may have, too, that has softened at a fold: there the error of the field decides its sign,
+and with that losses of equal crests differed by up to 4 %."""
+
 # ---------------------------------------------------------------- nucleation
 
 OVERLAP = 1e-6

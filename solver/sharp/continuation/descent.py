@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from adhesis.solver._kernels import CLOSING_SHARE, EQUAL, DescentEvent, EdgeLaw
+from adhesis.solver._kernels import CLOSING_SHARE, DescentEvent, EdgeLaw
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.threads import one_thread
 from adhesis.solver.sharp.errors import FullContact, NoState
@@ -26,6 +26,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     ENDLESS,
+    EQUAL,
     FINER_STEPS,
     OTHER_MINIMUM,
     RESTS,
@@ -169,9 +170,12 @@ class Descents:
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
-    def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
+    def ways_off_saddle(
+        self, gaps: Array, prescribed: float, law: EdgeLaw, at_fold: bool = False
+    ) -> list[Array]:
         """Move edges without force off a saddle of the energy; an empty list where they are stable.
 
+        Near a fold (``at_fold``) edges with a mode that has softened count as not stable.
         Both directions along the softest modes are tried. That on which the force is larger is the
         first, of equal ones that in which the leading edge goes outwards. Where energy rises on
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
@@ -184,7 +188,7 @@ class Descents:
         by_edge = near.opening[free, None] * tangent
         limit = step_limits(gaps, law.longest_step)[free]
         order = positions(gaps, edges.source.highest)[free]
-        found = leaving_step(by_edge + by_edge.T, limit, order)
+        found = leaving_step(by_edge + by_edge.T, limit, order, EQUAL if at_fold else 0.0)
         if found is None:
             return []
         step = np.zeros(gaps.size)
@@ -237,7 +241,7 @@ class Descents:
         return move_edges(gaps, step)
 
 
-def leaving_step(hessian: Array, limit: Array, order: Array) -> Array | None:
+def leaving_step(hessian: Array, limit: Array, order: Array, balanced: float = 0.0) -> Array | None:
     """Step off a saddle, along its softest modes, up to the limit of an edge; None off a minimum.
 
     One edge leads, outwards; it is the one that moves most freely in these modes, of equal ones the
@@ -246,9 +250,10 @@ def leaving_step(hessian: Array, limit: Array, order: Array) -> Array | None:
     """
     with one_thread():
         values, vectors = np.linalg.eigh(hessian)
-    if not values[0] < 0:
+    largest = np.abs(values).max()
+    if not values[0] < balanced * largest:
         return None
-    soft = vectors[:, values <= min(values[0] + EQUAL * np.abs(values).max(), 0.0)]
+    soft = vectors[:, values <= min(values[0] + EQUAL * largest, balanced * largest)]
     freedom = (soft**2).sum(axis=1)
     equal = np.flatnonzero(freedom > (1 - EQUAL) * freedom.max())
     step = soft @ soft[equal[np.argmin(order[equal])]]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.solver._kernels import EQUAL, SearchedGaps
+from adhesis.solver._kernels import SearchedGaps
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
@@ -32,7 +32,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.crack import Crack, Cracks
 from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation, Touch, locate
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import SECOND_FOLD_DISPLACED
+from adhesis.solver.sharp.tolerances import EQUAL, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 
@@ -305,7 +305,7 @@ class Follower:
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
             ways = self.jumps.descents.ways_off_saddle(
-                saddle.gaps, fold.d, self.edges.law_at(point.gaps)
+                saddle.gaps, fold.d, self.edges.law_at(point.gaps), at_fold=True
             )
             if ways:
                 return ways[0], EventOrders(fold.d, tuple(ways))
