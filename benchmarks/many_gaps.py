@@ -21,9 +21,8 @@ import numpy as np
 from adhesis.solver._kernels import FieldModel, set_up_response, solve_field
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.runtime.malloc import keep_freed
-from adhesis.solver.sharp.edge_problem import FIXED_SEPARATION
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import FIXED_SEPARATION, EdgeMechanics
 
 _TOUGHNESS = 1e-3  # critical opening: that of edges which are hardly in balance
 

@@ -7,11 +7,11 @@ loading path, the energy audit and the catalogue of jumps (:mod:`adhesis.solver.
 To add a method, subclass :class:`Method` and keep these promises:
 
 1.  ``detached(s)`` is the state without contact at separation s ≥ h_max.
-2.  ``follow(state, s)`` takes one of the method's equilibrium states to the prescribed value s (a
-    separation; s - p̄/k with a stiffness k, -p̄ under a load) along the quasi-static path and
-    returns every visited state in order, the last one at s.
-    The direction is free: s below the state's separation loads, above it unloads, and at the same
-    separation the state only settles (first touch at s = h_max is such a case).
+2.  ``follow(state, x)`` takes one of the method's equilibrium states to the prescribed value x (a
+    separation s; s - p̄/k with a stiffness k, -p̄ under a load) along the quasi-static path and
+    returns every visited state in order, the last one at x.
+    The direction is free: x below the state's own loads, above it unloads, and at the same
+    value the state only settles (first touch at s = h_max is such a case).
 3.  The path obeys the rules of evolution (docs/methods.md): contact nucleates only where surfaces
     touch, or come as near as adhesion reaches (``Problem.attraction_range``); it grows and recedes
     by energy descent at a fixed prescribed value, never over an energy maximum, never leaping over
@@ -264,8 +264,8 @@ class Method(NotebookDisplay, ABC):
         )
 
     @abstractmethod
-    def follow(self, state: ContactState, separation: float) -> Path:
-        """Follow the quasi-static path to the prescribed value ``separation``: m, or -p̄ in Pa."""
+    def follow(self, state: ContactState, prescribed: float) -> Path:
+        """Follow the quasi-static path to a prescribed value: s or s - p̄/k in m, or -p̄ in Pa."""
 
     @abstractmethod
     def fields(self, state: ContactState, n: int) -> Fields:

@@ -16,7 +16,6 @@
 #include "descent.hpp"
 #include "edge_model.hpp"
 #include "grid.hpp"
-#include "newton.hpp"
 #include "predictor.hpp"
 
 namespace nb = nanobind;
@@ -415,7 +414,7 @@ void bind_response(nb::module_& m) {
 void bind_nucleation(nb::module_& m) {
   nb::class_<SearchLengths>(m, "SearchLengths")
       .def(nb::init<double, double, double, double, double, double>(), nb::kw_only(), "wave"_a,
-           "closing_per_motion"_a, "surface"_a, "narrowest"_a, "widest"_a, "range"_a)
+           "closing_per_motion"_a, "surface"_a, "narrowest"_a, "longest_step"_a, "range"_a)
       .def(
           "seed_widths",
           [](const SearchLengths& lengths, Vector curvature) {
@@ -460,30 +459,25 @@ void bind_nucleation(nb::module_& m) {
 }
 
 void bind_predictor(nb::module_& m) {
-  nb::class_<TwoPoints>(m, "TwoPoints")
-      .def(nb::init<Vector, Vector, Vector, Vector, double>(), "gaps"_a, "rate"_a, "gaps_before"_a,
-           "rate_before"_a, "way"_a)
-      .def("leading_edge", &leading_edge)
-      .def("other_fold", &other_fold, "leading"_a)
+  nb::class_<FoldAhead>(m, "FoldAhead")
+      .def_ro("edge", &FoldAhead::edge)
+      .def_ro("distance", &FoldAhead::distance);
+  nb::class_<Predictor>(m, "Predictor")
+      .def(nb::init<double, Vector, Vector, std::optional<std::tuple<double, Vector, Vector>>>(),
+           "d"_a, "gaps"_a, "rate"_a, "before"_a.none(),
+           "Predict beyond a point of a branch; `before` are d, rates and gaps at the one before.")
+      .def_ro("d", &Predictor::d)
+      .def_prop_ro(
+          "gaps", [](const Predictor& p) { return pairs_of(p.ends); }, new_array)
+      .def_prop_ro("rate", [](const Predictor& p) { return p.rate; })
+      .def_ro("way", &Predictor::way)
+      .def_ro("fold", &Predictor::fold)
+      .def("other_fold", &Predictor::other_fold)
       .def(
           "predict_gaps",
-          [](const TwoPoints& points, double on, const LeadingEdge& leading) {
-            return pairs_of(predict_ends(points, on, leading));
-          },
-          "on"_a, "leading"_a, "Predict the gaps at a distance `on` in d.");
-  nb::class_<LeadingEdge>(m, "LeadingEdge")
-      .def_ro("edge", &LeadingEdge::edge)
-      .def_ro("fastest", &LeadingEdge::fastest)
-      .def_ro("gone", &LeadingEdge::gone)
-      .def_ro("here", &LeadingEdge::here)
-      .def_ro("square", &LeadingEdge::square)
-      .def_ro("cube", &LeadingEdge::cube)
-      .def_ro("fold", &LeadingEdge::fold)
-      .def_ro("fold_distance", &LeadingEdge::fold_distance);
-  nb::class_<OtherFold>(m, "OtherFold")
-      .def(nb::init<>())
-      .def_ro("edge", &OtherFold::edge)
-      .def_ro("distance", &OtherFold::distance);
+          [](const Predictor& p, double at) { return pairs_of(p.predict_ends(at)); }, "at"_a)
+      .def("reach", &Predictor::reach, "most"_a, "finest"_a)
+      .def("across", &Predictor::across, "distance"_a, "finest"_a);
 }
 
 void bind_grid(nb::module_& m) {
@@ -536,8 +530,7 @@ NB_MODULE(_kernels, m) {
   m.doc() = "Kernels of the methods sharp and grid.";
   m.attr("COMPILER") = ADHESIS_COMPILER;
   m.attr("CLOSING_SHARE") = adhesis::CLOSING_SHARE;
-  m.attr("COMPARABLE") = adhesis::COMPARABLE;
-  m.attr("PREDICTION_TRUSTED") = adhesis::PREDICTION_TRUSTED;
+  m.attr("ELSEWHERE") = adhesis::ELSEWHERE;
   m.attr("SHAPE_NODES") = adhesis::SHAPE_NODES;
   m.attr("STEP_GROWTH") = adhesis::STEP_GROWTH;
   m.attr("STEP_REDUCTION") = adhesis::STEP_REDUCTION;

@@ -18,7 +18,7 @@ Vector low_openings(const Field& field, int k, const GaussRule& rule) {
 double clearance_since(const Field& field, int k, const SearchedGap& was,
                        const SearchLengths& lengths, const GaussRule& rule) {
   const Gap& gap = field.nodes.gaps[k];
-  const double furthest = COMPARABLE * lengths.wave;
+  const double furthest = ELSEWHERE * lengths.longest_step;
   const double begin = gap.end[0] - was.end[0], end = gap.end[1] - was.end[1];
   if (std::abs(begin) > furthest || std::abs(end) > furthest || field.nodes.orders[k] != was.order)
     return -1;
@@ -61,7 +61,7 @@ double clearance_since(const Field& field, int k, const SearchedGap& was,
 
 double seed_width(double curvature, const SearchLengths& lengths) {
   const double first = std::pow(16 * lengths.surface / (pi * curvature * curvature), 1.0 / 3);
-  return std::min(std::max(0.5 * first, lengths.narrowest), lengths.widest);
+  return std::min(std::max(0.5 * first, lengths.narrowest), lengths.longest_step);
 }
 
 double clearance_of(const Minimum& minimum, const SearchLengths& lengths) {
@@ -82,7 +82,7 @@ Search search(const Field& field, const SearchedGaps& searched, const SearchLeng
   Integers again;  // the gaps that have to be searched
   size_t before = 0;
   for (int k = 0; k < count; ++k) {
-    const double least = nodes.gaps[k].end[0] - COMPARABLE * lengths.wave;
+    const double least = nodes.gaps[k].end[0] - ELSEWHERE * lengths.longest_step;
     while (before < searched.size() && searched[before]->end[0] < least) ++before;
     double left = -1;
     if (before < searched.size())

@@ -26,7 +26,8 @@ struct SearchLengths {
   double wave;                // λ_min
   double closing_per_motion;  // closing beside an edge over the motion of the edge
   double surface;             // Γ
-  double narrowest, widest;   // of a seed
+  double narrowest;           // of a seed
+  double longest_step;        // of an edge, and the widest seed
   double range;               // gap from which on surfaces attract each other
 };
 

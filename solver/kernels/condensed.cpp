@@ -75,7 +75,7 @@ double opening_change(const LinearResponse& response, int e, const Vector& motio
   const int k = e / 2, first = response.nodes.offset[k];
   const auto& tangent = response.edges[e].tangent;
   return tangent[0] * motion[2 * k] + tangent[1] * motion[2 * k + 1] -
-         dot(&response.opening_by_potential[e % 2][first], potential, response.nodes.size_of(k));
+         dot(&response.closing_by_potential[e % 2][first], potential, response.nodes.size_of(k));
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ Vector HeldEdges::residual() const {
                   now_.pressure * response_.potential[1][first + i] - response_.about[first + i];
     const Edge& edge = response_.edges[e];
     out.push_back(edge.residual + opening_change(response_, e, now_.motion, change.data()) -
-                  edge.opening_by_pressure * (now_.pressure - response_.about_pressure[k]));
+                  edge.closing_by_pressure * (now_.pressure - response_.about_pressure[k]));
   }
   return out;
 }
@@ -98,7 +98,7 @@ Vector HeldEdges::residual() const {
 Vector HeldEdges::closing_by_pressure() const {
   Vector out;
   for (int e : edges_)
-    out.push_back(response_.edges[e].opening_by_pressure -
+    out.push_back(response_.edges[e].closing_by_pressure -
                   opening_change(response_, e, now_.by_pressure,
                                  &response_.potential[1][response_.nodes.offset[e / 2]]));
   return out;

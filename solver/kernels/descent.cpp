@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "cholesky.hpp"
+
 namespace adhesis {
 
 namespace {
@@ -22,7 +24,7 @@ bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolu
     const Edge& edge = response.edges[e];
     if (edge.held) continue;
     const double stiff = std::abs(edge.tangent[0]) + std::abs(edge.tangent[1]);
-    const double soft = std::abs(now.by_pressure[e] / edge.opening_by_pressure) * stiff;
+    const double soft = std::abs(now.by_pressure[e] / edge.closing_by_pressure) * stiff;
     if (soft > softest) {
       weakest = e;
       softest = soft;
@@ -52,7 +54,7 @@ bool run_far(Flags& runs, const LinearResponse& response, const Vector& way, con
   bool more = false;
   for (int e = 0; e < int(runs.size()); ++e) {
     // written so that NaN is too far
-    bool near = std::abs(way[e]) <= FURTHEST_FOLLOWING * law.longest_step;
+    bool near = std::abs(way[e]) <= ELSEWHERE * law.longest_step;
     if (law.pins()) {
       const double gone = way_from_memory(e, ends[e], law);
       near = near && gone * (gone + way[e]) >= 0;
@@ -84,6 +86,121 @@ EdgeStates held_edges(const Flags& runs, const Vector& ends, const EdgeLaw& law)
   for (int e = 0; e < count; ++e)
     if (runs[e]) some[e] = some[(e + 1) % count] = some[(e + count - 1) % count] = true;
   return out;
+}
+
+// Find the share of a step that keeps every motion within its limit.
+double share_within(const EdgeModel& model, const Vector& step, const Vector& limit) {
+  double share = 1;
+  for (size_t e = 0; e < step.size(); ++e) {
+    const double towards = step[e] < 0 ? -1 : 1;
+    const double left = limit[e] - towards * model.edges[e].motion;
+    if (std::abs(step[e]) > left) share = std::min(share, left / std::abs(step[e]));
+  }
+  return share;
+}
+
+// Shorten steps that lead across the memory: there an edge may be pinned. From there it moves with
+// its force only.
+void stop_at_memory(const EdgeModel& model, const Vector& force, Vector& step, const EdgeLaw& law) {
+  for (size_t c = 0; c < step.size(); ++c) {
+    const double way = way_from_memory(model.edges[c].edge, model.edges[c].theta, law);
+    if (way == 0) {
+      if (step[c] * force[c] <= 0) step[c] = 0;
+    } else if (way * (way + step[c]) < 0) {
+      step[c] = -way;
+    }
+  }
+}
+
+// Flow through the model.
+struct ModelFlow {
+  Vector motion;                  // outward motion of the contact at every edge
+  Vector opening;                 // C of the model at the end
+  Vector lengths;                 // largest motion up to each step
+  std::vector<Vector> residuals;  // C - C_c of the model after each step
+  bool is_at_limit = false;       // whether an edge came to its limit
+};
+
+// Whether forces that were as large as `strongest` have come near a minimum or saddle.
+bool near_balance(double force, double strongest, const EdgeLaw& law) {
+  const double small = NEAR_BALANCE * law.critical * law.critical;
+  return force < small && FORCES_FELL * force < strongest;
+}
+
+// Follow the flow ṅ = C_c² - C² by linearly implicit Euler steps, (1/Δτ + H) Δn = force, until an
+// edge is at its limit, or at rest; a long step, or near balance. `strongest` is the largest norm
+// of the forces on the way so far. A short step ends where the forces have fallen, too: how far a
+// shallow minimum is from a saddle only the field shows. With equal speeds, for comparison, the
+// time Δτ is each edge's own.
+ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds, bool is_long,
+                       double strongest, const EdgeLaw& law) {
+  const int count = int(model.edges.size());
+  ModelFlow out;
+  const double longest = (is_long ? 1 : MODEL_SHORT_STEP) * law.longest_step;
+  double length = 0, share = 1, first = 0, shortest = law.rest_step;
+  for (double own : limit) shortest = std::min(shortest, law.rest_step * own / law.longest_step);
+  while (share == 1) {
+    const Vector force = model.forces();
+    const double total = norm(force);
+    strongest = std::max(strongest, total);
+    first = std::max(first, total);
+    if (is_long ? near_balance(total, strongest, law) : FORCES_FELL * total < first) break;
+    const Matrix hessian = model.hessian();
+    Vector step = implicit_step(hessian, force, longest, equal_speeds);
+    if (law.pins()) stop_at_memory(model, force, step, law);
+    if (!(largest(step) > shortest) && (distance_to_minimum(hessian, force) <= shortest ||
+                                        total < law.force_error || largest(step) == 0))
+      break;
+    share = share_within(model, step, limit);
+    if (share < 1)
+      for (double& motion : step) motion *= share;
+    model.advance(step);
+    Vector residual(count);
+    for (int e = 0; e < count; ++e) {
+      residual[e] = model.edges[e].opening - model.edges[e].critical;
+      length = std::max(length, std::abs(model.edges[e].motion));
+    }
+    out.residuals.push_back(residual);
+    out.lengths.push_back(length);
+  }
+  for (const MovingEdge& edge : model.edges) {
+    out.motion.push_back(edge.motion);
+    out.opening.push_back(edge.opening);
+  }
+  out.is_at_limit = share < 1;
+  return out;
+}
+
+// Measure by how much the openings of the model are wrong at the end of a long step, in units of
+// what is allowed.
+//
+// `residual` is C - C_c of the field there. On the way the errors are taken to grow as the square
+// of its length, and far from balance more is allowed.
+double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
+                   const Vector& ends, const EdgeLaw& law) {
+  double worst = 0;
+  for (size_t e = 0; e < residual.size(); ++e) {
+    const double critical = critical_opening(ends[edges[e]], law).value;
+    const double at_end = std::abs(residual[e] + critical - flow.opening[e]);
+    for (size_t i = 0; i < flow.lengths.size(); ++i) {
+      const double share = flow.lengths[i] / flow.lengths.back();
+      const double error = share * share * at_end;
+      const double unbalance = std::max(std::abs(flow.residuals[i][e]) - error, 0.0);
+      const double allowed = MODEL_ERROR * law.critical + MODEL_SHARE * unbalance;
+      // not written as > : an error that is no number is too large
+      if (!(error <= worst * allowed)) worst = error / allowed;
+    }
+  }
+  return worst;
+}
+
+// Choose the next reach after a long step of this length, in longest steps, and error.
+double next_reach(double before, double length, double error) {
+  const double safe = REACH_SAFETY / std::sqrt(std::max(error, 1e-9));
+  const double factor = std::min(STEP_GROWTH, std::max(STEP_REDUCTION, safe));
+  double reach = length * factor;
+  if (error <= 1) reach = std::max(reach, factor >= 1 ? before : 0.0);
+  return reach;
 }
 
 // Let held edges flow through the model; `strongest` is the largest norm of forces so far.
@@ -143,6 +260,39 @@ bool may_race(const Integers& edges, const Matrix& tangent, const Vector& start,
 }
 
 }  // namespace
+
+double distance_to_minimum(const Matrix& hessian, const Vector& force) {
+  Matrix factor = hessian;
+  if (!factor_rows(factor.values.data(), factor.n, factor.n)) return infinity;
+  Vector step = force;
+  solve_column(factor.values.data(), factor.n, factor.n, step.data());
+  return largest(step);
+}
+
+Vector implicit_step(const Matrix& hessian, const Vector& force, double longest,
+                     bool equal_speeds) {
+  const int n = hessian.n;
+  const double strongest = largest(force);
+  Vector step(n);
+  for (double growth = 1 / longest; growth < infinity;) {
+    Matrix factor = hessian;
+    for (int e = 0; e < n; ++e) {
+      double own = equal_speeds ? std::max(std::abs(force[e]), SLOWEST * strongest) : strongest;
+      factor(e, e) += growth * own;
+    }
+    if (!factor_rows(factor.values.data(), n, n)) {
+      growth /= STEP_REDUCTION;
+      continue;
+    }
+    step = force;
+    solve_column(factor.values.data(), n, n, step.data());
+    const double size = largest(step);
+    if (size <= longest) break;
+    for (double& motion : step) motion *= longest / size;
+    growth *= std::min(1 / STEP_REDUCTION, 1.1 * size / longest);
+  }
+  return step;
+}
 
 Descent descend(LinearResponse& response, Vector ends, const Vector& start, double prescribed,
                 int most_steps, bool equal_speeds, const EdgeLaw& law, const Model& model) {

@@ -10,7 +10,7 @@
 #pragma once
 
 #include "edge_model.hpp"
-#include "renewal.hpp"
+#include "equilibrium.hpp"
 
 namespace adhesis {
 
@@ -36,5 +36,16 @@ struct Descent {
 // the longest step.
 Descent descend(LinearResponse& response, Vector ends, const Vector& start, double prescribed,
                 int most_steps, bool equal_speeds, const EdgeLaw& law, const Model& model);
+
+// Take a linearly implicit step, (1/Δτ + H) Δn = force, in which no edge moves further than
+// `longest`.
+//
+// The time Δτ is that in which the largest force alone would move its edge so far; with equal
+// speeds every edge has its own time, in which its own force would. It is less where 1/Δτ + H is
+// not positive definite: the step would not be downhill.
+Vector implicit_step(const Matrix& hessian, const Vector& force, double longest, bool equal_speeds);
+
+// Compute the largest motion to the minimum of a quadratic model; infinite without one.
+double distance_to_minimum(const Matrix& hessian, const Vector& force);
 
 }  // namespace adhesis

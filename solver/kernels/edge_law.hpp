@@ -5,10 +5,10 @@
 //
 // The contract
 // ------------
-// A law is an `Adhesion`. It states for a place θ of the profile the work of adhesion w of an edge
-// that advances there and of one that recedes, each with its slope, and both integrals; w is that
-// of a projected length over the γ of the problem, which is a unit and nothing else. All the rest
-// follows from it, and field, flow and continuation ask for no other threshold:
+// A law of adhesion is an `Adhesion`. It states for a place θ of the profile the work of adhesion w
+// of an edge that advances there and of one that recedes, each with its slope, and both integrals;
+// w is that of a projected length over the γ of the problem, which is a unit and nothing else. All
+// the rest follows from it, and field, flow and continuation ask for no other threshold:
 //
 // - threshold: an edge moves where its opening C is C_c = critical sqrt(w), Griffith's condition.
 //   Its slope ∂C_c/∂θ is part of the tangent of its gap, hence of stability and folds, and of the
@@ -22,8 +22,8 @@
 // - energy: that of the contact is the integral of w of advancing edges over its patches. An edge
 //   that recedes dissipates the integral of the difference: friction, in a column of its own.
 //
-// What a law has to keep. Points 1 to 3 of a law of one's own are checked at some places,
-// before a path is followed (adhesion.py):
+// What a law of adhesion has to keep. Points 1 to 3 of a law of one's own are checked at some
+// places, before a path is followed (adhesion.py):
 //
 // 1. w is positive, of period 2π, and smooth over the shortest wave that `StressSource.top` states:
 //    steps of a descent are a twentieth of that wave, and predictors are of third order.

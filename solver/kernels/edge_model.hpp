@@ -62,46 +62,4 @@ class EdgeModel {
   void follow_lengths(const Vector& step);
 };
 
-// Take a linearly implicit step, (1/Δτ + H) Δn = force, in which no edge moves further than
-// `longest`.
-//
-// The time Δτ is that in which the largest force alone would move its edge so far; with equal
-// speeds every edge has its own time, in which its own force would. It is less where 1/Δτ + H is
-// not positive definite: the step would not be downhill.
-Vector implicit_step(const Matrix& hessian, const Vector& force, double longest, bool equal_speeds);
-
-// Compute the largest motion to the minimum of a quadratic model; infinite without one.
-double distance_to_minimum(const Matrix& hessian, const Vector& force);
-
-// Flow through the model.
-struct ModelFlow {
-  Vector motion;                  // outward motion of the contact at every edge
-  Vector opening;                 // C of the model at the end
-  Vector lengths;                 // largest motion up to each step
-  std::vector<Vector> residuals;  // C - C_c of the model after each step
-  bool is_at_limit = false;       // whether an edge came to its limit
-};
-
-// Follow the flow ṅ = C_c² - C² by linearly implicit Euler steps, (1/Δτ + H) Δn = force, until an
-// edge is at its limit, or at rest; a long step, or near balance. `strongest` is the largest norm
-// of the forces on the way so far. A short step ends where the forces have fallen, too: how far a
-// shallow minimum is from a saddle only the field shows. With equal speeds, for comparison, the
-// time Δτ is each edge's own.
-ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds, bool is_long,
-                       double strongest, const EdgeLaw& law);
-
-// Whether forces that were as large as `strongest` have come near a minimum or saddle.
-bool near_balance(double force, double strongest, const EdgeLaw& law);
-
-// Measure by how much the openings of the model are wrong at the end of a long step, in units of
-// what is allowed.
-//
-// `residual` is C - C_c of the field there. On the way the errors are taken to grow as the square
-// of its length, and far from balance more is allowed.
-double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
-                   const Vector& ends, const EdgeLaw& law);
-
-// Choose the next reach after a long step of this length, in longest steps, and error.
-double next_reach(double before, double length, double error);
-
 }  // namespace adhesis

@@ -5,17 +5,17 @@ namespace adhesis {
 namespace {
 
 // Subtract the first modes of a gap from the loads of its ends.
-EndTerms subtract_modes(const Vector& s, int modes, int fields, const EndTerms& ends) {
+EndTerms subtract_modes(const Vector& s, int modes, int load_count, const EndTerms& ends) {
   EndTerms out = {};
-  for (int field = 0; field < fields; ++field) {
+  for (int which = 0; which < load_count; ++which) {
     double low = 0, high = 0, sign = 1;
     for (int n = 0; n < modes; ++n) {
-      high += s[field * modes + n];
-      low += sign * s[field * modes + n];
+      high += s[which * modes + n];
+      low += sign * s[which * modes + n];
       sign = -sign;
     }
-    out[0][field] = ends[0][field] - low;
-    out[1][field] = ends[1][field] - high;
+    out[0][which] = ends[0][which] - low;
+    out[1][which] = ends[1][which] - high;
   }
   return out;
 }
@@ -84,17 +84,17 @@ Equations allocate_equations(const Nodes& nodes) {
           std::vector<EndTerms>(nodes.gap_count())};
 }
 
-WIDE void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model& model) {
+WIDE void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations, const Model& model) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
-  Vector s(m * fields);
+  Vector s(m * load_count);
   EndTerms ends = {};
-  gap_moments(nodes.gaps[k], *model.panels, m, fields, s.data(), ends);
-  equations.end_terms[k] = subtract_modes(s, m, fields, ends);
+  gap_moments(nodes.gaps[k], *model.panels, m, load_count, s.data(), ends);
+  equations.end_terms[k] = subtract_modes(s, m, load_count, ends);
   fill_nodes(k, rule, nodes);
-  for (int field = 0; field < fields; ++field) {
-    double* load = (field == 0 ? equations.load : equations.load_of_slope).data() + first;
-    apply(rule.modes.data(), m, m, &s[field * m], nullptr, load);
+  for (int which = 0; which < load_count; ++which) {
+    double* load = (which == 0 ? equations.load : equations.load_of_slope).data() + first;
+    apply(rule.modes.data(), m, m, &s[which * m], nullptr, load);
     for (int i = 0; i < m; ++i) load[i] *= rule.weights[i];
   }
   fill_block(nodes.gaps[k], &nodes.inset[first], &nodes.weight[first], rule,

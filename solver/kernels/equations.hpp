@@ -32,7 +32,7 @@ struct Nodes {
 };
 
 // Of S and S': a value for each end of a gap.
-using EndTerms = std::array<std::array<double, 2>, 2>;  // [side][field]
+using EndTerms = std::array<std::array<double, 2>, 2>;  // [side][load]
 
 // Diagonal blocks of B + G, flat, and loads; X is the weight of the nodes.
 struct Equations {
@@ -44,7 +44,7 @@ struct Equations {
 Equations allocate_equations(const Nodes& nodes);
 
 // Fill in nodes, block and loads of gap k, of S alone or also of S'.
-void fill_gap(int k, int fields, Nodes& nodes, Equations& equations, const Model& model);
+void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations, const Model& model);
 
 // Load on the own gap, and charges, of the singular opening that an edge leaves when it moves;
 // `density` is space for the nodes of the gap.

@@ -71,8 +71,8 @@ Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equat
   return out;
 }
 
-SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders, int fields,
-                        const Model& model) {
+SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders,
+                        int load_count, const Model& model) {
   const std::vector<GaussRule>& rules = gauss_rules();
   std::vector<Gap> gaps = map_gaps(ends);
   const int count = int(gaps.size());
@@ -84,14 +84,14 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
   }
   SolvedField out{Field(model), {}};
   Field& field = out.field;
-  const double room = fields == 2 ? ROOM : 1;
+  const double room = load_count == 2 ? ROOM : 1;
   field.nodes = Nodes(gaps, orders, room);
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
   const int n = nodes.size();
   out.factored.inverse.resize(nodes.square.back());
   for (int k = 0; k < count; ++k) {
-    fill_gap(k, fields, field.nodes, field.equations, model);
+    fill_gap(k, load_count, field.nodes, field.equations, model);
     const int at = nodes.square[k];
     solvable &=
         invert_definite(&field.equations.blocks[at], nodes.size_of(k), &out.factored.inverse[at]);

@@ -36,10 +36,10 @@ struct SolvedField {
   FactoredGaps factored;
 };
 
-// Solve the field of gaps with these ends; with two fields the loads of S' are computed, too, and
+// Solve the field of gaps with these ends; with two loads those of S' are computed, too, and
 // there is room for more nodes.
-SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders, int fields,
-                        const Model& model);
+SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders,
+                        int load_count, const Model& model);
 
 // Solve every gap by itself in the potential of the others, G = g dθ/dη at the nodes of nearby
 // gaps. The pressure is corrected, so that d has the prescribed value to rounding.

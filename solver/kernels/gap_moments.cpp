@@ -21,11 +21,11 @@ constexpr double surely_smooth = 2.0;    // modes·length/distance of a panel th
 struct MomentNodes {
   std::array<Vector, 2> from_end;  // 1 + η and 1 - η: η measured from the left and the right end
   std::array<Vector, 2> source;
-  int fields, count;
+  int load_count, count;
 
   // Begin anew, with room for as many nodes.
-  void begin(int most, int of_fields) {
-    fields = of_fields;
+  void begin(int most, int of_loads) {
+    load_count = of_loads;
     count = 0;
     for (auto* part : {&from_end, &source})
       for (Vector& values : *part) values.resize(std::max(values.size(), size_t(most)));
@@ -93,7 +93,7 @@ WIDE void place_end_piece(const Gap& gap, int side, double length, const Panels&
       farther[i] = 2 - nearer[i];
       position[i] = origin + per * r[i];
     }
-    if (nodes.fields > 1) {
+    if (nodes.load_count > 1) {
       interpolate(panels.slope, position, rule, panels, value);
       for (int i = 0; i < rule; ++i) nodes.source[1][nodes.count + i] = weight[i] * value[i];
     }
@@ -168,22 +168,22 @@ WIDE void place_tiles(const Gap& gap, const std::vector<Tile>& tiles, const Pane
       nearer[i] = distance + 2 * z * artanh_over(z * z) * scale;
     }
     for (int i = 0; i < p; ++i) farther[i] = 2 - nearer[i];
-    for (int field = 0; field < nodes.fields; ++field) {
-      const double* weights = &panels.weights[field][tile.row * p];
-      for (int i = 0; i < p; ++i) nodes.source[field][nodes.count + i] = weights[i];
+    for (int which = 0; which < nodes.load_count; ++which) {
+      const double* weights = &panels.weights[which][tile.row * p];
+      for (int i = 0; i < p; ++i) nodes.source[which][nodes.count + i] = weights[i];
     }
     nodes.count += p;
   }
 }
 
 // Place Gauss-Chebyshev nodes of the first kind in η, which serve s_n and s^± alike.
-void place_short_gap(const Gap& gap, int modes, int fields, const Panels& panels,
+void place_short_gap(const Gap& gap, int modes, int load_count, const Panels& panels,
                      MomentNodes& nodes) {
   const ShortRule* rule = &panels.short_rule;
   const int count = std::max(int(rule->eta.size()), 2 * modes);
   ShortRule longer(count > int(rule->eta.size()) ? count : 0);
   if (!longer.eta.empty()) rule = &longer;
-  nodes.begin(count + 4, fields);
+  nodes.begin(count + 4, load_count);
   Vector theta(count), theta_by_t(count), value(count);
   place_nodes(gap, rule->eta, rule->sine, theta.data(), theta_by_t.data());
   for (int i = 0; i < count; ++i) {
@@ -192,23 +192,24 @@ void place_short_gap(const Gap& gap, int modes, int fields, const Panels& panels
     theta[i] /= panels.width;
     theta_by_t[i] *= pi / count;
   }
-  for (int field = 0; field < fields; ++field) {
-    interpolate(field == 0 ? panels.stress : panels.slope, theta.data(), count, panels,
+  for (int which = 0; which < load_count; ++which) {
+    interpolate(which == 0 ? panels.stress : panels.slope, theta.data(), count, panels,
                 value.data());
-    for (int i = 0; i < count; ++i) nodes.source[field][i] = theta_by_t[i] * value[i];
+    for (int i = 0; i < count; ++i) nodes.source[which][i] = theta_by_t[i] * value[i];
   }
   nodes.count = count;
 }
 
-void place_moment_nodes(const Gap& gap, int modes, int fields, const Panels& panels,
+void place_moment_nodes(const Gap& gap, int modes, int load_count, const Panels& panels,
                         MomentNodes& nodes) {
   const double width = panels.width;
   long first = long(std::floor(gap.end[0] / width)) + 2;  // end pieces are one to two panels long
   long last = long(std::ceil(gap.end[1] / width)) - 2;
-  if (last < first) return place_short_gap(gap, modes, fields, panels, nodes);  // they would meet
+  if (last < first)
+    return place_short_gap(gap, modes, load_count, panels, nodes);  // they would meet
   std::vector<Tile> tiles = tile_gap(gap, first, last, modes, panels);
   const int most = most_end_nodes(gap, panels) + int(tiles.size()) * panels.nodes();
-  nodes.begin(most + 4, fields);
+  nodes.begin(most + 4, load_count);
   place_end_piece(gap, 0, double(first) * width - gap.end[0], panels, nodes);
   place_end_piece(gap, 1, gap.end[1] - double(last) * width, panels, nodes);
   place_tiles(gap, tiles, panels, nodes);
@@ -218,16 +219,16 @@ void place_moment_nodes(const Gap& gap, int modes, int fields, const Panels& pan
 
 }  // namespace
 
-WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
+WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int load_count, double* s,
                       std::array<std::array<double, 2>, 2>& ends) {
   thread_local MomentNodes nodes;  // kept, as gaps of many sizes follow each other
-  place_moment_nodes(gap, modes, fields, panels, nodes);
+  place_moment_nodes(gap, modes, load_count, panels, nodes);
   for (; nodes.count % 4 != 0; ++nodes.count) {  // whole vectors, the last ones without weight
     nodes.from_end[0][nodes.count] = nodes.from_end[1][nodes.count] = 1;
-    for (int field = 0; field < fields; ++field) nodes.source[field][nodes.count] = 0;
+    for (int which = 0; which < load_count; ++which) nodes.source[which][nodes.count] = 0;
   }
   // sin((n+1)t), cos t = η, by its recurrence; four nodes at a time, for all modes
-  Vector total(8 * modes);  // four of each field
+  Vector total(8 * modes);  // four of each load
   Four low[2] = {}, high[2] = {};
   for (int i = 0; i < nodes.count; i += 4) {
     const Four minus = load_four(&nodes.from_end[1][i]), plus = load_four(&nodes.from_end[0][i]);
@@ -238,26 +239,26 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int field
       now[lane] = std::sqrt(product[lane]);
       twice[lane] = 2 * FromEnds{minus[lane], plus[lane]}.eta();
     }
-    for (int field = 0; field < fields; ++field) {
-      source[field] = load_four(&nodes.source[field][i]);
-      const Four share = source[field] / (now * pi);
-      low[field] += share * minus;
-      high[field] += share * plus;
+    for (int which = 0; which < load_count; ++which) {
+      source[which] = load_four(&nodes.source[which][i]);
+      const Four share = source[which] / (now * pi);
+      low[which] += share * minus;
+      high[which] += share * plus;
     }
     for (int n = 0; n < modes; ++n) {
       double* sums = &total[8 * n];
       store_four(load_four(sums) + source[0] * now, sums);
-      if (fields > 1) store_four(load_four(sums + 4) + source[1] * now, sums + 4);
+      if (load_count > 1) store_four(load_four(sums + 4) + source[1] * now, sums + 4);
       const Four next = twice * now - previous;
       previous = now;
       now = next;
     }
   }
-  for (int field = 0; field < fields; ++field) {
-    ends[0][field] = sum_lanes(low[field]);
-    ends[1][field] = sum_lanes(high[field]);
+  for (int which = 0; which < load_count; ++which) {
+    ends[0][which] = sum_lanes(low[which]);
+    ends[1][which] = sum_lanes(high[which]);
     for (int n = 0; n < modes; ++n)
-      s[field * modes + n] = sum_lanes(load_four(&total[8 * n + 4 * field])) * (2 / pi);
+      s[which * modes + n] = sum_lanes(load_four(&total[8 * n + 4 * which])) * (2 / pi);
   }
 }
 

@@ -72,11 +72,11 @@ inline ValueAndSlope half_plane_opening(double theta, int side, const Panels& pa
   return evaluate_series(panels.half_plane[side], theta, panels);
 }
 
-// Compute the moments of S, with two fields also of S', over a gap; see gap_moments.cpp.
+// Compute the moments of S, with two loads also of S', over a gap; see gap_moments.cpp.
 //
-// `s` has `fields` rows and a column for each mode, `ends` both loads of each field:
-// ends[side][field].
-void gap_moments(const Gap& gap, const Panels& panels, int modes, int fields, double* s,
+// `s` has a row for each load and a column for each mode, `ends` a value for both ends and each
+// load: ends[side][load].
+void gap_moments(const Gap& gap, const Panels& panels, int modes, int load_count, double* s,
                  std::array<std::array<double, 2>, 2>& ends);
 
 }  // namespace adhesis

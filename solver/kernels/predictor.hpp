@@ -7,44 +7,64 @@
 // δ = |d - d_c|. If no edge leads, the rates give a parabola in d.
 #pragma once
 
+#include <optional>
+#include <tuple>
+
 #include "arrays.hpp"
 
 namespace adhesis {
 
-// Two points of a branch, `way` apart in d: ends and rates dn/dd of the edges at the second point,
-// and at the one before it.
-struct TwoPoints {
-  Vector ends, rate, ends_before, rate_before;
-  double way;
-};
-
-// The edge that leads between two points, and d along its motion.
+// An edge that may lead, and d along its motion.
 //
 // d is a polynomial of how far the edge goes on, both in units of their ways between the points:
-// here·λ + square·λ² + cube·λ³; NaN if no edge leads.
+// here·λ + square·λ² + cube·λ³; NaN if it does not lead.
 struct LeadingEdge {
   int edge;
-  double fastest, gone;  // |dn/dd| at the second point, and how far it has gone between them
+  double gone;  // how far it has gone between the points
   double here, square, cube;
   double fold, fold_distance;  // where the polynomial has its extremum, and that distance in d
 };
 
-// Find the leading edge, and the fold ahead.
-//
-// Of the edges that are not much slower than the fastest it is the one that comes to a fold first;
-// the fastest, if none does.
-LeadingEdge leading_edge(const TwoPoints& points);
-
-// The fold ahead that others lead to than the leading edge: their edge, -1 for none, and distance.
-struct OtherFold {
+// A fold ahead: the edge that leads to it, -1 for none, and its distance in d.
+struct FoldAhead {
   int edge = -1;
   double distance = infinity;
 };
 
-// Find the nearest fold ahead that other gaps lead to than the leading edge's and those beside it.
-OtherFold other_fold(const TwoPoints& points, int leading);
+// Predict a branch beyond a point and the one before it; beyond one alone it is straight.
+class Predictor {
+ public:
+  const double d;
+  const Vector ends, rate;  // at the point; rates are dn/dd
+  double fastest;           // largest |dn/dd| of an edge there
+  double way = 0;           // in d from the point before; 0 if that is not known
+  FoldAhead fold;           // that is seen ahead; its edge is the one that leads
 
-// Predict the ends at a distance `on` in d from the second point.
-Vector predict_ends(const TwoPoints& points, double on, const LeadingEdge& leading);
+  // `before` are d, rates and ends at the point before; of another number of edges it serves not.
+  Predictor(double d, Vector ends, Vector rate,
+            std::optional<std::tuple<double, Vector, Vector>> before);
+
+  // Find the nearest fold ahead that other gaps lead to than the leading edge's and those beside
+  // it; at infinity if none is seen.
+  FoldAhead other_fold() const;
+
+  // Predict the ends at d.
+  Vector predict_ends(double at) const;
+
+  // Step along which the edge that leads is expected to move no further than `most`. Towards a fold
+  // it leads near to it, and from next to it (`finest`) across.
+  double reach(double most, double finest) const;
+
+  // Step across a fold at this distance.
+  double across(double distance, double finest) const;
+
+ private:
+  Vector ends_before_, rate_before_;
+  LeadingEdge leading_ = {};
+
+  LeadingEdge follow_edge(int edge) const;  // take d as a polynomial of its motion
+  LeadingEdge find_leading_edge() const;
+  bool may_lead(int edge) const;
+};
 
 }  // namespace adhesis

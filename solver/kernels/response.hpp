@@ -22,7 +22,7 @@ struct Edge {
   double opening = 0, residual = 0;    // C and C - C_c, C_c that of an edge that advances
   ValueAndSlope pinning_range = {};    // C_c of one that recedes less that, and its derivative by n
   bool recedes = false;                // whether it is behind its memory
-  double opening_by_pressure = 0;      // -∂C/∂p between held edges
+  double closing_by_pressure = 0;      // -∂C/∂p between held edges
   std::array<double, 2> tangent = {};  // ∂(C - C_c)/∂n of both edges of its gap, at the others' g
   bool held = false;                   // whether it stays where it is,
   double here = 0;                     // so far from the reference; 0 if it is not held
@@ -56,7 +56,7 @@ struct LinearResponse {
   Vector about, about_pressure;    // potentials and p of the references
   Vector scaled_opening;           // f there
   std::vector<Edge> edges;
-  Pair opening_by_potential;        // ∂C_e/∂g by the potential at its nodes, with the other sign
+  Pair closing_by_potential;        // -∂C_e/∂g by the potential at its nodes
   Pair charge_by_edge;              // charges by the motion of each edge
   Pair held_charge;                 // between held edges in the reference, and by a unit of p
   Pair motion_by_potential;         // motion of both edges by the potential at each node
@@ -71,6 +71,9 @@ struct LinearResponse {
   int gap_count() const { return nodes.gap_count(); }
 
   // Compute the response of gap k about its reference, between given edges.
+  //
+  // A moving edge leaves a singular opening. The edge's own term follows from the translation of
+  // the whole gap through its own loads and the potential of the others.
   void linearise(int k, const EdgeLaw& law);
 
   // Linearise gap k about its potential in the last solution.

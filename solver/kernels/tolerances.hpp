@@ -131,25 +131,24 @@ inline constexpr double MODEL_SHARE = 0.1;
 // one.
 inline constexpr double FOLLOWING = 0.2;
 
-// Longest steps (0.005 λ_min) of one step through the model near balance, also the shortest reach,
-// where modes of different edges may compete, and their times decide: with twenty times this a loop
-// (γ = 0.04, seed 1) lost 6e-5 less, as another edge came first.
+// Longest steps (0.005 λ_min) of one step through the model near balance, where modes of different
+// edges may compete, and their times decide: with twenty times this a loop (γ = 0.04, seed 1) lost
+// 6e-5 less, as another edge came first. Also the shortest reach.
 inline constexpr double MODEL_SHORT_STEP = 0.1;
+
+// Longest steps, a quarter of λ_min. Edges that move further are elsewhere, over other roughness.
+//
+// In a descent an edge that would follow so far runs: where another patch near its fold followed by
+// 6 λ_min, the wrong one vanished, and the loss was wrong by 4e-3. A step that is predicted to move
+// one so far is not tried: an edge was predicted to move by 3 λ_min in the first step after a jump,
+// and another branch was found there, so that a loss of 30 patches was wrong by 1.6 %, unmarked. A
+// gap whose edge has moved so far is not compared with what was searched.
+inline constexpr double ELSEWHERE = 5.0;
 
 // Of the largest force. With equal speeds edges with less force than this are slower.
 inline constexpr double SLOWEST = 0.01;
 
-// Longest steps, a quarter of λ_min: an edge that would follow further runs. Where another patch
-// near its fold followed by 6 λ_min, the wrong one vanished, and the loss was wrong by 4e-3.
-inline constexpr double FURTHEST_FOLLOWING = 5.0;
-
 // ---------------------------------------------------------------- nucleation
-
-// λ_min. Edges that move further are elsewhere: their gap is not compared with what was searched,
-// and a step that is predicted to move one so far is not tried. Without the latter an edge was
-// predicted to move by 3 λ_min in the first step after a jump, and another branch was found there:
-// a loss of 30 patches was wrong by 1.6 %, unmarked.
-inline constexpr double COMPARABLE = 0.3;
 
 // Share of a clearance that must be left by the nodes of the field, else the gap is searched again.
 inline constexpr double CLEARANCE_LEFT = 0.5;
@@ -175,5 +174,12 @@ inline constexpr double CUBIC_OF_OTHERS_TRUSTED = 1.5;
 // Share of the fastest rate; slower edges do not lead. Where the fastest edge always led, loops
 // of 25 to 120 patches took 4 % more fields.
 inline constexpr double LEADING_SHARE = 0.2;
+
+// Share of the distance to a fold that is left to the next step.
+inline constexpr double LEFT_BEFORE_FOLD = 0.1;
+
+// Of the resolution of a jump: so far beyond a fold there is surely no equilibrium, and so much
+// before it is left at least to the next step.
+inline constexpr double BEYOND_FOLD = 0.2;
 
 }  // namespace adhesis

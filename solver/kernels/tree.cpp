@@ -322,7 +322,7 @@ WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {
               two.rank, &kernel[run.kernel]);
 }
 
-bool Tree::replace(int index, const std::vector<Gap>& gaps, double digits, Flags& moved) {
+bool Tree::place_anew(int index, const std::vector<Gap>& gaps, double digits, Flags& moved) {
   Run& run = runs[index];
   const auto [one, two] = run.half;
   if (run.rank > 0) {

@@ -77,7 +77,7 @@ struct Tree {
   // Place the charges of a run anew, as those of halves have moved, and mark whether they have
   // moved themselves: the interval of a run does not change by gaps inside. Returns whether there
   // is room for as many as it needs.
-  bool replace(int run, const std::vector<Gap>& gaps, double digits, Flags& moved);
+  bool place_anew(int run, const std::vector<Gap>& gaps, double digits, Flags& moved);
 
   // Compute the response of a run from those of its halves.
   void factor(int run);

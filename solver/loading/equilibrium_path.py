@@ -51,7 +51,7 @@ _FALL_SHARE = 0.01
 _NEARLY_FULL = 0.99
 _ROUNDING = 1e-9  # of h_max: a separation that is less below it is at first touch
 _COLUMNS = ("mean_stress", "contact_fraction", "elastic_energy", "adhesion_energy")
-_ENTERED = (*_COLUMNS, "branch", "separation", "tangent", "edge_friction")  # in the ledger
+_ENTERED = (*_COLUMNS, "separation", "tangent", "edge_friction")  # in the ledger
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
 
@@ -329,7 +329,7 @@ class EquilibriumPath(ByValue, ResultViews):
 
     def states_before_jumps(self) -> list[int]:
         """Return the index of the state before each jump; the next one is that after it."""
-        return states_before_jumps(self.jumps, self.branch, self.separation, self.contact_fraction)
+        return states_before_jumps(self.jumps, self.separation, self.contact_fraction)
 
     @property
     def audit_residual(self) -> float:
@@ -606,7 +606,6 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
     columns: dict[str, Any] = {name: record.column(name) for name in _COLUMNS}
     friction = record.column("edge_friction")
     columns |= {
-        "branch": np.array(record.branches),
         "separation": separation,
         "tangent": record.column("tangent"),
         "edge_friction": friction if friction.any() else None,
@@ -614,6 +613,7 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
     ledger = Ledger.of(problem, jumps, **columns)
     fields = columns | {
         "problem": problem,
+        "branch": np.array(record.branches),
         "load_step": np.array(record.ends_load_step),
         "penetration": problem.penetration(separation),
         "patches": patches,

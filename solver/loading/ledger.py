@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.problem import Problem
@@ -57,7 +56,6 @@ class Ledger:
         problem: Problem,
         jumps: Sequence[Jump],
         *,
-        branch: NDArray[np.str_],
         separation: Array,
         mean_stress: Array,
         tangent: Array,
@@ -82,7 +80,7 @@ class Ledger:
         friction = np.zeros(len(step))
         if edge_friction is not None:
             friction = np.diff(edge_friction) / period
-        before = states_before_jumps(jumps, branch, separation, contact_fraction)
+        before = states_before_jumps(jumps, separation, contact_fraction)
         losses = friction.copy()
         losses[before] = 0.0
         np.add.at(losses, before, [jump.energy_drop for jump in jumps])
@@ -121,25 +119,37 @@ class Ledger:
         return self.work - self.rise - self.loss
 
 
-def states_before_jumps(
-    jumps: Sequence[Jump],
-    branch: Sequence[str] | NDArray[np.str_],
-    separation: Array,
-    contact: Array,
-) -> list[int]:
+def states_before_jumps(jumps: Sequence[Jump], separation: Array, contact: Array) -> list[int]:
     """Return the index of the state before each jump of a path; the next one is that after it.
 
-    ``contact`` is A/A0; it, the branch and the separation have the shape (states,).
+    A jump has the numbers of both of its states, which a method returns one after the other.
+
+    Parameters
+    ----------
+    jumps : sequence of Jump
+        In the order of the path.
+    separation, contact : array, shape (states,)
+        s, and A/A0.
+
+    Raises
+    ------
+    ValueError
+        If the states of a jump are not among them.
     """
-    before = (np.asarray(column).tolist() for column in (branch, separation, contact))
-    pairs = list(zip(*before, np.asarray(contact)[1:].tolist(), strict=False))
-    found = [0]
+    contact = np.asarray(contact)
+    columns = (np.asarray(separation)[:-1], contact[:-1], contact[1:])
+    intervals = enumerate(zip(*(column.tolist() for column in columns), strict=True))
+    found = []
     for jump in jumps:
-        wanted = (jump.branch, jump.separation, jump.contact_before, jump.contact_after)
-        found.append(
-            next((k for k in range(found[-1], len(pairs)) if pairs[k] == wanted), len(pairs) - 1)
-        )
-    return found[1:]
+        wanted = (jump.separation, jump.contact_before, jump.contact_after)
+        before = next((k for k, interval in intervals if interval == wanted), None)
+        if before is None:
+            raise ValueError(
+                f"no two neighbouring states are those before and after the jump at s = "
+                f"{jump.separation:g} m: a method has to return both"
+            )
+        found.append(before)
+    return found
 
 
 def estimated_error(own: float, jumps: Sequence[Jump], residual: float, problem: Problem) -> float:

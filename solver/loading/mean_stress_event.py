@@ -112,13 +112,10 @@ def locate(method: Method, start: ContactState, end: ContactState, excess: Exces
 
 
 def _before_jumps(states: Sequence[ContactState], jumps: Sequence[Jump]) -> set[int]:
-    """Return the indices of the states before the jumps of a path of one branch."""
-    if not jumps:
-        return set()
-    branches = [jumps[0].branch] * len(states)
+    """Return the indices of the states before the jumps of a path."""
     separation = np.array([state.separation for state in states])
     contact = np.array([state.contact_fraction for state in states])
-    return set(states_before_jumps(jumps, branches, separation, contact))
+    return set(states_before_jumps(jumps, separation, contact))
 
 
 def _first(path: Path, count: int, states: Sequence[ContactState]) -> Path:

@@ -235,7 +235,7 @@ class Record:
     def before_jumps(self) -> list[int]:
         """Return the index of the state before each jump; the next one is that after it."""
         separation, contact = self.column("separation"), self.column("contact_fraction")
-        return states_before_jumps(self.jumps, self.branches, separation, contact)
+        return states_before_jumps(self.jumps, separation, contact)
 
     def copy(self) -> Self:
         """Return a copy with lists of its own."""

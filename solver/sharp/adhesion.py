@@ -1,4 +1,4 @@
-"""Laws of the edges: that of a problem, and what is checked of a law of one's own."""
+"""Laws of adhesion: that of a problem, and what is checked of a law of one's own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _AGREE = 1e-3  # of the largest w, and per wave number of the largest slope that
 
 
 def adhesion_of(problem: Problem, source: StressSource) -> Adhesion:
-    """Return the law of a problem's edges."""
+    """Return the law of adhesion of a problem."""
     ratio = problem.gamma_open / problem.work_of_adhesion if problem.pinning > 0 else 1.0
     pattern = problem.pattern
     bounds = (pattern.least, pattern.largest) if pattern else (1.0, 1.0)

@@ -1,55 +1,217 @@
-"""Mechanics of the contact edges of one problem: fields, equilibria and descents of its gaps."""
+"""Mechanics of the contact edges of one problem: fields and equilibria of its gaps.
+
+Equilibria are the points of a branch, with the rates of the edges there and before.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from adhesis.solver._kernels import (
-    CLOSING_SHARE,
-    DescentEvent,
+    Adhesion,
     EdgeLaw,
     Equilibrium,
     Field,
     FieldModel,
     LinearResponse,
+    LoadingDevice,
+    ProfileAdhesion,
     set_up_response,
     shortest_length,
     solve_field,
 )
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.threads import one_thread
-from adhesis.solver.sharp.branch_point import PinnedEdges, Point
-from adhesis.solver.sharp.edge_problem import EdgeProblem
-from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField, check_definite
-from adhesis.solver.sharp.gap.ends import (
-    lengths_of,
-    move_edges,
-    positions,
-    step_limits,
-    without_small,
-)
+from adhesis.solver.sharp.gap.ends import move_edges
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.tolerances import (
-    ENDLESS,
-    EQUAL,
+    BY_FIELD,
+    DESCENT_HANDS_OVER,
     FIELD_ACCURACY,
-    RESTS,
+    FIELD_ERROR,
+    LONGEST_STEP,
+    NEWTON_TOLERANCE,
+    SMALLEST_LENGTH,
+    SMALLEST_OF_SEED,
 )
+from adhesis.solver.values import with_values
+
+FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
 
 
-class EdgeMechanics(EdgeProblem):
-    """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
+class PreviousPoint(NamedTuple):
+    """d, and rate and place of every edge, at the point before one; see :class:`Point`."""
 
-    The linear response of the gaps is kept from one state to the next, and changes in place.
+    d: float
+    rate: Array
+    gaps: Array
+
+
+class PinnedEdges(NamedTuple):
+    """Place of C of every pinned edge between both critical openings, and its derivative by d.
+
+    It is 0 where an edge begins to advance and 1 where it begins to recede; NaN for other edges.
     """
 
-    def __init__(self, *problem: Any) -> None:
-        super().__init__(*problem)
+    share: Array
+    rate: Array
+
+    def distance(self, step: float) -> float:
+        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
+        rate = self.rate * np.sign(step)
+        left = np.where(rate > 0, 1 - self.share, self.share)
+        moving = np.isfinite(rate) & (rate != 0) & (left > 0)
+        return float((left[moving] / np.abs(rate[moving])).min(initial=np.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An equilibrium of edges, stable on a branch, or the field of edges next to one.
+
+    Attributes
+    ----------
+    d : float
+        What is prescribed: q0 s at fixed separation.
+    field : GapField
+    rate : array, shape (2L,)
+        dn/dd of every edge along the branch, n the outward motion of the contact.
+    slope : float
+        dY/dd along the branch: Y is p, under a load q0 s.
+    previous : PreviousPoint, optional
+        The point before it on its branch.
+    pinned : PinnedEdges, optional
+        With two works of adhesion.
+    """
+
+    d: float
+    field: GapField
+    rate: Array
+    slope: float
+    previous: PreviousPoint | None = None
+    pinned: PinnedEdges | None = None
+
+    @property
+    def gaps(self) -> Array:
+        """Gap ends, shape (L, 2)."""
+        return self.field.gaps
+
+    def with_previous(self, previous: PreviousPoint | None) -> Self:
+        """Return this point with the one before it."""
+        return with_values(self, previous=previous)
+
+    def extrapolate(self, d: float) -> Array:
+        """Extrapolate the gaps to ``d``, along the tangent."""
+        return move_edges(self.gaps, self.rate * (d - self.d))
+
+
+@dataclass
+class Counters:
+    """Numbers of field solutions (also by the linear response), energies, fine openings, steps."""
+
+    fields: int = 0
+    energies: int = 0
+    openings: int = 0
+    newton_steps: int = 0
+    descent_steps: int = 0
+
+
+class EdgeMechanics:
+    """Fields and equilibria of the edges of one problem, with its tolerances and counters.
+
+    Lengths in units of 1/q0. The linear response of the gaps is kept from one state to the next,
+    and changes in place.
+
+    Attributes
+    ----------
+    critical : float
+        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece where γ(x) = γ.
+    tolerance : float
+        Relative accuracy of the field.
+    wave : float
+        λ_min in θ.
+    newton_tolerance, field_error : float
+        Correction that ends Newton's iteration; displacement of an equilibrium that the error of
+        the field can cause.
+    smallest, narrowest : float
+        Narrower patches and gaps are removed; width of the narrowest patch or gap that is put.
+    surface : float
+        Γ = 2γ q0/E* where adhesion is weakest.
+    """
+
+    def __init__(
+        self,
+        source: StressSource,
+        critical: float,
+        tolerance: float,
+        device: LoadingDevice = FIXED_SEPARATION,
+        adhesion: Adhesion | None = None,
+    ) -> None:
+        self.source, self.critical, self.tolerance = source, critical, tolerance
+        self.adhesion = adhesion or ProfileAdhesion(source.panels)
+        self.wave = 2 * np.pi / source.top
+        self.newton_tolerance = min(NEWTON_TOLERANCE, BY_FIELD * tolerance) * self.wave
+        self.field_error = max(self.newton_tolerance, FIELD_ERROR * tolerance * self.wave)
+        self.longest_step = LONGEST_STEP * self.wave
+        # far below the width at which a patch on the sharpest crest first comes to rest,
+        # (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8, where adhesion is weakest
+        weakest = critical**2 * self.adhesion.least
+        self.surface = np.pi * weakest / 8  # Γ
+        seed = (2 * weakest / source.sharpest**2) ** (1 / 3)
+        self.smallest = SMALLEST_LENGTH * self.wave
+        if critical > 0:
+            self.smallest = min(self.smallest, SMALLEST_OF_SEED * seed)
+        self.narrowest = float(3 * self.smallest)
+        self.law = EdgeLaw(
+            adhesion=self.adhesion,
+            critical=float(critical),
+            newton_tolerance=self.newton_tolerance,
+            field_error=self.field_error,
+            rest_step=DESCENT_HANDS_OVER * self.wave,
+            longest_step=self.longest_step,
+            smallest=float(self.smallest),
+            rough_rate=float(max(critical, np.sqrt(source.m2 * self.wave)) / self.wave),
+            force_error=float(tolerance * critical**2),
+        )
+        self.model = FieldModel(
+            device=device,
+            digits=float(-np.log(tolerance)),
+            panels=source.panels,
+        )
+        self.count = Counters()
         self._finer: tuple[Point, Field] | None = None
         self.forget()
+
+    @property
+    def pins(self) -> bool:
+        """Whether edges are pinned, as works of adhesion differ."""
+        return self.adhesion.pins
+
+    def law_at(self, memory: Array) -> EdgeLaw:
+        """Return the law of edges that were at ``memory`` in the state before."""
+        if not self.pins:
+            return self.law
+        law = EdgeLaw(self.law)
+        law.memory = memory
+        return law
+
+    @property
+    def largest_opening(self) -> float:
+        """Largest critical opening of an edge, on a flat piece."""
+        return float(self.critical * np.sqrt(self.adhesion.largest))
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the separation is prescribed."""
+        return self.model.device.compliance == 0
+
+    @property
+    def is_load(self) -> bool:
+        """Whether the mean stress is prescribed."""
+        return self.model.device.separation_weight == 0
 
     def forget(self) -> None:
         """Forget the response: results depend on it within the error of the field."""
@@ -108,12 +270,18 @@ class EdgeMechanics(EdgeProblem):
     def fold_displacement(self, point: Point) -> float:
         """Estimate how far in d the error of the field displaces the fold next to a point.
 
-        The error of the openings is their difference from those of a more accurate field.
+        The error δC of the openings is their difference from those of a more accurate field. At a
+        fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
+        vector. Scaled by sqrt(C_e/C_f) it is symmetric, so its left null vector is
+        ψ_e = C_e dn_e/dd. In first order the fold is moved to where ψ·(δC + δd ∂C/∂d) = 0.
         """
         finer = self.solve_finer(point)
         change = finer.opening - point.field.solution.opening
-        _, _, by_prescribed = finer.by_prescribed()
-        return point.fold_displacement(change, by_prescribed)
+        _, _, by_prescribed = finer.by_prescribed()  # ∂C/∂d at fixed edges
+        left = point.field.opening.ravel() * point.rate
+        if not left.any():
+            return 0.0  # all edges are pinned
+        return -float(left @ change / (left @ by_prescribed))
 
     def equilibrium(
         self,
@@ -175,161 +343,3 @@ class EdgeMechanics(EdgeProblem):
         )
         pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)
-
-    def relax(
-        self, gaps: Array, prescribed: float, *, equal_speeds: bool = False, share: float = 1.0
-    ) -> tuple[Point | None, bool]:
-        """Descend in energy at a prescribed value to the next minimum; None if no contact is left.
-
-        By linear kinetics, or with ``equal_speeds``, to be compared with that; in steps of at most
-        this share of the longest. Gaps and patches that close or vanish on the way are left out.
-        Returns also whether the order in which edges ran may have decided the end.
-
-        Raises
-        ------
-        PathError
-            If the descent does not end, or comes to edges that have no field.
-        FullContact
-            If the last gap closes, as it may where the separation is not fixed.
-        """
-        raced = False
-        while len(gaps):
-            found, by_order = self._relax_until_one_vanishes(gaps, prescribed, equal_speeds, share)
-            raced = raced or by_order
-            if isinstance(found, Point):
-                return found, raced
-            gaps = found
-        return None, raced
-
-    def _relax_until_one_vanishes(
-        self, gaps: Array, prescribed: float, equal_speeds: bool, share: float
-    ) -> tuple[Point | Array, bool]:
-        """Descend to the next minimum, or until a gap or patch vanishes: the gaps without it."""
-        law = EdgeLaw(self.law_at(gaps))
-        law.longest_step *= share
-        left, rests, raced = ENDLESS, 0, False
-        rested, start = np.empty((0, 2)), gaps
-        while left > 0 and rests <= 2 * RESTS:
-            near = self.response_near(gaps, prescribed)
-            if near is None:
-                raise NoState("there is no field of these edges", prescribed)
-            end = near.descend(gaps, start, prescribed, left, equal_speeds, law, self.model)
-            left -= end.steps
-            self.count.descent_steps += end.steps
-            self.count.fields += end.steps
-            if end.event == DescentEvent.NO_FIELD:
-                self.forget()
-                raise NoState("there is no field of these edges", prescribed)
-            gaps, raced = end.gaps, raced or end.raced
-            if end.event == DescentEvent.VANISHED:
-                rest = without_small(gaps, self.smallest)
-                if rest is not None:
-                    return rest, raced
-                law = EdgeLaw(law)
-                law.smallest = self._smallest_of_last_gap(gaps, law.smallest)
-            if end.event == DescentEvent.AT_REST:
-                # Next to a fold the field's error may hide whether there is a minimum; whatever
-                # is taken for it, the next step in s decides.
-                rests += 1
-                if (
-                    gaps.shape == rested.shape
-                    and np.abs(gaps - rested).max() < self.newton_tolerance
-                ):
-                    rests = max(rests, RESTS + 1)  # no patience changes anything
-                rested = gaps
-                strict = rests <= RESTS
-                point = self.equilibrium(
-                    gaps, prescribed, self.longest_step, strict=strict, memory=law.memory
-                )
-                if point is not None:
-                    return point, raced
-                ways = self.ways_off_saddle(gaps, prescribed, law)
-                if ways:
-                    gaps = ways[0]
-                elif not strict and rests <= 2 * RESTS:
-                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
-        raise NoState("edges that descend in energy do not come to rest", prescribed)
-
-    def ways_off_saddle(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Array]:
-        """Move edges without force off a saddle of the energy; an empty list where they are stable.
-
-        Both directions along the softest modes are tried. That on which the force is larger is the
-        first, of equal ones that in which the leading edge goes outwards. Where energy rises on
-        both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
-        """
-        near, free = self.response_at(gaps, prescribed), law.free_edges(gaps)
-        if near is None or self.critical == 0 or len(free) == 0:
-            return []
-        tangent = near.tangent_between(gaps, free, prescribed, law, self.model)
-        by_edge = near.opening[free, None] * tangent
-        limit = step_limits(gaps, law.longest_step)[free]
-        order = positions(gaps, self.source.highest)[free]
-        found = leaving_step(by_edge + by_edge.T, limit, order)
-        if found is None:
-            return []
-        step = np.zeros(gaps.size)
-        step[free] = found
-        while np.abs(step).max() >= law.rest_step:
-            ways: list[Array] = [move_edges(gaps, way) for way in (step, -step)]
-            onwards = self._force_along(ways[0], step, prescribed, law)
-            backwards = self._force_along(ways[1], -step, prescribed, law)
-            if max(onwards, backwards) > 0:
-                return ways if onwards >= backwards * (1 - EQUAL) else ways[::-1]
-            step = 0.5 * step
-        return []
-
-    def _force_along(self, gaps: Array, step: Array, prescribed: float, law: EdgeLaw) -> float:
-        """Compute the force along a ``step`` at its end: positive where the energy falls."""
-        opening = self.solution(gaps, prescribed).opening
-        residual = opening - law.critical_of(gaps, opening)
-        return -float((residual * (2 * opening - residual)) @ step)
-
-    def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
-        """Return the length below which the last gap is closed.
-
-        At fixed separation it never closes, however narrow it gets.
-
-        Raises
-        ------
-        FullContact
-            If it closes, where the separation is not fixed.
-        """
-        if len(gaps) > 1:
-            return smallest
-        length, _ = lengths_of(gaps)
-        if length[0] < self.smallest and self.model.device.compliance > 0:
-            raise FullContact
-        return min(smallest, CLOSING_SHARE * float(length[0]))
-
-    def _perturb_most_unbalanced(
-        self, gaps: Array, prescribed: float, times: int, law: EdgeLaw
-    ) -> Array:
-        """Move the most unbalanced edge on by ``times`` half a longest step.
-
-        Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
-        minimum: the flow stands still there. A minimum draws the edge back.
-        """
-        opening = self.solution(gaps, prescribed).opening
-        residual = opening - law.critical_of(gaps, opening)
-        e = int(np.argmax(np.abs(residual)))
-        step = np.zeros(gaps.size)
-        step[e] = -np.sign(residual[e]) * step_limits(gaps, 0.5 * times * law.longest_step)[e]
-        return move_edges(gaps, step)
-
-
-def leaving_step(hessian: Array, limit: Array, order: Array) -> Array | None:
-    """Step off a saddle, along its softest modes, up to the limit of an edge; None off a minimum.
-
-    One edge leads, outwards; it is the one that moves most freely in these modes, of equal ones the
-    first in ``order`` (positions). Where symmetry makes several modes equally soft, the step is the
-    leading edge's projection on all of them: which of equivalent edges leads does not matter.
-    """
-    with one_thread():
-        values, vectors = np.linalg.eigh(hessian)
-    if not values[0] < 0:
-        return None
-    soft = vectors[:, values <= min(values[0] + EQUAL * np.abs(values).max(), 0.0)]
-    freedom = (soft**2).sum(axis=1)
-    equal = np.flatnonzero(freedom > (1 - EQUAL) * freedom.max())
-    step = soft @ soft[equal[np.argmin(order[equal])]]
-    return np.asarray(step / np.abs(step / limit).max())

@@ -30,14 +30,13 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
-from adhesis.solver.sharp.continuation.jump import History
+from adhesis.solver.sharp.continuation.jump import Event, History
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 from adhesis.solver.sharp.tolerances import (
@@ -61,7 +60,7 @@ from adhesis.solver.sharp.tolerances import (
 
 @dataclass(frozen=True)
 class SharpReport(MethodReport):
-    """Relative accuracy of loss and field, resolution of jumps, and ``edge_problem.Counters``.
+    """Relative accuracy of loss and field, resolution of jumps, and ``mechanics.Counters``.
 
     A jump is located to that part of h_max, under a load to that σ~.
     """
@@ -153,13 +152,13 @@ class SharpMethod(Method):
             check_adhesion(adhesion, problem, source)
         self.edges = EdgeMechanics(source, critical, tolerance, device, adhesion)
         self.states = States(problem, self.edges)
-        finest = max(FIELD_RESOLVES * tolerance, ROUNDING)
+        limit = max(FIELD_RESOLVES * tolerance, ROUNDING)
         self.resolution = Resolution(
-            jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
+            jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), limit) * h_max,
             bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**WEAKNESS_POWER),
             work=work,
             h_max=h_max,
-            finest=finest * h_max,
+            field_limit=limit * h_max,
             late=LATE_DROP * accuracy,
             least_drop=LEAST_DROP * problem.work_of_adhesion,
             field_share=FIELD_SHARE * accuracy,
@@ -210,8 +209,8 @@ class SharpMethod(Method):
     @one_at_a_time
     def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the quasi-static path; see the contract."""
-        branch = self.problem.branch_to(state, prescribed)
-        target = Target(self.states.to_field_units(prescribed), prescribed, branch)
+        direction = self.problem.branch_to(state, prescribed)
+        target = Target(self.states.to_field_units(prescribed), prescribed, direction)
         try:
             if self.problem.work_of_adhesion == 0:
                 return self._follow_reversibly(state, target)
@@ -245,14 +244,15 @@ class SharpMethod(Method):
         if not state.patches:
             touch, highest = self.jumps.first_touch()
             first = 0.0 if control.is_load else touch
-            if target.branch == "unloading" or target.d > first:
+            if target.direction == "unloading" or target.d > first:
                 apart = self.problem.detached_separation(state, target.prescribed)
                 history.states.append(self.detached(apart))
                 return history
             d = first
-            before, gaps = self.states.detached(touch), np.empty((0, 2))
-            jump = self.jumps.compute(before, gaps, d, target.branch, highest)
-            point = history.commit(jump)
+            gaps = np.empty((0, 2))
+            start = self.nucleation.insert(gaps, highest)
+            event = Event(self.states.detached(touch), d, gaps, start)
+            point = history.commit(self.jumps.compute(event, target.direction))
         else:
             gaps = state.internal.gaps
             if point is None:
@@ -262,7 +262,8 @@ class SharpMethod(Method):
             if point is None:
                 field = self.edges.field(gaps, d)
                 before = self.states.of_point(Point(d, field, np.zeros(gaps.size), math.nan))
-                point = history.commit(self.jumps.compute(before, gaps, d, target.branch))
+                event = Event(before, d, gaps, gaps)
+                point = history.commit(self.jumps.compute(event, target.direction))
             elif d == target.d:
                 history.states.append(state)
         while point is not None and d != target.d:
@@ -280,7 +281,7 @@ class SharpMethod(Method):
         of loading; a missing state is reached by loading from a lighter one.
         """
         prescribed_in = self.problem.prescribed_in
-        if target.branch == "loading":
+        if target.direction == "loading":
             states = self._history(state, target).states
             begin = prescribed_in(state)
             self._loaded = [s for s in self._loaded if prescribed_in(s) >= begin] + states
@@ -294,6 +295,6 @@ class SharpMethod(Method):
         )
         last = min(lighter, key=prescribed_in, default=first)
         if prescribed_in(last) > target.prescribed:
-            last = self._history(last, replace(target, branch="loading")).states[-1]
+            last = self._history(last, replace(target, direction="loading")).states[-1]
         back.reverse()  # states at one prescribed value come in the order opposite to loading
         return Path((*sorted(back, key=prescribed_in), last), ())

@@ -21,8 +21,8 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.method import Method, PathError
+from adhesis.solver.sharp.continuation.descent import Descents
 from adhesis.solver.sharp.errors import NoState
-from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.exact_wave import ExactWave
 from tests.support.grids import grid_of
@@ -139,7 +139,7 @@ def test_a_state_that_is_not_found_is_reported_in_the_units_of_the_turning_point
     def lost(self, gaps, prescribed, *args, **options):
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
-    monkeypatch.setattr(EdgeMechanics, "relax", lost)
+    monkeypatch.setattr(Descents, "relax", lost)
     for stiffness, place in (
         (np.inf, r"Δ/h_max = 0 \(mean gap 1e-06 m\)"),
         (1.0, r"u_tot/h_max = 0 \(u_tot = 0 m\)"),

@@ -20,8 +20,8 @@ from adhesis import (
 )
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.mechanics import Point
 from adhesis.solver.sharp.nucleation.nucleation import Touch
 from tests.support.dugdale_wave import DugdaleWave
 from tests.support.explicit_solution import explicit_openings

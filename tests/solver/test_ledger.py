@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from adhesis import Control, HalfSpace, Problem, make_method, run_path, self_affine_profile
-from adhesis.solver.loading.ledger import Ledger
+from adhesis.solver.loading.ledger import Ledger, states_before_jumps
 from adhesis.solver.model.jump import Jump
 from tests.support.scenes import UNEVEN
 
@@ -58,7 +58,6 @@ def test_a_ledger_states_work_jump_and_friction_of_each_interval():
     ledger = Ledger.of(
         problem,
         [jump],
-        branch=np.array(["loading"] * 4),
         separation=s,
         mean_stress=s**3,
         tangent=3 * s**2,
@@ -75,3 +74,20 @@ def test_a_ledger_states_work_jump_and_friction_of_each_interval():
     assert ledger.residual == pytest.approx(ledger.work - ledger.rise - ledger.loss)
     part = ledger.part(1, 3)
     assert (part.loss, part.rise, part.work) == (5.0, 0.0, 0.0)
+
+
+def jump_at(s: float, before: float, after: float) -> Jump:
+    return Jump("loading", s, 1.0, "spreading", 1, 1, before, after, 1e-3)
+
+
+def test_jumps_are_found_in_their_order_and_each_between_states_of_its_own():
+    """Two like jumps once shared an interval, and one that was not found had the last one."""
+    s = np.array([1.0, 0.5, 0.5, 0.5, 0.5, 0.2])
+    contact = np.array([0.1, 0.2, 0.3, 0.2, 0.3, 0.4])
+    there, back = jump_at(0.5, 0.2, 0.3), jump_at(0.5, 0.3, 0.2)
+    assert states_before_jumps([there, back, there], s, contact) == [1, 2, 3]
+    assert states_before_jumps([there, there], s, contact) == [1, 3]
+    assert states_before_jumps([], s[:1], contact[:1]) == []
+    for missing in ([jump_at(0.5, 0.2, 0.4)], [back, back], [there, there, there]):
+        with pytest.raises(ValueError, match=r"jump at s = 0\.5 m: a method has to return both"):
+            states_before_jumps(missing, s, contact)

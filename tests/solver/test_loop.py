@@ -108,9 +108,12 @@ class _Upwards(ExactWave):
 
     def follow(self, state: ContactState, separation: float) -> Path:
         path = super().follow(state, separation)
-        up = tuple(replace(j, energy_drop=-0.1 * j.energy_drop) for j in path.jumps)
-        down = tuple(replace(j, energy_drop=1.1 * j.energy_drop) for j in path.jumps)
-        return Path(path.states, down + up, 0.0)
+        states, jumps = list(path.states), []
+        for jump in path.jumps:
+            after = next(k for k, s in enumerate(states) if s.separation == jump.separation) + 2
+            states[after:after] = states[after - 2 : after]
+            jumps += [replace(jump, energy_drop=share * jump.energy_drop) for share in (1.1, -0.1)]
+        return Path(tuple(states), tuple(jumps), 0.0)
 
 
 class _Falling(ExactWave):

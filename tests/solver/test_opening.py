@@ -26,7 +26,10 @@ from adhesis.solver.loading.zero_range import beyond_limit, range_warnings
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
-from adhesis.solver.sharp.nucleation.opening import Crack, judge_maximum
+from adhesis.solver.sharp.continuation.branch import StableBranch
+from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.nucleation.crack import Crack, judge_maximum
+from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
 
 PERIOD = 2e-3
 # Two troughs, of which the one at x = λ/2 is the shallower.
@@ -63,7 +66,7 @@ def troughs_problem(strength: float = STRENGTH) -> Problem:
 
 
 def test_the_largest_excess_opens_first_with_what_equals_it():
-    choose = make_method("sharp", troughs_problem()).follower.cracks.choose_seeds
+    choose = make_method("sharp", troughs_problem()).follower.cracks.choose
     cracks = [Crack(float(i), value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
     assert [crack.position for crack in choose(cracks)] == [1.0, 3.0]
     assert choose(cracks[:1]) == []
@@ -117,6 +120,43 @@ def test_patches_open_under_every_control(control, turning_point):
     assert abs(loop.audit_residual) < 1e-4
     opened = [jump for jump in loop.jumps if jump.kind == "opening"]
     assert all(jump.energy_drop > -jump.barrier for jump in opened)
+
+
+def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
+    """It halved each of them once, so that none grew again: such a loop did not end."""
+    branch = SimpleNamespace(
+        _states=SimpleNamespace(
+            of_point=lambda point: point, energy_residual=lambda before, after: 100.0
+        ),
+        _output=SimpleNamespace(d=0.0),
+        _at_output=None,
+        _resolution=SimpleNamespace(jump=1e-6, work=1.0),
+        _work_before=(0.0, math.inf),
+        _work_of_fields=0.0,
+    )
+    for d in (1.0, 0.5):
+        StableBranch._work_error(branch, SimpleNamespace(d=d))
+    branch._work_before = (0.0, math.inf)  # the step was accepted
+    assert StableBranch._work_error(branch, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
+
+
+def test_patches_that_open_from_the_same_edges_again_end_the_path():
+    """They would without end, unless a touch that did not hold meanwhile is not tried again."""
+    follower = make_method("sharp", troughs_problem()).follower
+    gaps = np.array([[1.0, 6.0]])
+    points = [SimpleNamespace(d=0.5, gaps=gaps + by, field=None) for by in (0.0, 0.2, 1e-5, 2e-5)]
+    follower.cracks = SimpleNamespace(
+        is_possible=True, minimum=lambda field: (-1.0, []), choose=lambda found: []
+    )
+    follower._crack_jump = lambda located, target: located.point
+    for point in points[:2]:
+        assert follower._cracks_at(point, None) is point
+    follower.nucleation.heals += 1
+    assert follower._cracks_at(points[2], None) is points[2]
+    with pytest.raises(NoState, match="open and close in turn"):
+        follower._cracks_at(points[3], None)
+    points[3].d = 0.4
+    assert follower._cracks_at(points[3], None) is points[3]
 
 
 def test_work_and_energy_agree_between_openings():

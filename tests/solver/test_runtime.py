@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import ThreadpoolController
 
 from adhesis.solver.runtime.malloc import keep_freed
-from adhesis.solver.sharp.mechanics import leaving_step
+from adhesis.solver.sharp.continuation.descent import leaving_step
 
 
 def threads() -> set[int]:

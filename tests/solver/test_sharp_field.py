@@ -6,9 +6,9 @@ import pytest
 from adhesis import Problem, self_affine_profile, single_wave
 from adhesis.solver._kernels import FieldModel, LoadingDevice, solve_field
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.edge_problem import FIXED_SEPARATION
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.mechanics import FIXED_SEPARATION
 from tests.support.dense import solve_densely
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.grids import grid_of

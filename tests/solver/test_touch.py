@@ -22,7 +22,7 @@ def places(of: Nucleation, overlaps: list[float]) -> list[float]:
     """Places that get a patch, of minima at θ = 0, 1, … with openings in units of h_max."""
     opening = np.array(overlaps) * AMPLITUDE * 2 * np.pi / PERIOD
     theta, width = np.arange(len(overlaps), dtype=float), np.full(len(overlaps), 1e-3)
-    return [touch.theta for touch in of.choose_seeds(Minima(theta, opening, width, opening))]
+    return [touch.theta for touch in of.choose(Minima(theta, opening, width, opening))]
 
 
 def test_the_deepest_place_gets_a_patch_and_of_equal_ones_the_first_from_the_crest_on() -> None:

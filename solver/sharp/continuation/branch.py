@@ -7,14 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver._kernels import COMPARABLE, STEP_GROWTH, STEP_REDUCTION, shortest_length
+from adhesis.solver._kernels import (
+    ELSEWHERE,
+    STEP_GROWTH,
+    STEP_REDUCTION,
+    Predictor,
+    shortest_length,
+)
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.gap.ends import signs_of, without_small
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics, PinnedEdges, Point, PreviousPoint
 from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
@@ -22,18 +26,17 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
-    WORK_RESOLVED,
     WORK_STALLED,
 )
 
 
 @dataclass(frozen=True)
 class Target:
-    """End of a load step: d, the same value in m or Pa without rounding, and the branch."""
+    """End of a load step: d, the same value in m or Pa without rounding, and the way there."""
 
     d: float
     prescribed: float
-    branch: Branch
+    direction: Branch
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,8 @@ class Resolution:
         roughness opens patches from inside; infinite where it does not.
     h_max : float
         q0 h_max.
-    finest : float
-        No jump is located more finely than this.
+    field_limit : float
+        Nearer to a fold the error of the field hides it: no jump is located more finely.
     late : float
         Work that a jump may add to the loss by being found late, in units of its drop.
     least_drop : float
@@ -65,7 +68,7 @@ class Resolution:
     bend: float
     work: float
     h_max: float
-    finest: float
+    field_limit: float
     late: float
     least_drop: float
     field_share: float
@@ -144,7 +147,7 @@ class StableBranch:
         The last accepted point.
     trail : list of Point
         Accepted points from that at which touches were last searched for.
-    finest : float
+    smallest_step : float
         Separation to which a jump is located, in d: the smallest step, but across a fold or to the
         target.
     """
@@ -165,9 +168,9 @@ class StableBranch:
         self.point = self._output = point  # the last one whose state belongs to the path
         self._at_output: ContactState | None = None  # the state there, where work is compared
         self.trail = [point]
-        self.finest, self._longest = resolution.jump, math.inf  # step
+        self.smallest_step, self._longest = resolution.jump, math.inf  # step
         # straight where no point before is known: short steps there keep the integral exact
-        self._predictor = Predictor(point)
+        self._predictor = beyond(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
         self._work_of_fields = 0.0  # largest difference that a shorter step did not reduce
         self._free_step, self._begins_to_move = 0.0, False  # with two works of adhesion
@@ -184,46 +187,45 @@ class StableBranch:
             if reached is not None:
                 error = max(self._trapezoid_error(reached), self._work_error(reached))
                 share = 0.5 if error > TRAPEZOID_FAR else self._share_to_turn(reached, step)
-                if share == 1 or abs(step) <= 2 * self._resolution.finest:
+                if share == 1 or abs(step) <= 2 * self._resolution.field_limit:
                     return self._accept(reached, step, error)
                 # a branch may bend more sharply than jumps are located
                 self._longest = share * abs(step)
-                self.finest = min(self.finest, self._longest)
-            elif abs(step) <= self.finest:
+                self.smallest_step = min(self.smallest_step, self._longest)
+            elif abs(step) <= self.smallest_step:
                 return Fold(self.point, d, self._two_folds)
             else:
-                self._longest = max(STEP_REDUCTION * abs(step), self.finest)
+                self._longest = max(STEP_REDUCTION * abs(step), self.smallest_step)
 
     @property
     def fold_ahead(self) -> tuple[float, float]:
         """Return d of the fold that is predicted, or infinity, and of a place beyond it."""
         predictor = self._predictor
-        way = self._target.d - predictor.point.d
-        distances = predictor.fold_distance, predictor.across(self._resolution.jump)
-        fold, beyond = (predictor.point.d + math.copysign(x, way) for x in distances)
-        return fold, beyond
+        way, distance = self._target.d - predictor.d, predictor.fold.distance
+        across = predictor.across(distance, self._resolution.jump)
+        return predictor.d + math.copysign(distance, way), predictor.d + math.copysign(across, way)
 
-    def refine(self, finest: float) -> None:
-        """Locate the fold ahead to ``finest``."""
-        self.finest = self._longest = finest
+    def refine(self) -> None:
+        """Locate the fold ahead as finely as the field resolves it."""
+        self.smallest_step = self._longest = self._resolution.field_limit
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.append(point)
-        self.point, self._predictor = point, Predictor(point)
+        self.point, self._predictor = point, beyond(point)
 
     def _next_step(self) -> float:
         """Return the next step in d: the leading edge is not to move far, nor the target be passed.
 
-        A step that leads across a fold may be shorter than the finest. The first one after a jump
+        A step that leads across a fold may be shorter than the smallest. The first one after a jump
         follows the tangent: where it was longer, more than a half of them failed in a loop of 120
         patches.
         """
         predictor = self._predictor
         motion = PREDICTED_MOTION if predictor.way else LONGEST_STEP * STEP_REDUCTION
-        size = min(self._longest, predictor.reach(motion * self._edges.wave, self.finest))
-        if not predictor.fold_distance < self.finest:
-            size = max(size, self.finest)
+        size = min(self._longest, predictor.reach(motion * self._edges.wave, self.smallest_step))
+        if not predictor.fold.distance < self.smallest_step:
+            size = max(size, self.smallest_step)
         left = self._target.d - self.point.d
         step = left if size >= abs(left) else math.copysign(size, left)
         self._free_step, self._begins_to_move = step, False
@@ -234,12 +236,12 @@ class StableBranch:
 
         The branch has a kink there, and the state on either side belongs to the path.
         """
-        finest = self.finest
+        near = self.smallest_step
         distance = pinned.distance(step)
-        if not distance < abs(step) + finest:
+        if not distance < abs(step) + near:
             return step
         self._begins_to_move = True
-        size = distance - finest if distance > 2 * finest else distance + finest
+        size = distance - near if distance > 2 * near else distance + near
         return step if size >= abs(step) else math.copysign(size, step)
 
     def _share_to_turn(self, reached: Point, step: float) -> float:
@@ -274,7 +276,7 @@ class StableBranch:
         if point.d != self._target.d:
             # what lies before a kink predicts nothing beyond it
             kink = self._begins_to_move
-            self._predictor = Predictor(point.with_previous(None) if kink else point)
+            self._predictor = beyond(point.with_previous(None) if kink else point)
             self._look_for_two_folds()
             self._longest = STEP_GROWTH * abs(self._free_step if kink else step)
         return Accepted(point, is_output, remaining)
@@ -289,14 +291,14 @@ class StableBranch:
         other = predictor.other_fold()
         if math.isinf(other.distance):
             return
-        now = other.distance - predictor.fold_distance
+        now = other.distance - predictor.fold.distance
         apart, self._folds_apart = min(now, self._folds_apart), now
         self._two_folds = None
         if apart < resolution:
-            way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
-            rate, edges = predictor.point.rate, (predictor.leading.edge, other.edge)
+            way = math.copysign(predictor.across(other.distance, resolution), predictor.way)
+            rate, edges = predictor.rate, (predictor.fold.edge, other.edge)
             ahead = tuple((edge, float(np.sign(rate[edge] * way))) for edge in edges)
-            self._two_folds = TwoFolds(ahead, predictor.point.d + way, apart)
+            self._two_folds = TwoFolds(ahead, predictor.d + way, apart)
 
     def _trapezoid_error(self, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed.
@@ -309,25 +311,25 @@ class StableBranch:
         # p = q0 h_max is σ~ = 1
         h_max = self._resolution.h_max
         load = self._edges.is_load
-        conjugate = point.separation - h_max if load else point.pressure
+        which = 1 if load else 0  # of p and q0 s
+        before, here = (p.field.nearly[which] for p in (output, point))
+        conjugate = here - h_max if load else here
         scale = max(abs(conjugate), QUIET_STRESS * h_max)
         change = abs(way) * abs(point.slope - output.slope)
         if self._edges.source.is_patterned or self._edges.pins:
-            before, here = (p.separation if load else p.pressure for p in (output, point))
             change = max(change, *(abs(here - before - way * p.slope) for p in (output, point)))
         return float(change / 12 / (self._resolution.bend * scale))
 
     def _work_error(self, point: Point) -> float:
         """Difference of work and energy since the last output, in units of what is allowed.
 
-        Zero for steps much shorter than the resolution of jumps. A difference that a shorter step
-        does not reduce is no error of the step: energies differ by it where the number of modes of
-        a gap changes. No smaller one halves a further step of the branch.
+        A difference that a shorter step does not reduce is no error of the step: energies differ by
+        it where the number of modes of a gap changes. No smaller one halves a further step of the
+        branch.
         """
-        span = abs(point.d - self._output.d)
-        short = span < WORK_RESOLVED * self._resolution.jump
-        if math.isinf(self._resolution.work) or short:
+        if math.isinf(self._resolution.work):
             return 0.0
+        span = abs(point.d - self._output.d)
         if self._at_output is None:
             self._at_output = self._states.of_point(self._output)
         residual = self._states.energy_residual(self._at_output, self._states.of_point(point))
@@ -346,8 +348,13 @@ def correct(edges: EdgeMechanics, predictor: Predictor, d: float) -> Point | Non
 
     None, too, where an edge is predicted to move far: what is found there may be another branch.
     """
-    gaps = predictor.gaps(d)
+    gaps = predictor.predict_gaps(d)
     # not written as > : a prediction that is no number is none
-    if not np.abs(gaps - predictor.point.gaps).max() <= COMPARABLE * edges.wave:
+    if not np.abs(gaps - predictor.gaps).max() <= ELSEWHERE * edges.longest_step:
         return None
-    return edges.equilibrium(gaps, d, edges.longest_step, memory=predictor.point.gaps)
+    return edges.equilibrium(gaps, d, edges.longest_step, memory=predictor.gaps)
+
+
+def beyond(point: Point) -> Predictor:
+    """Return the predictor of the branch beyond a point."""
+    return Predictor(point.d, point.gaps, point.rate, point.previous)

@@ -12,7 +12,6 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import Point
 from adhesis.solver.sharp.continuation.branch import (
     Accepted,
     Fold,
@@ -20,15 +19,20 @@ from adhesis.solver.sharp.continuation.branch import (
     StableBranch,
     Target,
 )
-from adhesis.solver.sharp.continuation.jump import ComputedJump, EventOrders, History, Jumps
+from adhesis.solver.sharp.continuation.jump import (
+    ComputedJump,
+    Event,
+    EventOrders,
+    History,
+    Jumps,
+)
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
-from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.location import Located, locate
-from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Crack, Cracks
+from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
+from adhesis.solver.sharp.nucleation.crack import Crack, Cracks
+from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation, Touch, locate
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import EQUAL, MOST_OPENINGS, SECOND_FOLD_DISPLACED
+from adhesis.solver.sharp.tolerances import EQUAL, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 
@@ -42,11 +46,12 @@ class Follower:
         self.nucleation, self.cracks = Nucleation(problem, edges), Cracks(problem, edges)
         self.jumps = Jumps(edges, self.nucleation, states)
         self._came_on: Branch | None = None
+        self._opened: list[tuple[Point, int]] = []  # points that patches opened from, and heals
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
         self.nucleation.healed = []
-        self.nucleation.searched, self._came_on = SearchedGaps(), None
+        self.nucleation.searched, self._came_on, self._opened = SearchedGaps(), None, []
         if data is None or data.stopped is None:
             return None
         d, nearly, rate, slope, previous, pinned, searched, name = data.stopped
@@ -62,13 +67,13 @@ class Follower:
         d, point
             d reached and the stable point there, None if no contact is left.
         """
-        if self.edges.pins and self._came_on not in (None, target.branch):
+        if self.edges.pins and self._came_on not in (None, target.direction):
             # where a path turns back all its edges are pinned at first
             turned = self.edges.equilibrium(point.gaps, point.d, self.edges.newton_tolerance)
             point = point.with_previous(None) if turned is None else turned
             history.states.append(self.states.of_point(point))
         self._came_on = None
-        jump = self._opening_at(history, point, target)
+        jump = self._cracks_at(point, target)
         if jump is not None:
             return jump.d, history.commit(jump)
         branch = StableBranch(self.edges, self.resolution, self.states, point, target)
@@ -80,7 +85,7 @@ class Follower:
                 jump = self._handle_accepted(history, branch, event, target)
             if jump is not None:
                 return jump.d, history.commit(jump)
-        self._remember(history, branch, target.branch)
+        self._remember(history, branch, target.direction)
         return target.d, branch.point
 
     def _remember(self, history: History, branch: StableBranch, name: Branch) -> None:
@@ -107,9 +112,10 @@ class Follower:
             jump = self._nucleation_jump(branch, target)
         if jump is None and event.remaining is not None:
             before = output or self.states.of_point(point)
-            return self.jumps.compute(before, event.remaining, point.d, target.branch, known=point)
+            vanished = Event(before, point.d, point.gaps, event.remaining)
+            return self.jumps.compute(vanished, target.direction)
         if output is not None:
-            onwards = -1.0 if target.branch == "loading" else 1.0
+            onwards = -1.0 if target.direction == "loading" else 1.0
             if jump is None or onwards * (self.states.prescribed_of(output) - jump.d) < 0:
                 history.states.append(output)
         return jump
@@ -127,9 +133,9 @@ class Follower:
             if jump is not None:
                 return replace(jump, states=(self.states.of_point(fold.point), *jump.states))
         last = history.states[-1] if history.states else None
-        jump = self._fold_jump(last, fold, target, branch.finest)
+        jump = self._fold_jump(last, fold, target, branch.smallest_step)
         if jump is None:
-            branch.refine(self.resolution.finest)
+            branch.refine()
             return None
         after = jump.point
         goes_on = fold.d != target.d and self._is_near(fold.point, after)
@@ -158,16 +164,17 @@ class Follower:
             return None
         branch.trail = [branch.point]
         fold, beyond = branch.fold_ahead
-        for _ in range(MOST_OPENINGS):
-            finest = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
-            touched = locate(self.nucleation, self.edges, trail, finest)
+        # This ends: a touch that does not hold is found again only where its gap closes further.
+        while True:
+            near = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
+            touched = locate(self.nucleation, self.edges, trail, near)
             opened = None
             if self.cracks.is_possible:
-                opened = locate(self.cracks, self.edges, trail, self.resolution.finest)
+                opened = locate(self.cracks, self.edges, trail, self.resolution.field_limit)
             if opened is not None and (
                 touched is None or abs(opened.point.d - start) < abs(touched.point.d - start)
             ):
-                return self._opening_jump(opened, target)
+                return self._crack_jump(opened, target)
             if touched is None:
                 return None
             apart = math.copysign(1.0, target.d - start) * (fold - touched.point.d)
@@ -177,43 +184,45 @@ class Follower:
             jump = self._touch_jump(touched, beyond if may_fold else None, target)
             if jump is not None:
                 return jump
-        raise NoState("contact nucleates, and goes back in turn", trail[-1].d)
 
-    def _opening_at(self, history: History, point: Point, target: Target) -> ComputedJump | None:
+    def _cracks_at(self, point: Point, target: Target) -> ComputedJump | None:
         """Compute the jump at the start of a branch where patches open at once; else None.
 
         Raises
         ------
         NoState
-            If patches open and close without end.
+            If they have opened from the same edges at this d before, and closed again: they would
+            without end.
         """
         if not self.cracks.is_possible:
             return None
         least, found = self.cracks.minimum(point.field)
         if least > 0:
             return None
-        jump = self._opening_jump(Located(point, self.cracks.choose_seeds(found), 0.0), target)
-        last = history.jumps[-MOST_OPENINGS:]
-        here = jump.jump.separation
-        if len(last) == MOST_OPENINGS and all(one.separation == here for one in last):
-            raise NoState("patches open and close in turn", jump.d)
-        return jump
+        # touches that did not hold since then are not tried again: another end is possible
+        heals = self.nucleation.heals
+        self._opened = [opened for opened in self._opened if opened[0].d == point.d]
+        for other, heals_then in self._opened:
+            if heals_then == heals and self.jumps.descents.is_same(other.gaps, point.gaps):
+                raise NoState("patches open and close in turn", point.d)
+        self._opened.append((point, heals))
+        return self._crack_jump(Located(point, self.cracks.choose(found), 0.0), target)
 
-    def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
+    def _crack_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
         """Compute the jump from a point at which patches open inside."""
-        point, gaps = opened.point, opened.point.field.gaps
-        before = self.states.of_point(point)
-        jump = self.jumps.compute(
-            before,
-            self.cracks.insert_seeds(gaps, opened.seeds),
+        point = opened.point
+        event = Event(
+            self.states.of_point(point),
             point.d,
-            target.branch,
-            known=point,
-            barrier=sum(crack.barrier for crack in opened.seeds),
+            point.gaps,
+            self.cracks.insert(point.gaps, opened.places),
+            barrier=sum(crack.barrier for crack in opened.places),
+            late=opened.late,
         )
-        if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
+        jump = self.jumps.compute(event, target.direction)
+        if jump.point is not None and self.jumps.descents.is_same(jump.point.gaps, point.gaps):
             raise NoState("a crack that grows at both tips closes again", point.d)
-        return replace(jump, misplaced=self.states.work(before, jump.states[-1], opened.late))
+        return jump
 
     def _touch_jump(
         self, touched: Located[Touch], beyond: float | None, target: Target
@@ -224,23 +233,28 @@ class Follower:
         d.
         """
         point = touched.point
-        if self.edges.critical > 0 and touched.seeds[0].opening < -self.nucleation.tolerance:
+        if self.edges.critical > 0 and touched.places[0].opening < -self.nucleation.tolerance:
             raise NoState("surfaces overlap, and no first touch is found", point.d)
-        before = self.states.of_point(point)
-        since = self.nucleation.way_since_healed(touched.seeds, point.d)
-        jump = self.jumps.compute(
-            before, point.field.gaps, point.d, target.branch, touched.seeds, point,
-            event_orders=None if beyond is None else EventOrders(beyond, (point.field.gaps,)),
-        )  # fmt: skip
-        gained = self.jumps.has_gained(point, jump.point, touched.seeds)
-        if not gained and self.nucleation.heal(touched.seeds, point.d):
+        since = self.nucleation.way_since_healed(touched.places, point.d)
+        event = Event(
+            self.states.of_point(point),
+            point.d,
+            point.gaps,
+            self.nucleation.insert(point.gaps, touched.places),
+            late=touched.late,
+            orders=None if beyond is None else EventOrders(beyond, (point.gaps,)),
+        )
+        jump = self.jumps.compute(event, target.direction)
+        gained = self.jumps.has_gained(point, jump.point, touched.places)
+        if not gained and self.nucleation.heal(touched.places, point.d):
             return None
         # they hold from somewhere since they last did not, where no energy is lost
-        late, since = (self.states.work(before, jump.states[-1], x) for x in (touched.late, since))
-        return replace(jump, misplaced=late + min(since, abs(jump.jump.energy_drop)))
+        healed = self.states.work(event.before, jump.states[-1], since)
+        more = min(healed, abs(jump.jump.energy_drop))
+        return replace(jump, misplaced=jump.misplaced + more)
 
     def _fold_jump(
-        self, last: ContactState | None, fold: Fold, target: Target, finest: float
+        self, last: ContactState | None, fold: Fold, target: Target, located: float
     ) -> ComputedJump | None:
         """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
@@ -249,18 +263,15 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             states = (self.states.of_point(point),)
         before = self.states.of_point(point, held=(fold.d, self.edges.solve_finer(point)))
-        start, event_orders = self._start_at_fold(fold)
-        jump = self.jumps.compute(
-            before, start, fold.d, target.branch, known=point, event_orders=event_orders
-        )
-        after = jump.states[-1]
-        late = self.states.work(before, after, way)
-        drop = jump.jump.energy_drop
+        start, orders = self._start_at_fold(fold)
+        event = Event(before, fold.d, point.gaps, start, late=way, orders=orders)
+        jump = self.jumps.compute(event, target.direction)
+        after, drop = jump.states[-1], jump.jump.energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
-        if late > allowed and finest > self.resolution.finest:
+        if jump.misplaced > allowed and located > self.resolution.field_limit:
             return None
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
-        misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
+        misplaced = jump.misplaced + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
         return replace(jump, states=states + jump.states, misplaced=misplaced)
@@ -293,7 +304,9 @@ class Follower:
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
-            ways = self.edges.ways_off_saddle(saddle.gaps, fold.d, self.edges.law_at(point.gaps))
+            ways = self.jumps.descents.ways_off_saddle(
+                saddle.gaps, fold.d, self.edges.law_at(point.gaps), at_fold=True
+            )
             if ways:
                 return ways[0], EventOrders(fold.d, tuple(ways))
         rate = np.abs(point.rate)

@@ -1,9 +1,8 @@
-"""Jumps: descent in energy at a prescribed value, and nucleation afterwards."""
+"""Jumps: what comes of an event at which a branch is left."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,12 +10,12 @@ import numpy as np
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import Point
+from adhesis.solver.sharp.continuation.descent import Descents, Rival
 from adhesis.solver.sharp.errors import FullContact, NoState
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
-from adhesis.solver.sharp.tolerances import ENDLESS, FINER_STEPS, OTHER_MINIMUM
+from adhesis.solver.sharp.tolerances import ENDLESS, OTHER_MINIMUM
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class ComputedJump:
     states: tuple[ContactState, ...]
     jump: Jump
     point: Point | None
-    misplaced: float = 0.0
+    misplaced: float
 
 
 @dataclass
@@ -72,8 +71,34 @@ class EventOrders:
     starts: tuple[Array, ...]
 
 
-Rival = Point | None | FullContact | NoState
-"""Another end of a descent: a minimum, no contact, full contact (with a stiffness), or unknown."""
+@dataclass(frozen=True, eq=False)
+class Event:
+    """An event by which a branch is left: a touch, a fold, an opening, or something that vanishes.
+
+    Attributes
+    ----------
+    before : ContactState
+        The state before it.
+    d : float
+    left : array, shape (L, 2)
+        Gaps of the branch there; empty out of contact.
+    start : array, shape (L, 2)
+        Gaps from which the edges run, with what has nucleated and without what has vanished.
+    barrier : float
+        That of cracks in ``start``, in units of γ/q0.
+    late : float
+        How far in d the event may have come before.
+    orders : EventOrders, optional
+        If it may as well come after another one.
+    """
+
+    before: ContactState
+    d: float
+    left: Array
+    start: Array
+    barrier: float = 0.0
+    late: float = 0.0
+    orders: EventOrders | None = None
 
 
 class Jumps:
@@ -83,8 +108,7 @@ class Jumps:
         self.edges, self.nucleation, self.states = edges, nucleation, states
         problem = states.problem
         self.mirror = MirrorCheck(edges, problem.profile.q0 * problem.mirror_axes)
-        # Under a load edges help each other: in which order they run decides nothing.
-        self._may_race = edges.critical > 0 and not edges.is_load
+        self.descents = Descents(edges, states)
         self._first: tuple[float, list[Touch]] | None = None
 
     def first_touch(self) -> tuple[float, list[Touch]]:
@@ -113,37 +137,26 @@ class Jumps:
             return False
         d = 0.0 if self.edges.is_load else separation
         try:
-            point, _ = self.edges.relax(self.nucleation.insert_seeds(np.empty((0, 2)), touches), d)
+            point, _ = self.descents.relax(self.nucleation.insert(np.empty((0, 2)), touches), d)
         except FullContact:
             return True
         return point is not None and self.states.of_point(point).potential < 0
 
-    def compute(
-        self,
-        before: ContactState,
-        start: Array,
-        d: float,
-        branch: Branch,
-        touches: list[Touch] | None = None,
-        known: Point | None = None,
-        barrier: float = 0.0,
-        event_orders: EventOrders | None = None,
-    ) -> ComputedJump:
-        """Descend at ``d`` from the gaps ``start`` to the next state in which nothing touches.
+    def compute(self, event: Event, direction: Branch) -> ComputedJump:
+        """Descend from an event to the next state in which nothing touches.
 
-        The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
-        ``barrier`` is that of these. The point of the result is the minimum as it was found: next
-        to a fold it may not be found again from its own edges. The jump raced, too, if another of
-        two events in ``event_orders`` leads elsewhere in the end, or if it ends
-        on one of two sides that are mirror images. Under a load no other order is sought.
+        The point of the result is the minimum as it was found: next to a fold it may not be found
+        again from its own edges. The jump raced, too, if another order of events leads elsewhere
+        in the end, or if it ends on one of two sides that are mirror images. Under a load no other
+        order is sought.
         """
         rivals: list[Rival] = []
-        point = self._descend(start, d, touches or [], rivals)
-        point = self._nucleate_until_clear(
-            point,
-            d,
-            lambda gaps, touching: self._descend(gaps, d, touching, rivals),
-        )
+        before, d = event.before, event.d
+
+        def descend(gaps: Array) -> Point | None:
+            return self.descents.to_minimum(gaps, d, rivals)
+
+        point = self._nucleate_until_clear(descend(event.start), d, descend)
         after = self._after(before, point, d)
         at_stake = None
         try:
@@ -152,15 +165,15 @@ class Jumps:
                     raise rivals[0]
                 rival = self._end_of(rivals[0], d, equal_speeds=True)
                 at_stake = self._at_stake(before, point, rival, d)
-            elif event_orders is not None and self._may_race:
-                at_stake = self._at_stake_beyond(before, point, event_orders)
+            elif event.orders is not None and self.descents.may_race:
+                at_stake = self._at_stake_beyond(before, point, event.orders)
         except (FullContact, NoState):  # elsewhere, or unknown where: no energy to be compared
             at_stake = 0.0
-        left = start if known is None else known.gaps
-        if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
+        if at_stake is None and point is not None and self.mirror.is_broken(event.left, point.gaps):
             at_stake = 0.0
-        jump = self.states.jump(before, after, branch, at_stake, barrier)
-        return ComputedJump(d, (before, after), jump, point)
+        jump = self.states.jump(before, after, direction, at_stake, event.barrier)
+        misplaced = self.states.work(before, after, event.late)
+        return ComputedJump(d, (before, after), jump, point, misplaced)
 
     def _at_stake_beyond(
         self, before: ContactState, point: Point | None, event_orders: EventOrders
@@ -169,7 +182,7 @@ class Jumps:
         d = event_orders.beyond
 
         def end(start: Array) -> Point | None:
-            return self._end_of(self.edges.relax(start, d)[0], d)
+            return self._end_of(self.descents.relax(start, d)[0], d)
 
         both = None if point is None else end(point.gaps)
         differences = [self._at_stake(before, both, end(start), d) for start in event_orders.starts]
@@ -179,7 +192,7 @@ class Jumps:
         self, before: ContactState, point: Point | None, rival: Point | None, d: float
     ) -> float | None:
         """Difference of the energies of two ends in J/m²; None if they are one."""
-        if self._is_same_minimum(rival, point):
+        if self.descents.is_same_minimum(rival, point):
             return None
         if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
             return 0.0
@@ -195,9 +208,8 @@ class Jumps:
     def _end_of(self, point: Point | None, d: float, equal_speeds: bool = False) -> Point | None:
         """Go on from a minimum at ``d`` until nothing touches."""
 
-        def relaxed(gaps: Array, touching: list[Touch]) -> Point | None:
-            gaps = self.nucleation.insert_seeds(gaps, touching)
-            return self.edges.relax(gaps, d, equal_speeds=equal_speeds)[0]
+        def relaxed(gaps: Array) -> Point | None:
+            return self.descents.relax(gaps, d, equal_speeds=equal_speeds)[0]
 
         return self._nucleate_until_clear(point, d, relaxed)
 
@@ -205,7 +217,7 @@ class Jumps:
         self,
         point: Point | None,
         d: float,
-        descend: Callable[[Array, list[Touch]], Point | None],
+        descend: Callable[[Array], Point | None],
     ) -> Point | None:
         """Let contact nucleate wherever surfaces overlap in a minimum, the deepest place first.
 
@@ -221,15 +233,15 @@ class Jumps:
                 touch, touches = self.first_touch()
                 if not (adhesive and self.states.attracts_when_detached(d, touch)):
                     return None
-                point = descend(np.empty((0, 2)), touches)
+                point = descend(self.nucleation.insert(np.empty((0, 2)), touches))
                 if point is None and not self.states.attracts_when_detached(d):
                     return None
                 continue
             least, minima = self.nucleation.minimum(point.field)
             if least > 0:
                 return point
-            seeds = self.nucleation.choose_seeds(minima)
-            grown = descend(point.field.gaps, seeds)
+            seeds = self.nucleation.choose(minima)
+            grown = descend(self.nucleation.insert(point.gaps, seeds))
             if self.has_gained(point, grown, seeds):
                 point = grown
             elif not self.nucleation.heal(seeds, d):
@@ -248,58 +260,7 @@ class Jumps:
         if self.nucleation.range > 0 and touches[0].opening > 0:
             both = (self.states.of_point(point).potential for point in (before, after))
             return not next(both) <= next(both)
-        return not self.is_same(after.field.gaps, before.field.gaps)
-
-    def _is_same_minimum(self, one: Point | None, other: Point | None) -> bool:
-        """Whether two descents led to one minimum."""
-        if one is None or other is None:
-            return one is other
-        return self.is_same(one.gaps, other.gaps)
-
-    def is_same(self, here: Array, there: Array) -> bool:
-        """Whether gaps are those of one minimum."""
-        apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.field_error)
-        return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
-
-    def _descend(
-        self, gaps: Array, d: float, touches: list[Touch], rivals: list[Rival]
-    ) -> Point | None:
-        """Descend to the next minimum of the energy; None when no contact is left.
-
-        Where edges may have raced, finer steps decide, if they end with less energy: more may be
-        that of a minimum on the way that the field's error shows. A minimum that equal speeds or
-        steps of the other length lead to instead is added to ``rivals``, unless there is one.
-        """
-        if touches:
-            gaps = self.nucleation.insert_seeds(gaps, touches)
-        point, raced = self.edges.relax(gaps, d)
-        if not (raced and self._may_race):
-            return point
-        others: list[Rival] = []
-        try:
-            others.append(self.edges.relax(gaps, d, equal_speeds=True)[0])
-        except (FullContact, NoState) as unknown:
-            others.append(unknown)
-        with suppress(NoState, FullContact):
-            finer, _ = self.edges.relax(gaps, d, share=FINER_STEPS)
-            if point and finer and not self._is_same_minimum(point, finer):
-                end, other = (self.states.of_point(one).potential for one in (finer, point))
-                if end < other:
-                    point, finer = finer, point
-                others.append(finer)
-        for rival in others:
-            if not rivals and self._is_rival(rival, gaps, point):
-                rivals.append(rival)
-        return point
-
-    def _is_rival(self, other: Rival, start: Array, point: Point | None) -> bool:
-        """Whether a descent from some gaps ended elsewhere than at a minimum."""
-        if isinstance(other, Exception):
-            return True
-        # next to a fold the field's error may show a minimum where the edges are
-        if other is not None and self.is_same(other.gaps, start):
-            return False
-        return not self._is_same_minimum(other, point)
+        return not self.descents.is_same(after.field.gaps, before.field.gaps)
 
 
 class MirrorCheck:

@@ -1,4 +1,9 @@
-"""Locate contact that nucleates inside gaps, and insert seeds (docs/methods.md, rules 4 and 11).
+"""Locate on a branch where contact appears in a gap, or a gap in contact; insert contact in gaps.
+
+Both are the same search: a :class:`Criterion` has a value for every field, positive while nothing
+nucleates; where it is not at the end of a trail of points, :func:`locate` finds the place from
+which on it is not. :class:`Nucleation` is the criterion of touches (docs/methods.md, rules 4 and
+11), ``crack.Cracks`` that of gaps that open inside patches.
 
 With adhesion a touching point grows at once to its first equilibrium; on the parabola κx²/2 that is
 (16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width, but no longer
@@ -11,8 +16,9 @@ both edges.
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -25,16 +31,50 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array, Integers
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
-from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.tolerances import (
     GROWTH,
     HEALED_OPENING,
-    HEALED_PLACE,
     IN_PATCH,
     LONGEST_TRIAL_HALF_LENGTH,
     OVERLAP,
     TRIAL_WIDTHS,
 )
+
+Place = TypeVar("Place")
+
+
+@dataclass(frozen=True, eq=False)
+class Located(Generic[Place]):
+    """Point of a branch at which something nucleates, the places, and how late it is in d."""
+
+    point: Point
+    places: list[Place]
+    late: float
+
+
+class Criterion(Protocol[Place]):
+    """Nucleation criterion: a value for every field, positive while nothing nucleates."""
+
+    @property
+    def tolerance(self) -> float:
+        """Value below zero that is allowed in a state."""
+        ...
+
+    def minimum(self, field: GapField) -> tuple[float, Any]:
+        """Return the least value of a field, and the candidates of places."""
+        ...
+
+    def choose(self, candidates: Any) -> list[Place]:
+        """Choose the place of the least value and those that equal it; none if it is positive."""
+        ...
+
+    def is_located(self, value: float, near: bool) -> bool:
+        """Return whether a point with this value is located finely enough.
+
+        ``near`` states whether one with a positive value is as near as the resolution.
+        """
+        ...
 
 
 @dataclass(frozen=True)
@@ -59,7 +99,7 @@ class Minima(NamedTuple):
 
 
 class Nucleation:
-    """Criterion of touches for ``location.locate``, which also inserts seed patches.
+    """Criterion of touches for ``locate``, which also inserts seed patches.
 
     Attributes
     ----------
@@ -87,13 +127,12 @@ class Nucleation:
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
         self.heals, self.healed_at = 0, math.nan
-        self._narrowest = float(3 * edges.smallest)
         self._lengths = SearchLengths(
             wave=float(edges.wave),
             closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
             surface=edges.surface,
-            narrowest=self._narrowest,
-            widest=float(edges.longest_step),
+            narrowest=self.edges.narrowest,
+            longest_step=float(edges.longest_step),
             range=self.range,
         )
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
@@ -107,7 +146,7 @@ class Nucleation:
         """
         profile = self.problem.profile
         crests = profile.crests()
-        chosen = self._choose(crests.position)
+        chosen = self._first_of_equal(crests.position)
         curvature = crests.curvature[chosen] / profile.q0
         theta = crests.position[chosen] * profile.q0
         widths = self._lengths.seed_widths(curvature)
@@ -122,7 +161,7 @@ class Nucleation:
         touches = [Touch(float(a), opening, float(w)) for a, w in zip(theta, widths, strict=True)]
         return separation, touches
 
-    def choose_seeds(self, minima: Minima) -> list[Touch]:
+    def choose(self, minima: Minima) -> list[Touch]:
         """Choose the touch of the largest overlap; of equal ones, one and its copies."""
         over = minima.clearance
         least = float(over.min(initial=np.inf))
@@ -131,13 +170,13 @@ class Nucleation:
         # without adhesion patches come and go smoothly, in any order
         equal = self.equal if self.edges.critical > 0 else np.inf
         deepest = np.flatnonzero(over <= min(least + equal, 0.0))
-        deepest = deepest[self._choose(minima.theta[deepest] / self.problem.profile.q0)]
+        deepest = deepest[self._first_of_equal(minima.theta[deepest] / self.problem.profile.q0)]
         return [
             Touch(float(minima.theta[i]), float(minima.opening[i]), float(minima.width[i]))
             for i in deepest
         ]
 
-    def _choose(self, position: Array) -> Integers:
+    def _first_of_equal(self, position: Array) -> Integers:
         """Choose those of equal touches at which contact begins; without adhesion all."""
         if self.edges.critical > 0:
             parts = self.problem.equal_parts
@@ -176,7 +215,7 @@ class Nucleation:
         longest = 2 * min(LONGEST_TRIAL_HALF_LENGTH * self.edges.wave, IN_PATCH * apart)
 
         def release(width: float) -> float:
-            if not self._narrowest <= width <= longest:
+            if not self.edges.narrowest <= width <= longest:
                 return np.inf
             seeded = with_patches(gaps, theta, np.full(len(theta), width))
             return float(self.edges.release(seeded, prescribed, first, 0.5 * width).max())
@@ -191,13 +230,13 @@ class Nucleation:
         return max(opening - self.range, left), width
 
     def is_located(self, value: float, near: bool) -> bool:
-        """Return whether a touch is located finely enough; see ``location.Criterion``.
+        """Return whether a touch is located finely enough; see ``Criterion``.
 
         Within the range a value may fall at once, where surfaces part beside a minimum.
         """
         return value > -0.5 * self.tolerance or (near and value > -self.range)
 
-    def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:
+    def insert(self, gaps: Array, touches: list[Touch]) -> Array:
         """Return the gaps with a seed patch at each touch."""
         return with_patches(
             gaps,
@@ -211,7 +250,7 @@ class Nucleation:
         return abs(d - self.healed_at) if healed else 0.0
 
     def _has_healed(self, theta: float, opening: float) -> bool:
-        near = HEALED_PLACE * self.edges.wave
+        near = self.edges.longest_step  # the widest seed: one covers the other's place
         return any(
             abs((theta - place + np.pi) % (2 * np.pi) - np.pi) < near
             and opening > HEALED_OPENING * before
@@ -229,3 +268,58 @@ class Nucleation:
             self.heals, self.healed_at = self.heals + len(healed), d
             return bool(healed)
         return False
+
+
+def locate(
+    criterion: Criterion[Place],
+    edges: EdgeMechanics,
+    trail: list[Point],
+    resolution: float,
+) -> Located[Place] | None:
+    """Locate where along a trail a criterion begins to be met, and at which places.
+
+    None if it is not met at its end. The trail starts at a point known to be clear; between its
+    points the search ends at ``resolution`` (d).
+    """
+    if criterion.minimum(trail[-1].field)[0] > 0:
+        return None
+    # Each trial is expensive: the values at both ends show where to begin.
+    clear, hit = trail[:2]
+    clear_value, _ = criterion.minimum(clear.field)
+    hit_value, hit_candidates = criterion.minimum(hit.field)
+    for point in trail[2:]:
+        if hit_value <= 0:
+            break
+        clear, clear_value, hit = hit, hit_value, point
+        hit_value, hit_candidates = criterion.minimum(hit.field)
+    aim = 0.2 * criterion.tolerance  # so far below zero
+    # The least value may be that of another candidate than the hit: then a secant creeps. As long
+    # as an end stays its value counts half as much with every trial (the Illinois method).
+    cleared: bool | None = None  # whether the last trial was clear
+    stayed = 1.0  # share with which the value at the other end counts
+    for _ in range(sys.float_info.mant_dig):
+        if criterion.is_located(hit_value, abs(clear.d - hit.d) <= resolution):
+            break
+        share = 0.5
+        if clear_value > 0:
+            above = (clear_value + aim) * (stayed if cleared is False else 1.0)
+            below = (hit_value + aim) * (stayed if cleared else 1.0)
+            share = min(max(above / (above - below), 0.02), 0.98)  # off both ends
+        trial = clear.d + (hit.d - clear.d) * share
+        if trial in (clear.d, hit.d):  # there its value differs by the error of the field
+            return Located(clear, criterion.choose(hit_candidates), 0.0)
+        between = edges.equilibrium_between(clear, hit, trial)
+        if between is None:
+            break
+        value, candidates = criterion.minimum(between.field)
+        stayed = 0.5 * stayed if cleared == (value > 0) else 1.0
+        cleared = value > 0
+        if cleared:
+            clear, clear_value = between, value
+        else:
+            hit, hit_candidates, hit_value = between, candidates, value
+    # estimate the distance from the exact location by a secant
+    late = abs(clear.d - hit.d)
+    if clear_value > hit_value:
+        late *= -hit_value / (clear_value - hit_value)
+    return Located(hit, criterion.choose(hit_candidates), late)

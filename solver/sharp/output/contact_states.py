@@ -12,17 +12,16 @@ from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.branch_point import PinnedEdges, Point, PreviousPoint
-from adhesis.solver.sharp.edge_problem import EdgeProblem
 from adhesis.solver.sharp.gap.ends import union_of
 from adhesis.solver.sharp.gap.full_contact_stress import patches_between
+from adhesis.solver.sharp.mechanics import EdgeMechanics, PinnedEdges, Point, PreviousPoint
 from adhesis.solver.values import with_values
 
 
 class BranchData(NamedTuple):
     """Point of a branch at which a path stopped: d, p and q0 s, and the rest of ``Point``.
 
-    With the gaps as they were when they were last searched for touches, and the name of the branch.
+    With the gaps as they were when they were last searched for touches, and the way it came on.
     """
 
     prescribed: float
@@ -32,7 +31,7 @@ class BranchData(NamedTuple):
     previous: PreviousPoint | None
     pinned: PinnedEdges | None
     searched: SearchedGaps
-    branch: Branch
+    direction: Branch
 
 
 class ContinuationData(NamedTuple):
@@ -53,7 +52,7 @@ def loading_device(problem: Problem) -> LoadingDevice:
 class States:
     """Contact states and conversions of units of one problem."""
 
-    def __init__(self, problem: Problem, edges: EdgeProblem) -> None:
+    def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.adhesion, self.count = problem, edges.adhesion, edges.count
         profile = problem.profile
         self.q0 = profile.q0
@@ -176,7 +175,7 @@ class States:
         self,
         before: ContactState,
         after: ContactState,
-        branch: Branch,
+        direction: Branch,
         at_stake: float | None = None,
         barrier: float = 0.0,
     ) -> Jump:
@@ -186,7 +185,7 @@ class States:
         """
         barrier *= self.problem.work_of_adhesion / (self.q0 * self.period)
         return Jump.between(
-            before, after, branch, self.period, raced=at_stake is not None,
+            before, after, direction, self.period, raced=at_stake is not None,
             at_stake=at_stake or 0.0, barrier=barrier,
             falls_off=self.problem.control.is_load and not after.patches,
         )  # fmt: skip

@@ -1,10 +1,13 @@
-// Renewal of a linear response where edges have moved, and its set-up.
+// References of a linear response that move with the edges, and equilibria by Newton's iteration.
 //
 // A gap whose edge leaves its reference is linearised anew where it is now, in the potential of the
 // last solution, and the runs of the tree that hold the gap are computed anew. So a state next to a
-// known one costs the changed gaps and one pass through the tree. Where a patch comes or goes the
-// response is set up anew: taking over the other gaps saves time beyond some 150 of them only. It
-// is, too, where a gap or run needs more nodes than there is room for.
+// known one costs the changed gaps and one pass through the tree. All edges are in equilibrium
+// where none is outdated any more.
+//
+// Where a patch comes or goes the response is set up anew: taking over the other gaps saves time
+// beyond some 150 of them only. It is, too, where a gap or run needs more nodes than there is room
+// for.
 #pragma once
 
 #include "field.hpp"
@@ -44,5 +47,26 @@ bool settle_response(LinearResponse& response, const Vector& ends, double prescr
 // orders of the gaps, or none.
 std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed, Integers least,
                                               const EdgeLaw& law, const Model& model);
+
+struct Equilibrium {
+  bool found = false;  // whether one was found within reach, stable if strict
+  Vector ends;
+  Vector potential;     // of the other gaps at the reference nodes, as G
+  ResponseSolution at;  // its pressure is NaN if the edges have no field
+  int corrections = 0;
+  std::vector<Gap> references;  // of the gaps, and the orders of their rules
+  Integers orders;
+  // Place of C between both critical openings, 0 where an edge begins to advance and 1 where it
+  // begins to recede, and its derivative by d; NaN for edges that are not pinned. Empty with one
+  // work of adhesion.
+  Vector pinned_share, pinned_rate;
+};
+
+// Find the equilibrium next to these edges. The references of gaps follow where they move by more
+// than that to which the response is accurate. Where the edges are not stable on the way, or the
+// corrections hardly shrink, the iteration ends. Unless `strict`, edges that are nearly in
+// equilibrium are taken as they are.
+Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed, double reach,
+                             bool strict, const EdgeLaw& law, const Model& model);
 
 }  // namespace adhesis

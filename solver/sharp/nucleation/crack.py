@@ -26,12 +26,10 @@ from adhesis.solver.sharp.field.patch_tension import InnerTension, TensionMaximu
 from adhesis.solver.sharp.gap.ends import with_gaps
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
-    EQUAL_TENSIONS,
     GROWTH,
     IN_PATCH,
     LONGEST_TRIAL_HALF_LENGTH,
     NEAR_STRENGTH,
-    SHORTEST_CRACK,
     STRENGTH_EXCEEDED,
 )
 
@@ -62,7 +60,7 @@ class Crack:
 
 
 class Cracks:
-    """Criterion of openings inside patches for ``location.locate``, which also inserts cracks.
+    """Criterion of openings inside patches for ``nucleation.locate``, which also inserts cracks.
 
     Attributes
     ----------
@@ -93,12 +91,15 @@ class Cracks:
         found = [self._crack_at(field, maximum) for maximum in maxima]
         return min((crack.value for crack in found), default=1 - NEAR_STRENGTH), found
 
-    def choose_seeds(self, candidates: list[Crack]) -> list[Crack]:
-        """Choose the crack of the largest excess, and those that equal it; none if none opens."""
-        least = min((crack.value for crack in candidates), default=1.0)
-        return [crack for crack in candidates if crack.value <= min(least + EQUAL_TENSIONS, 0.0)]
+    def choose(self, candidates: list[Crack]) -> list[Crack]:
+        """Choose the crack of the largest excess, and those that equal it; none if none opens.
 
-    def insert_seeds(self, gaps: Array, cracks: list[Crack]) -> Array:
+        Those are equal that differ by less than a tension is located to.
+        """
+        least = min((crack.value for crack in candidates), default=1.0)
+        return [crack for crack in candidates if crack.value <= min(least + self.tolerance, 0.0)]
+
+    def insert(self, gaps: Array, cracks: list[Crack]) -> Array:
         """Return the gaps with these cracks inserted."""
         centres = np.array([crack.position for crack in cracks])
         return with_gaps(gaps, centres, np.array([crack.length for crack in cracks]))
@@ -122,7 +123,7 @@ class Cracks:
             balanced=0.5 * critical**2 * work / tension**2,
             toughness=work,
             release=lambda half: self._release(field, theta, half),
-            shortest=0.5 * SHORTEST_CRACK * wave,
+            shortest=0.5 * self.edges.narrowest,
             longest=min(LONGEST_TRIAL_HALF_LENGTH * wave, IN_PATCH * distance),
         )
 
