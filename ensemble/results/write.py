@@ -102,28 +102,18 @@ class Writer:
 
     def reset(self, rows: Sequence[int]) -> None:
         """Make rows pending again; what they held is lost."""
-        cleared = (*_CONTENT, schema.CHECKSUM)
         for row in rows:
-            with self._writing(row):
-                # First the status: a row that is being emptied must not be taken for a whole one.
-                self._set_pending(row)
-                self.flush()
-                for dataset in cleared:
-                    place = self._place(dataset.name, row)
-                    if place is not None:
-                        rows_of = self._datasets[dataset.name]
-                        rows_of.write(place, rows_of.filled(dataset.fill))
-                self.flush()
+            # First the status: a row that is being emptied must not be taken for a whole one.
+            self._set_pending(row)
+            self._write(row, {}, schema.PENDING)
 
     def mark(self, rows: Iterable[int], *, needed: bool) -> None:
         """Mark rows without a result: they are to be computed, or need not be."""
         for row in rows:
             if needed:
-                with self._writing(row):
-                    self._set_pending(row)
+                self._set_pending(row)
             else:
                 self._write(row, {}, schema.NOT_NEEDED)
-        self.flush()
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
         """Write a row, its checksum, and then its status; what has no value is left empty.
@@ -137,21 +127,24 @@ class Writer:
                 if place is not None:
                     rows_of = self._datasets[name]
                     given = name in values
-                    blocks[name] = (
-                        rows_of.block(values[name]) if given else rows_of.filled(dataset.fill)
-                    )
+                    value = values[name] if given else np.full(rows_of.shape, dataset.fill)
+                    blocks[name] = rows_of.block(value)
                     rows_of.write(place, blocks[name])
             covered = (d.name for d in (*OF_TASKS, *OF_KEPT))
-            parts = (blocks[name] for name in covered if name in blocks)
+            value = checksum(blocks[name] for name in covered if name in blocks)
+            if status == schema.PENDING:
+                value = schema.CHECKSUM.fill
             rows_of = self._datasets[schema.CHECKSUM.name]
-            rows_of.write(row, rows_of.block(checksum(parts)))
+            rows_of.write(row, rows_of.block(value))
             self.flush()
             self._datasets[schema.STATUS.name].write(row, blocks[schema.STATUS.name])
             self.flush()
 
     def _set_pending(self, row: int) -> None:
-        rows_of = self._datasets[schema.STATUS.name]
-        rows_of.write(row, rows_of.block(schema.PENDING))
+        with self._writing(row):
+            rows_of = self._datasets[schema.STATUS.name]
+            rows_of.write(row, rows_of.block(schema.PENDING))
+            self.flush()
 
     def _origin_of(self, rank: int) -> dict[str, bytes]:
         return {schema.ORIGIN.name: schema.encode_text(self._origin(rank), schema.ORIGIN_LENGTH)}
@@ -210,29 +203,25 @@ class DatasetRows:
 
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._id = dataset.id
-        self._shape = dataset.shape[1:]
+        self.shape = dataset.shape[1:]
         self._dtype = dataset.dtype
         self._space = self._id.get_space()
-        self._memory = h5py.h5s.create_simple((1, *self._shape))
-        self._rest = (0,) * len(self._shape)
+        self._memory = h5py.h5s.create_simple((1, *self.shape))
+        self._rest = (0,) * len(self.shape)
 
     def block(self, value: Any) -> NDArray[Any]:
         """Return the bytes that a value of a row has in the file, shape (1, …)."""
-        if np.shape(value) != self._shape:
+        if np.shape(value) != self.shape:
             raise ValueError(
-                f"{self._id.name!r} has rows of shape {self._shape}, not {np.shape(value)}"
+                f"{self._id.name!r} has rows of shape {self.shape}, not {np.shape(value)}"
             )
-        block = np.empty((1, *self._shape), self._dtype)
+        block = np.empty((1, *self.shape), self._dtype)
         block[0] = value
         return block
 
-    def filled(self, fill: Any) -> NDArray[Any]:
-        """Return a row that holds one value throughout, shape (1, …)."""
-        return np.full((1, *self._shape), fill, self._dtype)
-
     def write(self, row: int, block: NDArray[Any]) -> None:
-        """Write a row that :meth:`block` or :meth:`filled` has made."""
+        """Write a row that :meth:`block` has made."""
         if not block.size:
             return
-        self._space.select_hyperslab((row, *self._rest), (1, *self._shape))
+        self._space.select_hyperslab((row, *self._rest), (1, *self.shape))
         self._id.write(self._memory, self._space, block)
