@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -75,14 +75,19 @@ class Writer:
         # Closing is collective: a rank that failed alone must not wait here for the others. And
         # HDF5 1.10 crashes when all ranks close a file that it cannot write to.
         if kind is None or self._disk is not None:
-            self.close()
+            with suppress(WriteError) if kind else nullcontext():  # the first error is raised
+                self.close()
 
     def close(self) -> None:
-        """Close the file (collectively, if it was opened so)."""
+        """Close the file (collectively, if it was opened so; WriteError)."""
         with signals_held():
-            self._file.close()
-            if self._disk is not None:
-                self._disk.close()
+            try:
+                self._file.close()
+                if self._disk is not None:
+                    self._disk.close()
+                    self._disk.check()
+            except (OSError, RuntimeError) as error:
+                raise WriteError(f"{self.path} could not be closed: {reason(error)}") from error
         self._names.close()
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
