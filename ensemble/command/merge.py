@@ -36,7 +36,7 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.solver.checks import counted
 
     out = args.out
-    check_results_file("--out", out)
+    check_results_file(out)
     with RunLock(out) as lock:
         lock.acquire(1, 10.0)
         try:

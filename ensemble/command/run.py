@@ -108,17 +108,15 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
 
     started = time.time()
     comm: Any = OneRank()
-    processes = 0
     try:
         if args.ranks is not None and not args.dry_run:
-            check_ranks("--ranks", args.ranks)
+            check_ranks(args.ranks)
             if launched()[0] > 1:
                 raise InputError(
                     "--ranks starts ranks of its own: leave it out under mpirun or srun"
                 )
-            processes = args.ranks - 1
         comm = world()
-        code = _run(args, comm, processes, started, engine)
+        code = _run(args, comm, started, engine)
         return code if comm.rank == 0 else exit_codes.DONE
     except InputError as error:
         if comm.size == 1:
@@ -148,9 +146,7 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     comm.Abort(code)
 
 
-def _run(
-    args: argparse.Namespace, comm: Any, processes: int, started: float, engine: Engine | None
-) -> int:
+def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
     from adhesis.ensemble.campaign.file import load_campaign
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Unresponsive
@@ -173,7 +169,7 @@ def _run(
         max_failures=args.max_failures or None,
         deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),
         patience=args.patience,
-        processes=processes,
+        processes=(args.ranks or 1) - 1,
     )
     try:
         summary = run_campaign(campaign, path, comm, options, log, engine)
@@ -194,7 +190,7 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
     """Refuse the campaign file itself, and what is no results file or will be none."""
     from adhesis.ensemble.results.layout import check_results_file
 
-    check_results_file("--out", path)
+    check_results_file(path)
     if os.path.exists(path) and path.samefile(args.campaign):
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
