@@ -23,6 +23,7 @@ from adhesis.ensemble.reporter import bar, log
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
+    from adhesis.ensemble.campaign.tasks import Part
     from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.progress import Summary
     from adhesis.ensemble.run.session import Engine
@@ -159,9 +160,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     campaign = together(comm, lambda: load_campaign(args.campaign))
     path = args.out or Path(f"{args.campaign.stem}.h5")
     together(comm, lambda: _check_out(args, path))
-    if args.dry_run:
-        return _tell_price(campaign, path, args, engine) if comm.rank == 0 else exit_codes.DONE
-    if args.part and not args.out:
+    if args.part and not args.out and not args.dry_run:
         raise InputError("--part needs --out: every part has a results file of its own")
     options = Options(
         part=Part.parse(args.part) if args.part else WHOLE,
@@ -171,6 +170,12 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
         patience=args.patience,
         processes=(args.ranks or 1) - 1,
     )
+    if args.dry_run:
+        if options.redo is not None:
+            raise InputError(
+                "--redo and --dry-run cannot be given together: the price is that of pending tasks"
+            )
+        return _price(campaign, path, options.part, engine) if comm.rank == 0 else exit_codes.DONE
     try:
         summary = run_campaign(campaign, path, comm, options, log, engine)
     except Unresponsive as error:
@@ -226,15 +231,11 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Optio
         )
 
 
-def _tell_price(
-    campaign: Campaign, path: Path, args: argparse.Namespace, engine: Engine | None
-) -> int:
-    from adhesis.ensemble.campaign.tasks import WHOLE, Part
+def _price(campaign: Campaign, path: Path, part: Part, engine: Engine | None) -> int:
     from adhesis.ensemble.run.price import price
     from adhesis.ensemble.run.session import Engine
 
     engine = engine or Engine()
-    part = Part.parse(args.part) if args.part else WHOLE
     with bar("price", last=False) as show:
         estimate = price(
             *(campaign, path, part),
