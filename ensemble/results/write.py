@@ -19,16 +19,12 @@ from adhesis.ensemble.errors import WriteError, reason
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
 from adhesis.ensemble.results.disk_file import DiskFile
-from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row
 from adhesis.solver.runtime.uninterrupted import signals_held
 
-_KEPT_NAMES = frozenset(d.name for d in schema.DATASETS if d.dims[0] == KEPT)
+_KEPT_NAMES = frozenset(d.name for d in OF_KEPT)
 _NAMES = frozenset(d.name for d in RESULT_DATASETS)
-# What a row holds beside the task itself, its status and its checksum.
-_CONTENT = tuple(
-    d for d in schema.DATASETS if d not in (*schema.TASK_DATASETS, schema.STATUS, schema.CHECKSUM)
-)
 
 # Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
 _LONGEST_NAME = 200
@@ -64,7 +60,7 @@ class Writer:
                 self._opened = os.stat(self.path)
             except OSError as error:  # it was there when the run was prepared
                 raise WriteError(f"{self.path} could not be opened: {reason(error)}") from error
-            self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in schema.DATASETS}
+            self._datasets = {d.name: DatasetRows(self._file[d.name]) for d in schema.ROW_DATASETS}
             self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
         self._origin = origin
 
@@ -126,37 +122,31 @@ class Writer:
         All of a row is written: a run that was killed may have left a part of it.
         """
         with self._writing(row):
-            blocks = {schema.STATUS.name: self._datasets[schema.STATUS.name].block(status)}
-            for dataset in _CONTENT:
-                name, place = dataset.name, self._place(dataset.name, row)
-                if place is not None:
-                    rows_of = self._datasets[name]
-                    given = name in values
-                    value = values[name] if given else np.full(rows_of.shape, dataset.fill)
-                    blocks[name] = rows_of.block(value)
-                    rows_of.write(place, blocks[name])
-            covered = (d.name for d in (*OF_TASKS, *OF_KEPT))
-            value = checksum(blocks[name] for name in covered if name in blocks)
-            if status == schema.PENDING:
-                value = schema.CHECKSUM.fill
-            rows_of = self._datasets[schema.CHECKSUM.name]
-            rows_of.write(row, rows_of.block(value))
-            self.flush()
-            self._datasets[schema.STATUS.name].write(row, blocks[schema.STATUS.name])
-            self.flush()
+            values, blocks = {**values, schema.STATUS.name: status}, []
+            kept = self._kept.get(row)
+            held = [(d, row) for d in OF_TASKS] + [(d, kept) for d in OF_KEPT if kept is not None]
+            for dataset, place in held:
+                rows_of, given = self._datasets[dataset.name], dataset.name in values
+                value = values[dataset.name] if given else np.full(rows_of.shape, dataset.fill)
+                blocks.append(rows_of.block(value))
+                if dataset is not schema.STATUS:
+                    rows_of.write(place, blocks[-1])
+            covered = schema.CHECKSUM.fill if status == schema.PENDING else checksum(blocks)
+            self._put(schema.CHECKSUM, row, covered)
+            self._put(schema.STATUS, row, status)
 
     def _set_pending(self, row: int) -> None:
         with self._writing(row):
-            rows_of = self._datasets[schema.STATUS.name]
-            rows_of.write(row, rows_of.block(schema.PENDING))
-            self.flush()
+            self._put(schema.STATUS, row, schema.PENDING)
+
+    def _put(self, dataset: Dataset, row: int, value: int) -> None:
+        """Write one number of a row, and hand all that was written to the operating system."""
+        rows_of = self._datasets[dataset.name]
+        rows_of.write(row, rows_of.block(value))
+        self.flush()
 
     def _origin_of(self, rank: int) -> dict[str, bytes]:
         return {schema.ORIGIN.name: schema.encode_text(self._origin(rank), schema.ORIGIN_LENGTH)}
-
-    def _place(self, name: str, row: int) -> int | None:
-        """Return the place of the row of a task in a dataset; None where it has none."""
-        return self._kept.get(row) if name in _KEPT_NAMES else row
 
     @contextmanager
     def _writing(self, row: int) -> Iterator[None]:
