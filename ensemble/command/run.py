@@ -24,7 +24,6 @@ from adhesis.ensemble.reporter import bar, log
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
     from adhesis.ensemble.campaign.tasks import Part
-    from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.progress import Summary
     from adhesis.ensemble.run.session import Engine
 
@@ -104,6 +103,7 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
 
     Tests pass another engine than loops.
     """
+    from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.launch import check_ranks
     from adhesis.ensemble.run.ranks import OneRank, launched, wait_for_all, world
 
@@ -128,11 +128,15 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
             _end_job(comm, exit_codes.BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
         return exit_codes.BAD_INPUT if comm.rank == 0 else exit_codes.DONE
     except BaseException as error:
-        if args.dry_run and isinstance(error, (BrokenPipeError, WriteError)):
+        if args.dry_run and (comm.size == 1 or isinstance(error, (BrokenPipeError, WriteError))):
             raise
-        code, sentence = exit_codes.ended_by(error)
+        if isinstance(error, Unresponsive):  # nobody can be waited for: the results file is sound
+            code, sentence = exit_codes.RESUME, str(error)
+        else:
+            code, sentence = exit_codes.ended_by(error)
         if sentence:
-            again = ", run the same command to resume" if code == exit_codes.INTERRUPTED else ""
+            resumes = code in (exit_codes.INTERRUPTED, exit_codes.RESUME)
+            again = f", {_again(args)}" if resumes else ""
             sentence = f"adhesis run: {sentence}; what was done is kept{again}"
         _end_job(comm, code, sentence)
         if code == exit_codes.WRITE_FAILED:
@@ -150,7 +154,6 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
 def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
     from adhesis.ensemble.campaign.file import load_campaign
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
-    from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
     from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.ranks import together
@@ -176,15 +179,9 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
                 "--redo and --dry-run cannot be given together: the price is that of pending tasks"
             )
         return _price(campaign, path, options.part, engine) if comm.rank == 0 else exit_codes.DONE
-    try:
-        summary = run_campaign(campaign, path, comm, options, log, engine)
-    except Unresponsive as error:
-        # Nobody can be waited for: what is in flight is lost, the results file is sound.
-        text = f"adhesis run: {error}; what was done is kept, {_again(options)}"
-        _end_job(comm, exit_codes.RESUME, text)
-        return exit_codes.RESUME
+    summary = run_campaign(campaign, path, comm, options, log, engine)
     if comm.rank == 0:
-        _report_end(campaign, path, summary, options)
+        _report_end(campaign, path, summary, _again(args))
     too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
     if summary.pending and not too_many:
         return exit_codes.RESUME
@@ -200,14 +197,14 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
-def _again(options: Options) -> str:
+def _again(args: argparse.Namespace) -> str:
     """Return how a run is resumed; with --redo what it did would be computed once more."""
-    if options.redo is None:
+    if args.redo is None:
         return "run the same command again to resume"
     return "run the command again without --redo to resume"
 
 
-def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Options) -> None:
+def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) -> None:
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
@@ -226,9 +223,7 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Optio
         why = why_beyond(campaign.material.opens)
         log(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
     if summary.stopped:
-        log(
-            f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {_again(options)}"
-        )
+        log(f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {again}")
 
 
 def _price(campaign: Campaign, path: Path, part: Part, engine: Engine | None) -> int:
