@@ -350,8 +350,7 @@ class Worker:
     clock: Callable[[], float] = time.monotonic  # replaced in tests
 
     def __post_init__(self) -> None:
-        self._halted = False
-        self._reported = False
+        self._stops = False  # as the master or a signal to this rank asks
         self._looking = False
         self._reported_at = -math.inf
         self._task: int | None = None
@@ -400,7 +399,7 @@ class Worker:
                 self._look()
             finally:
                 self._looking = False
-        return self._halted or self._reported
+        return self._stops
 
     def _look(self) -> None:
         """Report if it is time to, and look for urgent messages."""
@@ -409,9 +408,9 @@ class Worker:
             self._reported_at = now
             self.channel.send(MASTER, ("alive", self._task, self._note))
         while self.channel.poll(urgent=True) is not None:
-            self._halted = True
-        if not self._halted and not self._reported and (reason := self.limits.stop()) is not None:
-            self._reported = True
+            self._stops = True
+        if not self._stops and (reason := self.limits.stop()) is not None:
+            self._stops = True
             self.channel.send(MASTER, ("stop", reason))
 
 
