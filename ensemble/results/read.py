@@ -19,7 +19,7 @@ from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import HEAD, check_head
-from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
+from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.checks import shown
 
 _MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
@@ -65,7 +65,6 @@ class Results:
             self.part = self._part()
             self._check_attributes()
             self._check_members()
-            self._sizes = sizes_of(schema.scales(self.campaign, self.part))
             self._tasks = self.campaign.tasks(self.part)
             stack.pop_all()
 
@@ -253,7 +252,7 @@ class Results:
     def _differ(self, rows: NDArray[np.intp], status: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Whether rows that are not pending cannot be what was written."""
         written = self.column(schema.CHECKSUM.name, rows)
-        held = row_checksums(self.column, self._sizes, self.column(KEPT), rows)
+        held = row_checksums(self.column, self.column(KEPT), rows)
         return np.asarray((status > schema.NOT_NEEDED) | (written != held))
 
     def tasks(self) -> Tasks:
