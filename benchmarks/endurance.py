@@ -41,7 +41,6 @@ from adhesis.ensemble.run.ranks import world
 from adhesis.ensemble.run.session import Engine, run_campaign
 from adhesis.ensemble.task.compute import Runner, check_task
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
-from adhesis.ensemble.task.fields import field_plan
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -117,7 +116,7 @@ def do_nothing(seconds: float) -> Callable[..., Row]:
     def compute(campaign: Campaign, task: Task, progress: Any = None) -> Row:
         if seconds:
             time.sleep(seconds)
-        return row(campaign, task.realisation < field_plan(campaign).realisations)
+        return row(campaign, task.realisation < campaign.output.field_realisations)
 
     return compute
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, one_of, refused_as_input
+from adhesis.ensemble.errors import InputError, one_of, parameter, refused_as_input
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
@@ -145,9 +145,9 @@ def _take_defaults(args: argparse.Namespace) -> list[str]:
             if getattr(args, name) is None:
                 setattr(args, name, value)
                 text = plain(value) if isinstance(value, float) else value
-                taken.append(f"--{name.replace('_', '-')} {texts.get(name, text)}")
+                taken.append(f"{parameter(name)} {texts.get(name, text)}")
         return taken
-    missing = [f"--{n.replace('_', '-')}" for n in _MATERIAL if getattr(args, n) is None]
+    missing = [parameter(name) for name in _MATERIAL if getattr(args, name) is None]
     if missing and (args.heights or args.trace):
         raise InputError(
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing: with "

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, parameter
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import bar, log
 
@@ -248,8 +248,9 @@ def _selection(args: argparse.Namespace) -> Any:
     values = {name: getattr(args, name) for name in ("hurst", "work_of_adhesion", "realisation")}
     if args.redo is None:
         for name in filter(values.get, values):
-            option = "--" + name.replace("_", "-")
-            raise InputError(f"{option} needs --redo: it chooses the tasks to compute again")
+            raise InputError(
+                f"{parameter(name)} needs --redo: it chooses the tasks to compute again"
+            )
         return None
     if args.redo not in ("failed", "all"):
         raise InputError(f"--redo is {args.redo!r}: it must be failed or all")

@@ -106,7 +106,8 @@ class Runner:
                 "unloading": unit * campaign.unloading_penetration,
             }
         row = row_of(loop, sizes_of(row_scales(campaign)), axes)
-        row |= field_row(plan, branch.method, loop, keep=task.realisation < plan.realisations)
+        keep = task.realisation < campaign.output.field_realisations
+        row |= field_row(plan, branch.method, loop, keep=keep)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         return {"wall_time": wall, "cpu_time": cpu, **row}
 
