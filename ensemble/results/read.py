@@ -89,10 +89,7 @@ class Results:
         """
         for name in self._file:
             if not isinstance(self._file.get(name, getlink=True), h5py.HardLink):
-                raise InputError(
-                    f"{self.path} is damaged: its {name} is a link, and not in the file itself; "
-                    f"{_INSTEAD}"
-                )
+                raise self._damaged(f"{name} is a link, and not in the file itself")
 
     def _root_attributes(self) -> dict[str, Any]:
         found = {}
@@ -112,10 +109,8 @@ class Results:
         try:
             return Part.parse(text)
         except InputError:  # of which it names an option
-            raise InputError(
-                f"{self.path} is damaged: its attribute part is {quoted(text)}, and must be K/N "
-                f"with 1 ≤ K ≤ N, as 3/20; {_INSTEAD}"
-            ) from None
+            rule = "must be K/N with 1 ≤ K ≤ N, as 3/20"
+            raise self._damaged(f"attribute part is {quoted(text)}, and {rule}") from None
 
     def _check_attributes(self) -> None:
         """Compare the root attributes with those that the campaign decides.
@@ -126,9 +121,9 @@ class Results:
         for name, value in wanted.items():
             found: Any = self.attributes.get(name)
             if name not in _WORDING and not np.array_equal(found, value):
-                raise InputError(
-                    f"{self.path} is damaged: its attribute {name} is {shown(found)}, and that of "
-                    f"its campaign is {shown(value)}; {_INSTEAD}"
+                raise self._damaged(
+                    f"attribute {name} is {shown(found)}, and that of its campaign is "
+                    f"{shown(value)}"
                 )
 
     def _check_members(self) -> None:
@@ -169,10 +164,14 @@ class Results:
         wrong = np.flatnonzero(~np.isclose(found, wanted, rtol=rounding, atol=0.0))
         if wrong.size:
             row = int(wrong[0])
-            raise InputError(
-                f"{self.path} is damaged: its {dataset.name} is not that of its campaign "
-                f"({found[row]} instead of {wanted[row]} in row {row}); {_INSTEAD}"
+            raise self._damaged(
+                f"{dataset.name} is not that of its campaign ({found[row]} instead of "
+                f"{wanted[row]} in row {row})"
             )
+
+    def _damaged(self, what: str) -> InputError:
+        """Return the sentence on what is beside the rows and cannot be computed again."""
+        return InputError(f"{self.path} is damaged: its {what}; {_INSTEAD}")
 
     def __enter__(self) -> Self:
         return self
