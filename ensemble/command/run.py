@@ -148,7 +148,8 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     """End every rank: the others know nothing of this one's error and would wait for ever."""
     if sentence:
         log(sentence)
-    comm.Abort(code)
+    if comm.size > 1:
+        comm.Abort(code)
 
 
 def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:

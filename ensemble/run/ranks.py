@@ -40,16 +40,9 @@ _SETTING = "_MCA_"  # in the names of settings, which users make for launchers
 
 
 class OneRank:
-    """Communicator of a process that is alone, with what a run calls of MPI's."""
+    """Communicator of a process that is alone: there is nobody to talk to."""
 
     rank, size = 0, 1
-
-    def allgather(self, value: T) -> list[T]:
-        """Return the values of all ranks."""
-        return [value]
-
-    def Abort(self, code: int) -> None:
-        """Leave the end to the caller: there are no other ranks."""
 
 
 def launched() -> tuple[int, int, str]:

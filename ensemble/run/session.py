@@ -94,8 +94,8 @@ def run_campaign(
             # The last bits of a rank's rows depend on versions and processor. All ranks run one
             # installation, on nodes that may differ; processes that this one starts have its own.
             known = together(comm, versions)
-            processors = comm.allgather(processor()) * (size // comm.size)
-            origins = [origin_of(known | {"processor": name}) for name in processors]
+            names = comm.allgather(processor()) if comm.size > 1 else size * [processor()]
+            origins = [origin_of(known | {"processor": name}) for name in names]
         own_rows = comm.size > 1 and engine.all_write
         if own_rows and comm.rank > 0:
             lock.join()
