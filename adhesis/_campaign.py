@@ -135,7 +135,7 @@ class Campaign:
         from adhesis.ensemble.results.layout import check_results_file
 
         if path is not None:
-            check_results_file("out", path)
+            check_results_file(path)
         from adhesis.ensemble.run.price import price
 
         return price(self.tables, path, seconds=seconds)
@@ -185,14 +185,14 @@ class Campaign:
         checks.flag("progress", progress)
         from adhesis.ensemble.results.layout import check_results_file
 
-        check_results_file("out", path)
+        check_results_file(path)
         from adhesis._open import open as open_results
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run.launch import check_ranks
         from adhesis.ensemble.run.plan import Options
         from adhesis.ensemble.run.session import run_campaign
 
-        check_ranks("ranks", ranks)
+        check_ranks(ranks)
         say = log if progress else lambda text: None
         stream = None if progress else io.StringIO()  # stderr is that of all threads
         options = Options(processes=ranks - 1)

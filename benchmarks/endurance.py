@@ -21,8 +21,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -36,12 +35,12 @@ from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, file_size
 from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.dispatch import Master, Worker
 from adhesis.ensemble.run.launch import ONE_THREAD, launch_environment, launcher
 from adhesis.ensemble.run.ranks import world
 from adhesis.ensemble.run.session import Engine, run_campaign
 from adhesis.ensemble.task.compute import Runner, check_task
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
-from adhesis.ensemble.task.fields import field_plan
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -77,11 +76,14 @@ def measured(times: Times, pretend: float | None) -> Engine:
     ``pretend``: seconds of tasks that do nothing, instead of loops.
     """
 
-    @contextmanager
-    def watch() -> Iterator[None]:
-        wall, cpu = time.perf_counter(), time.process_time()
-        yield
-        times.loop, times.cpu = time.perf_counter() - wall, time.process_time() - cpu
+    def timed(loop: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        def run(of: Any) -> Any:
+            wall, cpu = time.perf_counter(), time.process_time()
+            ended = loop(of)
+            times.loop, times.cpu = time.perf_counter() - wall, time.process_time() - cpu
+            return ended
+
+        return run
 
     class TimedWriter(Writer):
         def write_result(self, row: int, result: Row, rank: int = 0) -> None:
@@ -93,12 +95,9 @@ def measured(times: Times, pretend: float | None) -> Engine:
 
     compute = Runner() if pretend is None else do_nothing(pretend)
     check = check_task if pretend is None else lambda *_: None
-    return Engine(
-        compute=compute,
-        check=check,
-        writer=TimedWriter,
-        watch=watch,
-    )
+    for loop in (Master, Worker):
+        loop.run = timed(loop.run)
+    return Engine(compute=compute, check=check, writer=TimedWriter)
 
 
 def do_nothing(seconds: float) -> Callable[..., Row]:
@@ -117,7 +116,7 @@ def do_nothing(seconds: float) -> Callable[..., Row]:
     def compute(campaign: Campaign, task: Task, progress: Any = None) -> Row:
         if seconds:
             time.sleep(seconds)
-        return row(campaign, task.realisation < field_plan(campaign).realisations)
+        return row(campaign, task.realisation < campaign.output.field_realisations)
 
     return compute
 

@@ -8,6 +8,7 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,12 @@ def versions() -> dict[str, str]:
     return {**software(), "mpi": _mpi(), "hdf5": _hdf5(), "fftw": _fftw()}
 
 
+@cache
 def software() -> dict[str, str]:
-    """Return the versions that decide the bits of a loop, the commit and the processor."""
+    """Return the versions that decide the bits of a loop, the commit and the processor.
+
+    They are those of the first call: what is loaded stays, whatever is checked out meanwhile.
+    """
     return {
         "adhesis_version": _package("adhesis", missing="unknown"),
         "commit": commit(),

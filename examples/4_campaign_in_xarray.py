@@ -7,7 +7,6 @@ units.
 """
 
 import tempfile
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 
@@ -29,13 +28,12 @@ campaign = adhesis.Campaign(
         "cycle": {"max_penetration": 0.8, "load_steps": 16},
     }
 )
-out = Path(tempfile.mkdtemp()) / "small.h5"
 print(campaign)
 
 # %%
 # Each quantity has an axis for the Hurst exponent, the work of adhesion and the realisation.
 # Selections are xarray's.
-with campaign.run(out) as results:
+with tempfile.TemporaryDirectory() as folder, campaign.run(f"{folder}/small.h5") as results:
     loops = results.dataset.load()
 print(loops.loss.mean("realisation").to_dataframe())
 

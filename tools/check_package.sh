@@ -24,9 +24,8 @@ rm -rf "$place"/adhesis-*/
 
 echo "package: a bare environment"
 "$python" -m venv "$place/venv"
-step package "installing the wheel and what it needs" \
-    "$place/venv/bin/python" -m pip --no-input install --quiet "$place"/adhesis-*.whl ||
-    { cat .setup/package.log >&2; exit 1; }
+must package "installing the wheel and what it needs" \
+    "$place/venv/bin/python" -m pip --no-input install --quiet "$place"/adhesis-*.whl
 # Nothing of this machine is in PATH: no mpirun, no compiler.
 adhesis() { (cd "$place" && env -i PATH="$place/venv/bin" HOME="$place" adhesis "$@"); }
 

@@ -11,12 +11,6 @@ log=.setup/docs.log
 mkdir -p .setup
 . tools/parts.sh
 trap end_parts EXIT
-must() { # NAME TEXT COMMAND…: a part whose log is shown where it fails
-    step "$@" || {
-        cat ".setup/$1.log" >&2
-        exit 1
-    }
-}
 tools=.setup/docs
 if ! cmp -s docs/requirements.lock "$tools/requirements.lock"; then
     rm -rf "$tools"

@@ -301,9 +301,8 @@ def _of_loop(loop: LoopResult) -> list[str]:
     wrong = []
     problem, h_max = loop.problem, loop.problem.profile.h_max
     prescribed = problem.control.prescribed(loop.separation, loop.mean_stress)
-    kept = (loop.patches > 0) | (
-        not problem.control.is_load
-    )  # a load is not carried out of contact
+    # a load is not carried out of contact
+    kept = loop.patches > 0 if problem.control.is_load else np.ones(loop.patches.size, bool)
     prescribed, branches = prescribed[kept], loop.branch[kept]
     for what in ("separation", "mean_stress", "energy", "contact_fraction"):
         if not np.all(np.isfinite(getattr(loop, what))):

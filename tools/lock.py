@@ -32,10 +32,9 @@ def closure(names: Iterable[str]) -> dict[str, str]:
         key = re.sub(r"[-_.]+", "-", asked.name).lower()
         package = distribution(asked.name)
         extras = asked.extras or {""}
-        needed = [Requirement(text) for text in package.requires or ()]
         wanted = [
             str(other)
-            for other in needed
+            for other in map(Requirement, package.requires or ())
             if other.marker is None or any(other.marker.evaluate({"extra": e}) for e in extras)
         ]
         if key in found and not asked.extras:

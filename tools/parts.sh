@@ -50,6 +50,13 @@ finish() {
 }
 # step NAME TEXT COMMAND…: a part that is waited for at once
 step() { part "$@" && finish "$1"; }
+# must NAME TEXT COMMAND…: a step whose log is shown, and which ends all, where it fails
+must() {
+    step "$@" || {
+        cat ".setup/$1.log" >&2
+        exit 1
+    }
+}
 # end_parts: end what is still under way, with all that it started
 end_parts() {
     local name

@@ -11,8 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def readme() -> str:
     """Return the text."""
     text = (ROOT / "README.md").read_text()
-    text = re.sub(r"!\[[^]]*\]\((?!https?:)[^)]*\)\n\n\*[^*]*\*\n\n", "", text)
-    text = re.sub(r"!\[[^]]*\]\((?!https?:)[^)]*\)\n?", "", text)
+    text = re.sub(r"!\[[^]]*\]\((?!https?:)[^)]*\)(\n\n\*[^*]*\*\n\n|\n?)", "", text)
     return re.sub(r"\[([^]]+)\]\((?!https?:)[^)]*\)", r"\1", text)
 
 

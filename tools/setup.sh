@@ -334,16 +334,13 @@ if [ -n "${pid[h5py]:-}" ] && ! finish h5py; then
     tail -n 15 .setup/h5py.log
     why_serial="h5py could not be built against $hdf5 (see .setup/h5py.log)"
 fi
-install_h5py() { # WHAT… from a wheel, whatever is installed now
-    install --force-reinstall "$@"
-}
 has_mpi_h5py() { "$venv/bin/python" -c 'import h5py, sys; sys.exit(not h5py.get_config().mpi)' 2>>"$log"; }
 if [ -z "$why_serial" ]; then
-    step installing "installing h5py with parallel HDF5" install_h5py "$wheels"/h5py-*.whl || true
+    step installing "installing h5py with parallel HDF5" install --force-reinstall "$wheels"/h5py-*.whl || true
     has_mpi_h5py || why_serial="the h5py in $wheels has no MPI or cannot be loaded"
 fi
 if [ -n "$why_serial" ]; then
-    part serial "installing h5py without MPI" install_h5py --only-binary=h5py "h5py==$H5PY"
+    part serial "installing h5py without MPI" install --force-reinstall --only-binary=h5py "h5py==$H5PY"
     required serial
 fi
 if ! has_mpi; then

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, one_of, refused_as_input
+from adhesis.ensemble.errors import InputError, one_of, parameter, refused_as_input
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
@@ -39,7 +39,6 @@ from adhesis.solver.model.profile import Profile, profile_from_heights, self_aff
 from adhesis.solver.registry import make_method
 
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
-_BELONGS_TO_TRACE = "{} belongs to --trace, which is not given"
 FIGURE_FORMATS = (".png", ".pdf", ".svg")
 _MATERIAL = {"work_of_adhesion": 0.04, "young": 1e6, "poisson": 0.5}
 # Of every field that is kept, over all its states: three arrays of so many numbers take 1.6 GB.
@@ -146,9 +145,9 @@ def _take_defaults(args: argparse.Namespace) -> list[str]:
             if getattr(args, name) is None:
                 setattr(args, name, value)
                 text = plain(value) if isinstance(value, float) else value
-                taken.append(f"--{name.replace('_', '-')} {texts.get(name, text)}")
+                taken.append(f"{parameter(name)} {texts.get(name, text)}")
         return taken
-    missing = [f"--{n.replace('_', '-')}" for n in _MATERIAL if getattr(args, n) is None]
+    missing = [parameter(name) for name in _MATERIAL if getattr(args, name) is None]
     if missing and (args.heights or args.trace):
         raise InputError(
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing: with "
@@ -196,30 +195,27 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     if len(sources) != 1:
         found = f"{' and '.join(sources)} are" if sources else "no profile is"
         raise InputError(f"{found} given: give one of --hurst, --heights and --trace")
-    if args.hurst is not None:
+    if args.heights is not None and args.period is None:
+        raise InputError("--heights needs --period, the length of the period, as in 2mm")
+    if args.hurst is None:
+        of_hurst = ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes")
+        for option in given(args, *of_hurst, *(() if args.trace is None else ("period",))):
+            raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
+    if args.trace is None:
+        of_heights = () if args.heights is None else ("--unit", "--delimiter", "--decimal")
         for option in given(args):
-            raise InputError(_BELONGS_TO_TRACE.format(option))
+            if option not in of_heights:
+                raise InputError(f"{option} belongs to --trace, which is not given")
+    if args.hurst is not None:
         return _self_affine(args), []
     if args.heights is not None:
-        if args.period is None:
-            raise InputError("--heights needs --period, the length of the period, as in 2mm")
-        _refuse_options_of_hurst(args)
         return _given_heights(args)
-    _refuse_options_of_hurst(args, "period")
     prepared = prepared_of(args, trace_of(args, args.trace))
     print(what_was_read(prepared))
     return prepared.profile(), []
 
 
-def _refuse_options_of_hurst(args: argparse.Namespace, *more: str) -> None:
-    for option in given(args, "seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes", *more):
-        raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
-
-
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
-    for option in given(args):
-        if option not in ("--unit", "--delimiter", "--decimal"):
-            raise InputError(_BELONGS_TO_TRACE.format(option))
     heights = read_heights(
         args.heights, unit=args.unit, delimiter=delimiter_of(args), decimal=args.decimal
     )

@@ -7,10 +7,10 @@ results file like any other: merge further parts into it, resume it, grow its ca
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from adhesis.ensemble.errors import WriteError
+from adhesis.ensemble.reporter import log
 
 EXAMPLES = (
     "adhesis merge part1.h5 part2.h5 --out all.h5",
@@ -36,7 +36,7 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.solver.checks import counted
 
     out = args.out
-    check_results_file("--out", out)
+    check_results_file(out)
     with RunLock(out) as lock:
         lock.acquire(1, 10.0)
         try:
@@ -45,7 +45,7 @@ def execute(args: argparse.Namespace) -> int:
             lock.release()  # nobody else writes
             raise WriteError(f"{error}; the same command resumes") from error
     for doubt in merged.doubts:
-        print(f"adhesis merge: {doubt}", file=sys.stderr)
+        log(f"adhesis merge: {doubt}")
     failed = f", {merged.failed} failed" if merged.failed else ""
     print(
         f"{out}: {merged.taken} rows taken over from {counted(len(args.parts), 'file')}; "

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, parameter
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import bar, log
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
-    from adhesis.ensemble.run.plan import Options
+    from adhesis.ensemble.campaign.tasks import Part
     from adhesis.ensemble.run.progress import Summary
     from adhesis.ensemble.run.session import Engine
 
@@ -103,22 +103,21 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
 
     Tests pass another engine than loops.
     """
+    from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.launch import check_ranks
     from adhesis.ensemble.run.ranks import OneRank, launched, wait_for_all, world
 
     started = time.time()
     comm: Any = OneRank()
-    processes = 0
     try:
         if args.ranks is not None and not args.dry_run:
-            check_ranks("--ranks", args.ranks)
+            check_ranks(args.ranks)
             if launched()[0] > 1:
                 raise InputError(
                     "--ranks starts ranks of its own: leave it out under mpirun or srun"
                 )
-            processes = args.ranks - 1
         comm = world()
-        code = _run(args, comm, processes, started, engine)
+        code = _run(args, comm, started, engine)
         return code if comm.rank == 0 else exit_codes.DONE
     except InputError as error:
         if comm.size == 1:
@@ -129,11 +128,15 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
             _end_job(comm, exit_codes.BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
         return exit_codes.BAD_INPUT if comm.rank == 0 else exit_codes.DONE
     except BaseException as error:
-        if args.dry_run and isinstance(error, (BrokenPipeError, WriteError)):
+        if args.dry_run and (comm.size == 1 or isinstance(error, (BrokenPipeError, WriteError))):
             raise
-        code, sentence = exit_codes.ended_by(error)
+        if isinstance(error, Unresponsive):  # nobody can be waited for: the results file is sound
+            code, sentence = exit_codes.RESUME, str(error)
+        else:
+            code, sentence = exit_codes.ended_by(error)
         if sentence:
-            again = ", run the same command to resume" if code == exit_codes.INTERRUPTED else ""
+            resumes = code in (exit_codes.INTERRUPTED, exit_codes.RESUME)
+            again = f", {_again(args)}" if resumes else ""
             sentence = f"adhesis run: {sentence}; what was done is kept{again}"
         _end_job(comm, code, sentence)
         if code == exit_codes.WRITE_FAILED:
@@ -145,15 +148,13 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     """End every rank: the others know nothing of this one's error and would wait for ever."""
     if sentence:
         log(sentence)
-    comm.Abort(code)
+    if comm.size > 1:
+        comm.Abort(code)
 
 
-def _run(
-    args: argparse.Namespace, comm: Any, processes: int, started: float, engine: Engine | None
-) -> int:
+def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
     from adhesis.ensemble.campaign.file import load_campaign
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
-    from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
     from adhesis.ensemble.run.plan import Options
     from adhesis.ensemble.run.ranks import together
@@ -163,9 +164,7 @@ def _run(
     campaign = together(comm, lambda: load_campaign(args.campaign))
     path = args.out or Path(f"{args.campaign.stem}.h5")
     together(comm, lambda: _check_out(args, path))
-    if args.dry_run:
-        return _tell_price(campaign, path, args, engine) if comm.rank == 0 else exit_codes.DONE
-    if args.part and not args.out:
+    if args.part and not args.out and not args.dry_run:
         raise InputError("--part needs --out: every part has a results file of its own")
     options = Options(
         part=Part.parse(args.part) if args.part else WHOLE,
@@ -173,17 +172,17 @@ def _run(
         max_failures=args.max_failures or None,
         deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),
         patience=args.patience,
-        processes=processes,
+        processes=(args.ranks or 1) - 1,
     )
-    try:
-        summary = run_campaign(campaign, path, comm, options, log, engine)
-    except Unresponsive as error:
-        # Nobody can be waited for: what is in flight is lost, the results file is sound.
-        text = f"adhesis run: {error}; what was done is kept, {_again(options)}"
-        _end_job(comm, exit_codes.RESUME, text)
-        return exit_codes.RESUME
+    if args.dry_run:
+        if options.redo is not None:
+            raise InputError(
+                "--redo and --dry-run cannot be given together: the price is that of pending tasks"
+            )
+        return _price(campaign, path, options.part, engine) if comm.rank == 0 else exit_codes.DONE
+    summary = run_campaign(campaign, path, comm, options, log, engine)
     if comm.rank == 0:
-        _report_end(campaign, path, summary, options)
+        _report_end(campaign, path, summary, _again(args))
     too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
     if summary.pending and not too_many:
         return exit_codes.RESUME
@@ -194,19 +193,19 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
     """Refuse the campaign file itself, and what is no results file or will be none."""
     from adhesis.ensemble.results.layout import check_results_file
 
-    check_results_file("--out", path)
+    check_results_file(path)
     if os.path.exists(path) and path.samefile(args.campaign):
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
-def _again(options: Options) -> str:
+def _again(args: argparse.Namespace) -> str:
     """Return how a run is resumed; with --redo what it did would be computed once more."""
-    if options.redo is None:
+    if args.redo is None:
         return "run the same command again to resume"
     return "run the command again without --redo to resume"
 
 
-def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Options) -> None:
+def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) -> None:
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
@@ -225,20 +224,14 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, options: Optio
         why = why_beyond(campaign.material.opens)
         log(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
     if summary.stopped:
-        log(
-            f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {_again(options)}"
-        )
+        log(f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {again}")
 
 
-def _tell_price(
-    campaign: Campaign, path: Path, args: argparse.Namespace, engine: Engine | None
-) -> int:
-    from adhesis.ensemble.campaign.tasks import WHOLE, Part
+def _price(campaign: Campaign, path: Path, part: Part, engine: Engine | None) -> int:
     from adhesis.ensemble.run.price import price
     from adhesis.ensemble.run.session import Engine
 
     engine = engine or Engine()
-    part = Part.parse(args.part) if args.part else WHOLE
     with bar("price", last=False) as show:
         estimate = price(
             *(campaign, path, part),
@@ -256,8 +249,9 @@ def _selection(args: argparse.Namespace) -> Any:
     values = {name: getattr(args, name) for name in ("hurst", "work_of_adhesion", "realisation")}
     if args.redo is None:
         for name in filter(values.get, values):
-            option = "--" + name.replace("_", "-")
-            raise InputError(f"{option} needs --redo: it chooses the tasks to compute again")
+            raise InputError(
+                f"{parameter(name)} needs --redo: it chooses the tasks to compute again"
+            )
         return None
     if args.redo not in ("failed", "all"):
         raise InputError(f"--redo is {args.redo!r}: it must be failed or all")

@@ -41,8 +41,9 @@ def execute(args: argparse.Namespace) -> int:
         print(f"{args.file}: {len(damaged)} of {sound + len(damaged)} written rows are damaged")
         print("\n".join(damage_lines(damaged)))
     else:
+        spare = f", {status['not_needed']} not needed" if status["not_needed"] else ""
         print(
             f"{args.file} is sound: {sound} rows have their checksum ({status['done']} done, "
-            f"{status['failed']} failed), {status['pending']} are pending"
+            f"{status['failed']} failed{spare}), {status['pending']} are pending"
         )
     return SOME_FAILED if damaged else DONE

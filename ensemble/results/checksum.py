@@ -10,15 +10,14 @@ checksum of every row, and BLAKE2b takes more than four times as long.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable, Mapping
-from math import prod
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS
-from adhesis.ensemble.task.dataset import KEPT, row_shape
+from adhesis.ensemble.task.dataset import KEPT
 
 _BLOCK_BYTES = 16 * 2**20
 
@@ -42,19 +41,13 @@ def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
     return start
 
 
-def row_checksums(
-    read: Read,
-    sizes: Mapping[str, int],
-    kept: NDArray[np.intp],
-    rows: NDArray[np.intp],
-) -> NDArray[np.uint32]:
+def row_checksums(read: Read, kept: NDArray[np.intp], rows: NDArray[np.intp]) -> NDArray[np.uint32]:
     """Compute the checksums of some rows from what they hold; a block is in memory at a time.
 
-    ``sizes`` are the lengths of the dimensions, ``kept`` the rows that keep their fields; both they
-    and ``rows`` ascend.
+    ``kept`` are the rows that keep their fields; both they and ``rows`` ascend.
     """
     out = np.zeros(rows.size, np.uint32)
-    width = sum(prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in OF_TASKS)
+    width = sum(read(d.name, slice(0, 1)).nbytes for d in OF_TASKS)
     step = max(1, _BLOCK_BYTES // width)
     places = dict(zip(kept.tolist(), range(kept.size), strict=True))
     done = 0

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -53,17 +53,12 @@ def write_head(path: Path) -> None:
         ]
     size = path.stat().st_size
     with path.open("r+b") as handle:
-        place = handle.read(_NEAR).find(_MARK)
-        if place < 0:
-            raise ValueError(f"{path} has no attribute '{HEAD}'")
+        place = handle.read(_NEAR).index(_MARK)
         ranges = sorted([_FLAGS, (place, _LENGTH), *rows])
         table = f"{size} " + " ".join(f"{first}+{length}" for first, length in ranges) + " "
         checksum = _checksum(handle, table.encode(), ranges, size)
-        text = (_MARK + f"{checksum:08x} ".encode() + table.encode()).ljust(_LENGTH, b".")
-        if len(text) > _LENGTH:
-            raise ValueError(f"{len(ranges)} places of rows do not fit into '{HEAD}'")
         handle.seek(place)
-        handle.write(text)
+        handle.write((_MARK + f"{checksum:08x} ".encode() + table.encode()).ljust(_LENGTH, b"."))
 
 
 def check_head(path: Path) -> bool:
@@ -72,9 +67,7 @@ def check_head(path: Path) -> bool:
     ValueError if it has no head: it is no results file.
     """
     with open_regular(path) as handle:
-        place = handle.read(_NEAR).find(_MARK)
-        if place < 0:
-            raise ValueError(f"{path} has no '{HEAD}'")
+        place = handle.read(_NEAR).index(_MARK)
         handle.seek(place)
         text = handle.read(_LENGTH).removeprefix(_MARK)
         try:
@@ -94,17 +87,9 @@ def _checksum(handle: BinaryIO, table: bytes, ranges: _Ranges, size: int) -> int
     """Return the CRC-32 of the places of the rows, and of a file without them."""
     place, value = 0, zlib.crc32(table)
     for first, length in [*ranges, (size, 0)]:
-        for piece in _pieces(handle, place, first):
+        handle.seek(place)
+        while place < first and (piece := handle.read(min(_PIECE, first - place))):
             value = zlib.crc32(piece, value)
+            place += len(piece)
         place = max(place, first + length)
     return value
-
-
-def _pieces(handle: BinaryIO, first: int, stop: int) -> Iterator[bytes]:
-    handle.seek(first)
-    while first < stop:
-        piece = handle.read(min(_PIECE, stop - first))
-        if not piece:
-            return
-        first += len(piece)
-        yield piece

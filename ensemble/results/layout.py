@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part
-from adhesis.ensemble.errors import InputError, reason, refusal
+from adhesis.ensemble.errors import InputError, parameter, reason, refusal
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.regular_file import irregular
@@ -36,8 +36,9 @@ _BLOCK_BYTES = 16 * 2**20
 Rows = NDArray[np.intp]
 
 
-def check_results_file(option: str, path: Path) -> None:
+def check_results_file(path: Path) -> None:
     """Refuse what is no regular file, and a new file that does not end in .h5 (InputError)."""
+    option = parameter("out")
     try:
         kind = irregular(path.stat().st_mode)
     except FileNotFoundError:
@@ -120,16 +121,13 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
 
 def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.Dataset:
     """Create a contiguous dataset, its place on disk taken and filled at once."""
-    dtype = np.dtype(column.dtype)
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
-    if dtype.kind != "S":  # texts are filled with zeros; h5py hands a text over as garbage
-        plist.set_fill_value(np.array(column.fill, dtype))
-    space = h5py.h5s.create_simple(shape)
-    kind = h5py.h5t.py_create(dtype)
-    return h5py.Dataset(h5py.h5d.create(file.id, column.name.encode(), kind, space, plist))
+    # texts are filled with zeros; h5py hands a text over as garbage
+    fill = None if column.dtype.startswith("S") else column.fill
+    return file.create_dataset(
+        *(column.name, shape, column.dtype), fillvalue=fill, fill_time="alloc", dcpl=plist
+    )
 
 
 # ---------------------------------------------------------------------- rows of other files

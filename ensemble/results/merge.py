@@ -28,6 +28,8 @@ from adhesis.ensemble.task.row import RESULT_DATASETS, TIMES
 
 # Times may differ between two computations of one task; nothing else may, and fields follow.
 _COMPARED = tuple(d for d in RESULT_DATASETS if d not in TIMES and d.dims[0] != KEPT)
+# By status, how much a row is worth: one that failed gives way to one that did not.
+_WORTH = np.array([0, 2, 1, 1, 0])
 
 
 @dataclass(frozen=True)
@@ -60,30 +62,24 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         for part in opened:
             if there is not None and part.path.samefile(out):
                 raise InputError(f"{part.path} is to be merged into itself")
-        campaign = opened[0].campaign if there is None else there.campaign
+        first, of = (opened[0], opened[0].path) if there is None else (there, out)
+        campaign = first.campaign
         for part in opened:
-            _check_campaign(part, campaign, opened[0].path if there is None else out)
-        status = np.zeros(campaign.task_count, np.uint8) if there is None else there.status()
-        if status.size != campaign.task_count:
-            raise InputError(f"{out} is part {there.part if there else ''} of its campaign itself")
+            _check_campaign(part, campaign, of)
+        if there is not None and len(there) != campaign.task_count:
+            raise InputError(f"{out} is part {there.part} of its campaign itself")
         doubts = [doubt for file in opened for doubt in file.doubts()]
-        sources = _assign(opened, campaign, status, there)
+        sources, status = _assign(opened, campaign, there)
         of_file = {*schema.fixed_attributes(campaign), "part", "laid_out"}
         if there is None:
             of_file.add("created")
-        known = (opened[0] if there is None else there).attributes.items()
+        known = first.attributes.items()
         attributes = {name: value for name, value in known if name not in of_file}
-        taken = sum(int(source.taken.sum()) for source in sources)
-        if there is None:
-            create(out, campaign, attributes=attributes, sources=sources)
-        elif taken and not os.access(out, os.W_OK):
+        taken = sum(int(source.taken.sum()) for source in sources if source.results is not there)
+        if there is not None and taken and not os.access(out, os.W_OK):
             raise InputError(f"{out} cannot be written: permission denied")
-        elif taken:
-            stays = there.status() != schema.DAMAGED
-            for source in sources:
-                stays[source.target[source.taken]] = False
-            old = Source(there, campaign, stays)
-            create(out, campaign, attributes=attributes, sources=[old, *sources])
+        if there is None or taken:
+            create(out, campaign, attributes=attributes, sources=sources)
     return Merged(
         total=status.size,
         done=int(np.sum(status == schema.DONE)),
@@ -104,41 +100,40 @@ def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
 
 
 def _assign(
-    opened: Sequence[Results], campaign: Campaign, status: NDArray[np.uint8], there: Results | None
-) -> list[Source]:
-    """Decide which file gives which row; ``status`` becomes that of the merged file."""
+    opened: Sequence[Results], campaign: Campaign, there: Results | None
+) -> tuple[list[Source], NDArray[np.uint8]]:
+    """Decide which file gives which row; return also the status of each row of the merged file.
+
+    The file that is ``there`` comes first: what it has stays, unless another file has better.
+    """
+    status = np.zeros(campaign.task_count, np.uint8)
+    giver = np.full(status.size, -1)  # source of each row that is not pending
     sources: list[Source] = []
-    giver = np.full(status.size, -1)  # source of each row that is not there yet
-    for part in opened:
-        own = part.status()
-        source = Source(part, campaign, own == schema.DONE)
-        target = source.target
-        for row in np.flatnonzero((own == schema.DONE) & (status[target] == schema.DONE)).tolist():
-            other = giver[target[row]]
-            if other >= 0:
-                _compare(source, row, sources[other].results, sources[other].row_of(target[row]))
-            elif there is not None:
-                _compare(source, row, there, int(target[row]))
-        # A row that failed elsewhere, in time or place, gives way to one that did not.
-        better = (own == schema.DONE) & (status[target] != schema.DONE)
-        better |= (own == schema.FAILED) & np.isin(status[target], (schema.PENDING, schema.DAMAGED))
-        for row in np.flatnonzero(better & (giver[target] >= 0)).tolist():
-            loser = sources[giver[target[row]]]
-            loser.taken[loser.row_of(target[row])] = False
-        source.taken[:] = better
-        giver[target[better]] = len(sources)
-        status[target[better]] = own[better]
+    for number, file in enumerate(opened if there is None else (there, *opened)):
+        own = file.status()
+        if file is not there:  # how many realisations are needed is decided by a run
+            own[own == schema.NOT_NEEDED] = schema.PENDING
+        source = Source(file, campaign, np.zeros(own.size, bool))
         sources.append(source)
-    return sources
+        target = source.target
+        for row in target[(own == schema.DONE) & (status[target] == schema.DONE)].tolist():
+            _compare(source, sources[giver[row]], row)
+        better = _WORTH[own] > _WORTH[status[target]]
+        giver[target[better]] = number
+        status[target[better]] = own[better]
+    for number, source in enumerate(sources):
+        source.taken[:] = giver[source.target] == number
+    return sources, status
 
 
-def _compare(source: Source, row: int, other: Results, there: int) -> None:
-    """Refuse a row that two files hold with different bits."""
+def _compare(one: Source, other: Source, row: int) -> None:
+    """Refuse a row of the merged file that two files hold with different bits."""
+    here, there = one.row_of(row), other.row_of(row)
     for dataset in _COMPARED:
-        one = source.results.column(dataset.name, slice(row, row + 1))
-        two = other.column(dataset.name, slice(there, there + 1))
-        if one.tobytes() != two.tobytes():
+        mine = one.results.column(dataset.name, slice(here, here + 1))
+        yours = other.results.column(dataset.name, slice(there, there + 1))
+        if mine.tobytes() != yours.tobytes():
             raise InputError(
-                f"{source.results.path} and {other.path} both hold {source.results.tasks()[row]}, "
-                f"and their {dataset.name} differs"
+                f"{one.results.path} and {other.results.path} both hold "
+                f"{one.results.tasks()[here]}, and their {dataset.name} differs"
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,7 +19,7 @@ from adhesis.ensemble.errors import InputError, lack, quoted
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import HEAD, check_head
-from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
+from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.checks import shown
 
 _MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
@@ -31,7 +31,7 @@ _WORDING = frozenset(("title", "long_name"))
 _OF_HDF5 = frozenset(("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIMENSION_LABELS"))
 # Exponential functions of numpy differ between processors by the last bits.
 _SCALE_ROUNDING = 1e-12
-_LOOKS = 3
+_LOOKS = 4
 _MOST_NAMED = 10
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
@@ -47,31 +47,26 @@ class Results:
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self._status: NDArray[np.uint8] | None = None
-        with _damage(self.path):
+        with _damage(self.path), ExitStack() as stack:
             # HDF5 can crash over damaged bytes of its own: it reads none that are known to be.
             if not check_head(self.path):
                 raise InputError(
                     f"{self.path} is damaged or truncated, or another program has changed it: the "
                     f"bytes beside its rows do not have their checksum; {_INSTEAD}"
                 )
-            self._file = h5py.File(self.path, "r", locking=False)
-        try:
-            with _damage(self.path):
-                self._check_links()
-                self._check_size()
-                self.attributes = self._root_attributes()
-                schema.check_version(
-                    self.path, self.attributes.get("file_type"), self.attributes["file_version"]
-                )
-                self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
-                self.part = self._part()
-                self._check_attributes()
-                self._check_members()
-                self._sizes = sizes_of(schema.scales(self.campaign, self.part))
-                self._tasks = self.campaign.tasks(self.part)
-        except BaseException:
-            self._file.close()
-            raise
+            self._file = stack.enter_context(h5py.File(self.path, "r", locking=False))
+            self._check_links()
+            self._check_size()
+            self.attributes = self._root_attributes()
+            schema.check_version(
+                self.path, self.attributes.get("file_type"), self.attributes["file_version"]
+            )
+            self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
+            self.part = self._part()
+            self._check_attributes()
+            self._check_members()
+            self._tasks = self.campaign.tasks(self.part)
+            stack.pop_all()
 
     def _check_size(self) -> None:
         """Refuse a file with more than a campaign can have beside its rows, before reading.
@@ -94,10 +89,7 @@ class Results:
         """
         for name in self._file:
             if not isinstance(self._file.get(name, getlink=True), h5py.HardLink):
-                raise InputError(
-                    f"{self.path} is damaged: its {name} is a link, and not in the file itself; "
-                    f"{_INSTEAD}"
-                )
+                raise self._damaged(f"{name} is a link, and not in the file itself")
 
     def _root_attributes(self) -> dict[str, Any]:
         found = {}
@@ -117,10 +109,8 @@ class Results:
         try:
             return Part.parse(text)
         except InputError:  # of which it names an option
-            raise InputError(
-                f"{self.path} is damaged: its attribute part is {quoted(text)}, and must be K/N "
-                f"with 1 ≤ K ≤ N, as 3/20; {_INSTEAD}"
-            ) from None
+            rule = "must be K/N with 1 ≤ K ≤ N, as 3/20"
+            raise self._damaged(f"attribute part is {quoted(text)}, and {rule}") from None
 
     def _check_attributes(self) -> None:
         """Compare the root attributes with those that the campaign decides.
@@ -131,9 +121,9 @@ class Results:
         for name, value in wanted.items():
             found: Any = self.attributes.get(name)
             if name not in _WORDING and not np.array_equal(found, value):
-                raise InputError(
-                    f"{self.path} is damaged: its attribute {name} is {shown(found)}, and that of "
-                    f"its campaign is {shown(value)}; {_INSTEAD}"
+                raise self._damaged(
+                    f"attribute {name} is {shown(found)}, and that of its campaign is "
+                    f"{shown(value)}"
                 )
 
     def _check_members(self) -> None:
@@ -151,33 +141,37 @@ class Results:
             )
         if sum(member.nbytes for member in wanted) > os.path.getsize(self.path):
             raise ValueError("truncated")
+        found = {member.dataset.name: self._file[member.dataset.name] for member in wanted}
         for dataset, shape, _ in wanted:
-            found = self._file[dataset.name]
-            dims = [[scale.name for scale in dim.values()] for dim in found.dims]
+            here = found[dataset.name]
+            along = [list(dim.values()) for dim in here.dims]
             if (
-                (found.shape, found.dtype) != (shape, np.dtype(dataset.dtype))
-                or (found.is_virtual or found.external)
-                or set(found.attrs) - _OF_HDF5 != set(dataset.described)
-                or (dataset.dims and dims != [[f"/{name}"] for name in dataset.dims])
+                (here.shape, here.dtype) != (shape, np.dtype(dataset.dtype))
+                or (here.is_virtual or here.external)
+                or set(here.attrs) - _OF_HDF5 != set(dataset.described)
+                or (dataset.dims and along != [[found[name]] for name in dataset.dims])
             ):
                 raise ValueError(dataset.name)
             for key, value in dataset.described.items():
-                if key not in _WORDING and not np.array_equal(found.attrs[key], value):
+                if key not in _WORDING and not np.array_equal(here.attrs[key], value):
                     raise ValueError(dataset.name)
         for dataset, _, values in wanted:
             if values is not None:
-                self._check_values(dataset, values())
+                self._check_values(dataset, found[dataset.name][:], values())
 
-    def _check_values(self, dataset: Dataset, wanted: NDArray[Any]) -> None:
-        found = self._file[dataset.name][:]
+    def _check_values(self, dataset: Dataset, found: NDArray[Any], wanted: NDArray[Any]) -> None:
         rounding = 0.0 if dataset.dims else _SCALE_ROUNDING
         wrong = np.flatnonzero(~np.isclose(found, wanted, rtol=rounding, atol=0.0))
         if wrong.size:
             row = int(wrong[0])
-            raise InputError(
-                f"{self.path} is damaged: its {dataset.name} is not that of its campaign "
-                f"({found[row]} instead of {wanted[row]} in row {row}); {_INSTEAD}"
+            raise self._damaged(
+                f"{dataset.name} is not that of its campaign ({found[row]} instead of "
+                f"{wanted[row]} in row {row})"
             )
+
+    def _damaged(self, what: str) -> InputError:
+        """Return the sentence on what is beside the rows and cannot be computed again."""
+        return InputError(f"{self.path} is damaged: its {what}; {_INSTEAD}")
 
     def __enter__(self) -> Self:
         return self
@@ -242,23 +236,22 @@ class Results:
         return tuple(out)
 
     def _checked_status(self) -> NDArray[np.uint8]:
-        status = self.column(schema.STATUS.name)
-        suspects = np.flatnonzero(status != schema.PENDING)
-        suspects = suspects[self._differ(suspects, status[suspects])]
+        suspects = np.arange(len(self))
+        status = np.zeros(len(self), np.uint8)
         # A row that a run empties and computes again at this moment looks damaged, once.
         for _ in range(_LOOKS):
-            if not suspects.size:
-                break
             status[suspects] = self.column(schema.STATUS.name, suspects)
             suspects = suspects[status[suspects] != schema.PENDING]
             suspects = suspects[self._differ(suspects, status[suspects])]
+            if not suspects.size:
+                break
         status[suspects] = schema.DAMAGED
         return status
 
     def _differ(self, rows: NDArray[np.intp], status: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Whether rows that are not pending cannot be what was written."""
         written = self.column(schema.CHECKSUM.name, rows)
-        held = row_checksums(self.column, self._sizes, self.column(KEPT), rows)
+        held = row_checksums(self.column, self.column(KEPT), rows)
         return np.asarray((status > schema.NOT_NEEDED) | (written != held))
 
     def tasks(self) -> Tasks:

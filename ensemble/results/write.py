@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,16 +19,12 @@ from adhesis.ensemble.errors import WriteError, reason
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
 from adhesis.ensemble.results.disk_file import DiskFile
-from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row
 from adhesis.solver.runtime.uninterrupted import signals_held
 
-_KEPT_NAMES = frozenset(d.name for d in schema.DATASETS if d.dims[0] == KEPT)
+_KEPT_NAMES = frozenset(d.name for d in OF_KEPT)
 _NAMES = frozenset(d.name for d in RESULT_DATASETS)
-# What a row holds beside the task itself, its status and its checksum.
-_CONTENT = tuple(
-    d for d in schema.DATASETS if d not in (*schema.TASK_DATASETS, schema.STATUS, schema.CHECKSUM)
-)
 
 # Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
 _LONGEST_NAME = 200
@@ -64,7 +60,7 @@ class Writer:
                 self._opened = os.stat(self.path)
             except OSError as error:  # it was there when the run was prepared
                 raise WriteError(f"{self.path} could not be opened: {reason(error)}") from error
-            self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in schema.DATASETS}
+            self._datasets = {d.name: DatasetRows(self._file[d.name]) for d in schema.ROW_DATASETS}
             self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
         self._origin = origin
 
@@ -75,14 +71,19 @@ class Writer:
         # Closing is collective: a rank that failed alone must not wait here for the others. And
         # HDF5 1.10 crashes when all ranks close a file that it cannot write to.
         if kind is None or self._disk is not None:
-            self.close()
+            with suppress(WriteError) if kind else nullcontext():  # the first error is raised
+                self.close()
 
     def close(self) -> None:
-        """Close the file (collectively, if it was opened so)."""
+        """Close the file (collectively, if it was opened so; WriteError)."""
         with signals_held():
-            self._file.close()
-            if self._disk is not None:
-                self._disk.close()
+            try:
+                self._file.close()
+                if self._disk is not None:
+                    self._disk.close()
+                    self._disk.check()
+            except (OSError, RuntimeError) as error:
+                raise WriteError(f"{self.path} could not be closed: {reason(error)}") from error
         self._names.close()
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
@@ -102,28 +103,18 @@ class Writer:
 
     def reset(self, rows: Sequence[int]) -> None:
         """Make rows pending again; what they held is lost."""
-        cleared = (*_CONTENT, schema.CHECKSUM)
         for row in rows:
-            with self._writing(row):
-                # First the status: a row that is being emptied must not be taken for a whole one.
-                self._set_pending(row)
-                self.flush()
-                for dataset in cleared:
-                    place = self._place(dataset.name, row)
-                    if place is not None:
-                        rows_of = self._datasets[dataset.name]
-                        rows_of.write(place, rows_of.filled(dataset.fill))
-                self.flush()
+            # First the status: a row that is being emptied must not be taken for a whole one.
+            self._set_pending(row)
+            self._write(row, {}, schema.PENDING)
 
     def mark(self, rows: Iterable[int], *, needed: bool) -> None:
         """Mark rows without a result: they are to be computed, or need not be."""
         for row in rows:
             if needed:
-                with self._writing(row):
-                    self._set_pending(row)
+                self._set_pending(row)
             else:
                 self._write(row, {}, schema.NOT_NEEDED)
-        self.flush()
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
         """Write a row, its checksum, and then its status; what has no value is left empty.
@@ -131,34 +122,31 @@ class Writer:
         All of a row is written: a run that was killed may have left a part of it.
         """
         with self._writing(row):
-            blocks = {schema.STATUS.name: self._datasets[schema.STATUS.name].block(status)}
-            for dataset in _CONTENT:
-                name, place = dataset.name, self._place(dataset.name, row)
-                if place is not None:
-                    rows_of = self._datasets[name]
-                    given = name in values
-                    blocks[name] = (
-                        rows_of.block(values[name]) if given else rows_of.filled(dataset.fill)
-                    )
-                    rows_of.write(place, blocks[name])
-            covered = (d.name for d in (*OF_TASKS, *OF_KEPT))
-            parts = (blocks[name] for name in covered if name in blocks)
-            rows_of = self._datasets[schema.CHECKSUM.name]
-            rows_of.write(row, rows_of.block(checksum(parts)))
-            self.flush()
-            self._datasets[schema.STATUS.name].write(row, blocks[schema.STATUS.name])
-            self.flush()
+            values, blocks = {**values, schema.STATUS.name: status}, []
+            kept = self._kept.get(row)
+            held = [(d, row) for d in OF_TASKS] + [(d, kept) for d in OF_KEPT if kept is not None]
+            for dataset, place in held:
+                rows_of, given = self._datasets[dataset.name], dataset.name in values
+                value = values[dataset.name] if given else np.full(rows_of.shape, dataset.fill)
+                blocks.append(rows_of.block(value))
+                if dataset is not schema.STATUS:
+                    rows_of.write(place, blocks[-1])
+            covered = schema.CHECKSUM.fill if status == schema.PENDING else checksum(blocks)
+            self._put(schema.CHECKSUM, row, covered)
+            self._put(schema.STATUS, row, status)
 
     def _set_pending(self, row: int) -> None:
-        rows_of = self._datasets[schema.STATUS.name]
-        rows_of.write(row, rows_of.block(schema.PENDING))
+        with self._writing(row):
+            self._put(schema.STATUS, row, schema.PENDING)
+
+    def _put(self, dataset: Dataset, row: int, value: int) -> None:
+        """Write one number of a row, and hand all that was written to the operating system."""
+        rows_of = self._datasets[dataset.name]
+        rows_of.write(row, rows_of.block(value))
+        self.flush()
 
     def _origin_of(self, rank: int) -> dict[str, bytes]:
         return {schema.ORIGIN.name: schema.encode_text(self._origin(rank), schema.ORIGIN_LENGTH)}
-
-    def _place(self, name: str, row: int) -> int | None:
-        """Return the place of the row of a task in a dataset; None where it has none."""
-        return self._kept.get(row) if name in _KEPT_NAMES else row
 
     @contextmanager
     def _writing(self, row: int) -> Iterator[None]:
@@ -210,29 +198,25 @@ class DatasetRows:
 
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._id = dataset.id
-        self._shape = dataset.shape[1:]
+        self.shape = dataset.shape[1:]
         self._dtype = dataset.dtype
         self._space = self._id.get_space()
-        self._memory = h5py.h5s.create_simple((1, *self._shape))
-        self._rest = (0,) * len(self._shape)
+        self._memory = h5py.h5s.create_simple((1, *self.shape))
+        self._rest = (0,) * len(self.shape)
 
     def block(self, value: Any) -> NDArray[Any]:
         """Return the bytes that a value of a row has in the file, shape (1, …)."""
-        if np.shape(value) != self._shape:
+        if np.shape(value) != self.shape:
             raise ValueError(
-                f"{self._id.name!r} has rows of shape {self._shape}, not {np.shape(value)}"
+                f"{self._id.name!r} has rows of shape {self.shape}, not {np.shape(value)}"
             )
-        block = np.empty((1, *self._shape), self._dtype)
+        block = np.empty((1, *self.shape), self._dtype)
         block[0] = value
         return block
 
-    def filled(self, fill: Any) -> NDArray[Any]:
-        """Return a row that holds one value throughout, shape (1, …)."""
-        return np.full((1, *self._shape), fill, self._dtype)
-
     def write(self, row: int, block: NDArray[Any]) -> None:
-        """Write a row that :meth:`block` or :meth:`filled` has made."""
+        """Write a row that :meth:`block` has made."""
         if not block.size:
             return
-        self._space.select_hyperslab((row, *self._rest), (1, *self._shape))
+        self._space.select_hyperslab((row, *self._rest), (1, *self.shape))
         self._id.write(self._memory, self._space, block)

@@ -139,7 +139,7 @@ class Master:
     sleep: Callable[[float], None] = time.sleep
 
     def __post_init__(self) -> None:
-        # Last note of each task that is handed out and not answered; None before the first.
+        # Last note of each task in flight, handed out and not answered; None before the first.
         self.notes: dict[int, Any] = {}
         # Of each worker, the tasks that it was sent and has not answered, with the mean times of
         # their groups: nothing is queued behind a task of a group that was not measured.
@@ -148,16 +148,10 @@ class Master:
         self._room = [(0, rank) for rank in self._sent]
         self._halted: float | None = None
         self._reason: str | None = None
-        self._dismissed = False
         # Time that the master was awake, and when each worker was last heard from by that clock; a
         # process that starts is heard from when it has loaded what it takes.
         self._awake, self._looked, self._next_count = 0.0, self.clock(), 0.0
         self._heard: dict[int, float] = {}
-
-    @property
-    def in_flight(self) -> int:
-        """Tasks handed out and not answered."""
-        return sum(len(tasks) for tasks in self._sent.values())
 
     def run(self) -> str | None:
         """Hand out until everything is answered; return why it stopped early, or None.
@@ -168,7 +162,7 @@ class Master:
         pause = SHORTEST_PAUSE
         self._consider_stopping()
         self._hand_out()
-        while self.in_flight:
+        while self.notes:
             self._consider_stopping()
             message = self._look()
             if message is None:
@@ -203,7 +197,7 @@ class Master:
     def _consider_stopping(self) -> None:
         if self._halted is not None:
             if self.clock() - self._halted > self.limits.grace:
-                raise Unresponsive(f"{self.in_flight} tasks did not stop in time ({self._reason})")
+                raise Unresponsive(f"{len(self.notes)} tasks did not stop in time ({self._reason})")
         elif (reason := self.limits.stop()) is not None:
             self._halt(reason)
 
@@ -247,8 +241,6 @@ class Master:
 
     def _hand_out(self) -> None:
         """Give every worker that has room a task, while there are any; the emptiest goes first."""
-        if self._dismissed:
-            return
         while self._room and self._halted is None and self.schedule.waiting:
             load, rank = self._room[0]
             sent = self._sent[rank]
@@ -270,7 +262,6 @@ class Master:
         return not sent or (len(sent) <= MOST_AHEAD and sum(sent.values()) < AHEAD)
 
     def _dismiss(self) -> None:
-        self._dismissed = True
         for rank in self._sent:
             self.channel.send(rank, ("dismissed",))
         waiting, end = set(self._sent), self.clock() + self.limits.grace
@@ -359,8 +350,7 @@ class Worker:
     clock: Callable[[], float] = time.monotonic  # replaced in tests
 
     def __post_init__(self) -> None:
-        self._halted = False
-        self._reported = False
+        self._stops = False  # as the master or a signal to this rank asks
         self._looking = False
         self._reported_at = -math.inf
         self._task: int | None = None
@@ -409,7 +399,7 @@ class Worker:
                 self._look()
             finally:
                 self._looking = False
-        return self._halted or self._reported
+        return self._stops
 
     def _look(self) -> None:
         """Report if it is time to, and look for urgent messages."""
@@ -418,9 +408,9 @@ class Worker:
             self._reported_at = now
             self.channel.send(MASTER, ("alive", self._task, self._note))
         while self.channel.poll(urgent=True) is not None:
-            self._halted = True
-        if not self._halted and not self._reported and (reason := self.limits.stop()) is not None:
-            self._reported = True
+            self._stops = True
+        if not self._stops and (reason := self.limits.stop()) is not None:
+            self._stops = True
             self.channel.send(MASTER, ("stop", reason))
 
 

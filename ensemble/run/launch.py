@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from adhesis import _version
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, parameter
 from adhesis.ensemble.escape import one_line
 
 # Variables that a launcher sets for its ranks. A second launcher that inherits them passes for one
@@ -118,15 +118,15 @@ def launch_environment(ranks: int) -> dict[str, str]:
     return env
 
 
-def check_ranks(name: str, ranks: int) -> None:
-    """Refuse more ranks than this machine can hold; ``name`` is that of the option (InputError)."""
+def check_ranks(ranks: int) -> None:
+    """Refuse more ranks than this machine can hold (InputError)."""
     most = _RANKS_PER_CORE * cores()
     if ranks > most:
         from adhesis.solver.checks import counted  # here: it loads numpy
 
         raise InputError(
-            f"{name} is {ranks}: at most {most} are started here, on {counted(cores(), 'core')}; "
-            "more ranks than cores compute no faster"
+            f"{parameter('ranks')} is {ranks}: at most {most} are started here, on "
+            f"{counted(cores(), 'core')}; more ranks than cores compute no faster"
         )
 
 

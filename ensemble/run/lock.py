@@ -18,7 +18,6 @@ import json
 import os
 import socket
 import stat
-import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -29,6 +28,7 @@ from typing import Any, Self
 from adhesis.ensemble.errors import InputError, WriteError, refusal
 from adhesis.ensemble.escape import one_line
 from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.reporter import log
 from adhesis.solver.checks import counted
 
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}
@@ -62,11 +62,9 @@ class RunLock:
                     "that have outlived it: wait until they have ended"
                 )
             if not announced and patience > 1:
-                print(
+                log(
                     f"{self._results} is held by another run{self._holder()}; "
-                    f"waiting up to {patience:g} s for it to end",
-                    file=sys.stderr,
-                    flush=True,
+                    f"waiting up to {patience:g} s for it to end"
                 )
                 announced = True
             time.sleep(_RETRY_INTERVAL)
@@ -108,10 +106,9 @@ class RunLock:
                     return True
         except OSError as error:
             if error.errno in _UNSUPPORTED:
-                print(
+                log(
                     f"warning: the file system of {self.path} has no locks; "
-                    "make sure that no other run writes there",
-                    file=sys.stderr,
+                    "make sure that no other run writes there"
                 )
                 return True
         os.close(descriptor)

@@ -91,6 +91,21 @@ class Plan:
     batches: Batches | None = None  # where the campaign has ``[stop]``: what comes after ``rows``
 
 
+def tasks_of(campaign: Campaign, part: Part) -> Tasks:
+    """Return the tasks of a part (InputError, if there can be no such part)."""
+    tasks = campaign.tasks(part)
+    if part != WHOLE and campaign.stop.relative_error is not None:
+        raise InputError(
+            f"part is {part}, but the campaign has [stop]: its batches are decided on whole cells"
+        )
+    if not tasks:
+        raise InputError(
+            f"part is {part}: the campaign has {campaign.task_count} tasks and so at most as many "
+            "parts"
+        )
+    return tasks
+
+
 def prepare(
     campaign: Campaign,
     path: Path,
@@ -107,16 +122,7 @@ def prepare(
     be set up.
     """
     part, redo = options.part, options.redo
-    tasks = campaign.tasks(part)
-    if part != WHOLE and campaign.stop.relative_error is not None:
-        raise InputError(
-            f"part is {part}, but the campaign has [stop]: its batches are decided on whole cells"
-        )
-    if not tasks:
-        raise InputError(
-            f"part is {part}: the campaign has {campaign.task_count} tasks and so at most as many "
-            "parts"
-        )
+    tasks = tasks_of(campaign, part)
     if redo is not None:
         redo.check(tasks)
         if not os.path.exists(path):

@@ -23,7 +23,7 @@ from adhesis.ensemble.results.layout import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.launch import peak_bytes
-from adhesis.ensemble.run.plan import prior
+from adhesis.ensemble.run.plan import prior, tasks_of
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached
 from adhesis.ensemble.task.row import Row
@@ -166,10 +166,10 @@ def price(
     reached is extrapolated by how the tasks of such cells usually compare. Loops that share a
     loading branch are tried out together. ``check`` is called with the first task still to do of
     each cell before one is tried out, ``on_pilot`` after each loop with its CPU time in s.
-    InputError if the results file is damaged, or holds another campaign.
+    InputError if the results file is damaged, or holds another campaign, or there is no such part.
     """
     compute = compute or Runner()
-    tasks = campaign.tasks(part)
+    tasks = tasks_of(campaign, part)
     known: Known = {task.cell: [] for task in tasks.of_cells()}
     left, done = tasks, 0
     if path is not None and os.path.exists(path):

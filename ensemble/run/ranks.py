@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 from adhesis.ensemble.errors import InputError, RankError
 
@@ -40,28 +40,9 @@ _SETTING = "_MCA_"  # in the names of settings, which users make for launchers
 
 
 class OneRank:
-    """Communicator of a process that is alone, with what a run calls of MPI's."""
+    """Communicator of a process that is alone: there is nobody to talk to."""
 
     rank, size = 0, 1
-
-    def bcast(self, value: T) -> T:
-        """Return the value."""
-        return value
-
-    def allgather(self, value: T) -> list[T]:
-        """Return the values of all ranks."""
-        return [value]
-
-    def Ibarrier(self) -> Self:
-        """Return a request that is complete."""
-        return self
-
-    def Test(self) -> bool:
-        """Return that it is."""
-        return True
-
-    def Abort(self, code: int) -> None:
-        """Leave the end to the caller: there are no other ranks."""
 
 
 def launched() -> tuple[int, int, str]:
@@ -110,6 +91,8 @@ def world() -> Any:
 
 def together(comm: Any, function: Callable[[], T]) -> T:
     """Run a function on rank 0 and return its value, or raise its InputError, on every rank."""
+    if comm.size == 1:
+        return function()
     answer: tuple[bool, Any] | None = None
     if comm.rank == 0:
         try:

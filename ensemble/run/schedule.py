@@ -10,8 +10,8 @@ it. Tasks that share work go out together, as one unit.
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from bisect import insort
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 
 Unit = tuple[int, ...]
@@ -46,7 +46,7 @@ class Schedule:
         self._groups = {name: _Group(prior) for name, prior in priors.items()}
         self.group_of, self._round_of, self._key_of = group_of, round_of, key_of or {}
         self._rounds: dict[int, list[Unit]] = {}
-        self._turns: list[int] = []  # heap of these rounds, and of some that are over
+        self._turns: list[int] = []  # these rounds, ascending
         self._ordered: set[int] = set()  # rounds whose units stand in order, the longest last
         self._known_seconds = self._known_prior = 0.0
         self.waiting = 0
@@ -62,7 +62,7 @@ class Schedule:
             turn = self._round_of[unit[0]]
             if turn not in self._rounds:
                 self._rounds[turn] = []
-                heapq.heappush(self._turns, turn)
+                insort(self._turns, turn)
             self._rounds[turn].append(tuple(unit))
             self._ordered.discard(turn)
             self._count(unit, 1)
@@ -102,7 +102,7 @@ class Schedule:
 
     def take(self, time_left: float | None = None) -> Unit:
         """Return the next unit; an empty one if none waits or fits into ``time_left`` (s)."""
-        for turn in self._in_order():
+        for turn in self._turns:
             units = self._rounds[turn]
             if turn not in self._ordered:
                 self._ordered.add(turn)
@@ -115,16 +115,10 @@ class Schedule:
             unit = units.pop(place)
             if not units:
                 del self._rounds[turn]
+                self._turns.remove(turn)
             self._count(unit, -1)
             return unit
         return ()
-
-    def _in_order(self) -> Iterator[int]:
-        """Rounds that wait; of many the first is found quickly, and as a rule has what fits."""
-        while self._turns and self._turns[0] not in self._rounds:
-            heapq.heappop(self._turns)
-        yield from self._turns[:1]
-        yield from sorted(self._rounds)[1:]
 
     def _count(self, unit: Iterable[int], by: int) -> None:
         for task in unit:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Hashable, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -33,13 +34,15 @@ from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
 from adhesis.solver.loading.path_record import Progress
 
+ComputeLoop = Callable[[Campaign, Task, Progress | None], Row]
+
 
 @dataclass(frozen=True)
 class Engine:
     """Functions that a run works with; tests and benchmarks pass in their own."""
 
     # Computes a task of a campaign; it calls its third argument now and then
-    compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
+    compute: ComputeLoop = field(default_factory=Runner)
     # Raises InputError if a task cannot be set up
     check: Callable[[Campaign, Task], None] = check_task
     # Opens the results file for writing: path, the communicator if all ranks write, and what
@@ -47,8 +50,6 @@ class Engine:
     writer: Callable[[Path, Any, Callable[[int], str]], Writer] = Writer
     # Whether each rank writes the rows that it computed, as parallel HDF5 allows
     all_write: bool = bool(h5py.get_config().mpi)
-    # Makes what stands around a rank's loop of handing out or working
-    watch: Callable[[], AbstractContextManager[object]] = nullcontext
     # How long a rank may not be heard from until the run ends, in s
     silence: float = dispatch.SILENCE
 
@@ -93,8 +94,8 @@ def run_campaign(
             # The last bits of a rank's rows depend on versions and processor. All ranks run one
             # installation, on nodes that may differ; processes that this one starts have its own.
             known = together(comm, versions)
-            processors = comm.allgather(processor()) * (size // comm.size)
-            origins = [origin_of(known | {"processor": name}) for name in processors]
+            names = comm.allgather(processor()) if comm.size > 1 else size * [processor()]
+            origins = [origin_of(known | {"processor": name}) for name in names]
         own_rows = comm.size > 1 and engine.all_write
         if own_rows and comm.rank > 0:
             lock.join()
@@ -103,21 +104,15 @@ def run_campaign(
             all_of_them = comm if own_rows else None
             writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
         session = _Session(campaign, plan, writer, options, signals, engine, stream)
-        with engine.watch():
-            stopped = session.run(comm, own_rows)
+        stopped = session.run(comm, own_rows)
     return together(comm, lambda: session.summary(stopped))
 
 
-@dataclass(frozen=True)
-class _Computing:
-    """``compute`` of :mod:`adhesis.ensemble.run.dispatch`, for the tasks of a campaign."""
-
-    campaign: Campaign
-    tasks: Sequence[Task]
-    compute: Callable[[Campaign, Task, Progress | None], Row]
-
-    def __call__(self, row: int, check: StopCheck) -> Row:
-        return self.compute(self.campaign, self.tasks[row], lambda *_: check())
+def _compute(
+    loop: ComputeLoop, campaign: Campaign, tasks: Sequence[Task], row: int, check: StopCheck
+) -> Row:
+    """Compute a task of a campaign as the hand-out asks for it."""
+    return loop(campaign, tasks[row], lambda *_: check())
 
 
 @dataclass(eq=False)
@@ -140,7 +135,7 @@ class _Session:
         self._ends = None if deadline is None else deadline.at - time.time() + self._started
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Summary(total, plan.done, plan.failed)
-        self._compute = _Computing(campaign, plan.tasks, engine.compute)
+        self._compute = partial(_compute, engine.compute, campaign, plan.tasks)
         self._limits = dispatch.Limits(
             stop=self._stop,
             time_left=self._time_left,
@@ -181,7 +176,7 @@ class _Session:
         )
 
         def halted(reason: str) -> None:
-            if master.in_flight and not isinstance(channel, dispatch.OwnWorker):
+            if master.notes and not isinstance(channel, dispatch.OwnWorker):
                 progress.say(
                     f"{reason}: tasks in progress have up to {self._limits.grace:g} s to stop"
                     + ("; Ctrl-C again ends at once" if self.signals.received == "SIGINT" else "")

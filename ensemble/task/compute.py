@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
 from typing import Any
 
 from adhesis.ensemble.campaign.tables import Campaign
@@ -65,16 +64,6 @@ def _make_method(campaign: Campaign, task: Task) -> Method:
     )
 
 
-@dataclass(frozen=True)
-class _Shared:
-    """Loading branch of the last task, which the next one may continue."""
-
-    campaign: Campaign
-    key: Task
-    turning_point: float
-    branch: LoadingBranch
-
-
 class Runner:
     """Runner of tasks one after the other, each with the bits that it has alone.
 
@@ -84,7 +73,8 @@ class Runner:
     """
 
     def __init__(self) -> None:
-        self._shared: _Shared | None = None
+        # Of the last task: campaign, key, turning point and the branch, which the next may continue
+        self._last: tuple[Campaign, Task, float, LoadingBranch] | None = None
 
     def __call__(self, campaign: Campaign, task: Task, progress: Progress | None = None) -> Row:
         """Compute one loop, independently of ranks and files.
@@ -96,15 +86,18 @@ class Runner:
         wall, cpu = time.perf_counter(), time.process_time()
         here, plan = campaign.at(task), field_plan(campaign, task)
         turn, key = here.cycle.turning_point, campaign.branch_of(task)
-        branch = self._branch(campaign, task, key, turn)
-        shared = _Shared(campaign, key, turn, branch) if key != task else None
-        self._shared = None  # an interrupted branch is not continued
+        last, self._last = self._last, None  # an interrupted branch is not continued
+        if last is not None and last[0] is campaign and last[1] == key and last[2] < turn:
+            branch = last[3]
+        else:
+            branch = _branch(campaign, task)
+        this = (campaign, key, turn, branch) if key != task else None
         try:
             loop = branch.loop(turn, marks=_marks(plan), progress=progress)
         except Exception:
-            self._shared = shared
+            self._last = this
             raise
-        self._shared = shared
+        self._last = this
         axes: dict[Branch, Array] | None = None
         if key != task or here.cycle.turns_at_stress:  # its load steps are not the curves' axes
             unit = campaign.penetration_unit(task)
@@ -113,24 +106,22 @@ class Runner:
                 "unloading": unit * campaign.unloading_penetration,
             }
         row = row_of(loop, sizes_of(row_scales(campaign)), axes)
-        row |= field_row(plan, branch.method, loop, keep=task.realisation < plan.realisations)
+        keep = task.realisation < campaign.output.field_realisations
+        row |= field_row(plan, branch.method, loop, keep=keep)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         return {"wall_time": wall, "cpu_time": cpu, **row}
 
-    def _branch(self, campaign: Campaign, task: Task, key: Task, turn: float) -> LoadingBranch:
-        """Return the loading branch of a task: that of the last task, if they share one."""
-        last = self._shared
-        same = last is not None and last.campaign is campaign and last.key == key
-        if last is not None and same and last.turning_point < turn:
-            return last.branch
-        others = campaign.sharing(task)
-        return LoadingBranch(
-            _make_method(campaign, task),
-            [campaign.at(other).cycle.turning_point for other in others],
-            load_steps=campaign.cycle.load_steps,
-            latest=None if campaign.cycle.preload is None else campaign.cycle.deepest,
-            marks=[mark for o in others for mark in _marks(field_plan(campaign, o))],
-        )
+
+def _branch(campaign: Campaign, task: Task) -> LoadingBranch:
+    """Return the loading branch of a task, with all tasks that share it."""
+    others = campaign.sharing(task)
+    return LoadingBranch(
+        _make_method(campaign, task),
+        [campaign.at(other).cycle.turning_point for other in others],
+        load_steps=campaign.cycle.load_steps,
+        latest=None if campaign.cycle.preload is None else campaign.cycle.deepest,
+        marks=[mark for o in others for mark in _marks(field_plan(campaign, o))],
+    )
 
 
 def _marks(plan: FieldPlan) -> list[float]:

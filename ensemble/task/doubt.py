@@ -53,18 +53,23 @@ def why_beyond(opens: bool) -> str:
 
 
 def errors_text(row: Mapping[str, Any]) -> str:
-    """Return "audit residual 0.2 %, estimated error 3 %" of the loss of a row."""
-    error = row["loss_error"] / (abs(row["loss"]) or 1.0)
-    return f"audit residual {percent(row['audit_residual'])}, estimated error {percent(error)}"
+    """Return "audit residual 0.2 %, estimated error 3 %" of the loss of a row.
+
+    None stands for a number that is not finite.
+    """
+    names = ("loss", "loss_error", "audit_residual")
+    loss, error, audit = (np.nan if row[name] is None else row[name] for name in names)
+    error /= abs(loss) or 1.0
+    return f"audit residual {percent(audit)}, estimated error {percent(error)}"
 
 
 def doubtful(values: Mapping[str, Any], accuracy: float) -> NDArray[np.bool_]:
-    """Return which losses are less accurate than asked for, by their own account.
+    """Return which losses are less accurate than asked for, by their own account, or no numbers.
 
     ``values`` are numbers or columns of rows, by the names of the results file.
     """
-    error = np.asarray(values["loss_error"]) > accuracy * np.abs(values["loss"])
-    return np.asarray((np.abs(values["audit_residual"]) > accuracy) | error)
+    is_known = np.asarray(values["loss_error"]) <= accuracy * np.abs(values["loss"])
+    return np.asarray(~(is_known & (np.abs(values["audit_residual"]) <= accuracy)))
 
 
 def beyond_zero_range(values: Mapping[str, Any]) -> NDArray[np.bool_]:

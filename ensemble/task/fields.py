@@ -56,7 +56,6 @@ class FieldPlan:
     load_steps: int
     wanted: tuple[float, ...]  # penetrations Δ/h_max as the campaign gives them
     max_nodes: int  # largest number of nodes of a stored field
-    realisations: int  # number of first realisations of each (H, γ) whose fields are stored
     # max_stress, preload: in Pa, under a load, and at a preload
     max_stress: float | None = None
     preload: float | None = None
@@ -197,7 +196,6 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
         load_steps=cycle.load_steps,
         wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,
         max_nodes=output.field_nodes,
-        realisations=min(output.field_realisations, campaign.realisations),
         max_stress=cycle.turning_point if cycle.under_load else None,
         preload=cycle.preload,
     )

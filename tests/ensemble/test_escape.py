@@ -1,5 +1,6 @@
 """Texts from files are shown as texts; links in place of our own files are not followed."""
 
+import h5py
 import numpy as np
 import pytest
 from markdown_it import MarkdownIt
@@ -71,6 +72,19 @@ def test_status_prints_no_control_characters(tmp_path, capsys, monkeypatch):
         assert all(char == "\n" or char.isprintable() for char in shown)
         assert "diverged" in shown
         assert "second line" in shown
+
+
+def test_a_merge_names_a_damaged_file_without_control_characters(tmp_path, capsys):
+    part = tmp_path / "a\x1b[31m.h5"
+    create(part, parse_campaign(campaign_text()))
+    with Writer(part) as writer:
+        writer.write_failure(0, "diverged", 1.0)
+    with h5py.File(part, "r+") as file:
+        file["wall_time"][0] = 2.0
+    assert main(["merge", str(part), "--out", str(tmp_path / "all.h5")]) == 0
+    errors = capsys.readouterr().err
+    assert r"a\x1b[31m.h5 is damaged in row 0; damaged rows are not used" in errors
+    assert "\x1b" not in errors
 
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)

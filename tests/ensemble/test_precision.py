@@ -18,6 +18,7 @@ from adhesis.ensemble.campaign.precision import (
     precision,
     precision_lines,
 )
+from adhesis.ensemble.command.main import main
 from adhesis.ensemble.interval import estimates, interval
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.write_report import write_report
@@ -192,7 +193,7 @@ def test_intervals_of_real_losses_at_the_stop_cover_the_mean_and_are_as_narrow_a
 
 
 @pytest.mark.parametrize("quantity", ["", "loss"])
-def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity):
+def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity, capsys):
     """By default that is the dimensionless loss, which has the interval of the table of losses."""
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text(quantity=quantity))
@@ -217,6 +218,9 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity)
     assert summary.done == sum(needed[steered])
     reported = json.loads(json.dumps(read_status(out)))
     assert reported["not_needed"] == 160 - summary.done
+    assert main(["verify", str(out)]) == 0
+    counts = f"({summary.done} done, 0 failed, {160 - summary.done} not needed), 0 are pending"
+    assert counts in capsys.readouterr().out
     shown = as_text(reported)
     for group, (name, known), values_of in zip(
         reported["groups"], summary.precisions, np.split(values[steered], 2), strict=True

@@ -8,6 +8,7 @@ import pytest
 
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import Part, Task
+from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.write import Writer
@@ -199,6 +200,15 @@ def test_a_part_costs_its_share():
     assert sum(shares) == pytest.approx(sum(cost(task) for task in campaign.tasks()))
 
 
+def test_a_part_that_no_run_would_take_has_no_price():
+    text = campaign_text(realisations="10")
+    with pytest.raises(InputError, match="the campaign has 40 tasks and so at most as many parts"):
+        price(parse_campaign(text), None, Part(41, 50), compute=compute)
+    stopped = parse_campaign(f"{text}\n[stop]\nrelative_error = 0.1\nmost = 40\n")
+    with pytest.raises(InputError, match="its batches are decided on whole cells"):
+        price(stopped, None, Part(1, 2), compute=compute)
+
+
 def test_a_dry_run_writes_nothing(tmp_path, monkeypatch):
     path = write_campaign(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -208,3 +218,31 @@ def test_a_dry_run_writes_nothing(tmp_path, monkeypatch):
     assert "core hours" in process.stdout
     assert "MB of memory a rank" in process.stdout
     assert [p.name for p in tmp_path.iterdir()] == ["c.toml"]
+
+
+@pytest.mark.parametrize(
+    ("called", "options", "said"),
+    [
+        ("price.price", ["--dry-run"], "interrupted"),
+        (
+            "session.run_campaign",
+            [],
+            "interrupted; what was done is kept, run the same command again to resume",
+        ),
+        (
+            "session.run_campaign",
+            ["--redo", "all"],
+            "interrupted; what was done is kept, run the command again without --redo to resume",
+        ),
+    ],
+)
+def test_an_interrupt_says_what_is_kept_and_what_resumes(
+    tmp_path, monkeypatch, capsys, called, options, said
+):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"adhesis.ensemble.run.{called}", interrupt)
+    out = tmp_path / "r.h5"
+    assert main(["run", str(write_campaign(tmp_path)), "--out", str(out), *options]) == 130
+    assert capsys.readouterr().err == f"adhesis run: {said}\n"

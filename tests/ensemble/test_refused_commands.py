@@ -49,6 +49,8 @@ run c.toml --patience {{x,-1,nan,1e99,inf}} -> --patience is '{{}}'
 run c.toml --out p.h5 --part {{x,0/3,4/3,1/0}} -> --part is '{{}}': it must be K/N
 run c.toml --part 1/2 -> --part needs --out
 run c.toml --redo some -> --redo is 'some'
+run c.toml --dry-run --redo all -> --redo and --dry-run cannot be given together
+run c.toml --dry-run --walltime x -> --walltime is 'x': it must
 run c.toml --hurst 0.7 -> --hurst needs --redo: it chooses the tasks to compute again
 run c.toml --redo all --hurst {{x,-1,nan}} -> --hurst is '{{}}'
 run c.toml --redo all --work-of-adhesion 40 ->

@@ -19,6 +19,7 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results import schema
+from adhesis.ensemble.results.disk_file import DiskFile
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
@@ -438,3 +439,23 @@ def test_a_file_that_is_gone_when_it_is_opened_to_write_is_one_sentence(path):
     path.unlink()
     with pytest.raises(WriteError, match=r"r\.h5 could not be opened: No such file or directory"):
         Writer(path)
+
+
+def test_what_the_disk_reports_only_when_the_file_is_closed_is_no_success(
+    path, campaign, monkeypatch
+):
+    """As of a network file system that is full: rows that were taken for written may be lost."""
+    close = DiskFile.close
+
+    def close_late(self):
+        close(self)
+        self._error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    row = fake_result(campaign, campaign.tasks()[0])
+    writer = Writer(path)
+    writer.write_result(0, row)
+    monkeypatch.setattr(DiskFile, "close", close_late)
+    with pytest.raises(WriteError, match=r"r\.h5 could not be closed: No space left on device"):
+        writer.__exit__(None, None, None)
+    with pytest.raises(TypeError, match="the first error"), Writer(path):
+        raise TypeError("the first error")

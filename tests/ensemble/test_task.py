@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.results.layout import Source, create
@@ -293,12 +294,30 @@ def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
 def test_a_loss_is_doubtful_where_it_misses_the_accuracy_asked_for():
     """The estimated error is calibrated (docs/methods.md), so it is held against it as it is."""
     values = {
-        "loss": -np.ones(4),
-        "audit_residual": [0, 0, 2e-3, -2e-3],
-        "loss_error": [9e-4, 1.1e-3, 0, 0],
+        "loss": [-1, -1, -1, -1, np.nan, -1, -1],
+        "audit_residual": [0, 0, 2e-3, -2e-3, 0, np.nan, 0],
+        "loss_error": [9e-4, 1.1e-3, 0, 0, 0, 0, np.nan],
     }
     flags = doubtful(values, 1e-3)
-    assert flags.tolist() == [False, True, True, True]
+    assert flags.tolist() == [False, *6 * [True]]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("loss", np.nan), ("loss_error", np.nan), ("loss_error", np.inf), ("audit_residual", np.nan)],
+)
+def test_a_number_that_is_not_finite_makes_a_loss_doubtful_and_the_status_lists_it(
+    tmp_path, name, value
+):
+    campaign, path = parse_campaign(campaign_text()), tmp_path / "r.h5"
+    create(path, campaign)
+    with Writer(path) as writer:
+        for row, task in enumerate(campaign.tasks()):
+            wrong = {name: value} if row == 2 else {}
+            writer.write_result(row, fake_result(campaign, task) | wrong)
+    status = read_status(path)
+    assert [loop["row"] for loop in status["doubtful"]] == [2]
+    assert "1 losses are doubtful: by their own account" in as_text(status)
 
 
 KEPT_COLUMNS = [column.name for column in DATASETS if column.dims[0] == KEPT]

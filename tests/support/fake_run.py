@@ -27,7 +27,6 @@ from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Engine
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
-from adhesis.ensemble.task.fields import field_plan
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 
@@ -44,7 +43,7 @@ def fake_result(campaign: Campaign, task: Task) -> Row:
     mixed = [task.seed, *(round(1e9 * v) for v in values if v is not None)]
     rng = np.random.default_rng(mixed)
     sizes = sizes_of(row_scales(campaign))
-    keep = task.realisation < field_plan(campaign).realisations
+    keep = task.realisation < campaign.output.field_realisations
     values = {}
     for dataset in RESULT_DATASETS:
         shape = row_shape(dataset, sizes)

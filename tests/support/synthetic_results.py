@@ -187,10 +187,9 @@ def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
 def sign(path: Path) -> Path:
     """Give a results file and its rows the checksums of what they hold, as if all were written."""
     with h5py.File(path, "r+") as file:
-        sizes = {name: data.size for name, data in file.items() if data.is_scale}
         file["checksum"][...] = row_checksums(
             lambda name, rows: file[name][rows],
-            *(sizes, file[KEPT][:], np.arange(file["task"].size)),
+            *(file[KEPT][:], np.arange(file["task"].size)),
         )
     write_head(path)
     return path
