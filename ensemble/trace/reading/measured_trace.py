@@ -415,6 +415,8 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
+    if len(columns) == 1 and table.left_out:
+        notes.append(f"{counted(table.left_out, 'empty row')} left out")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
@@ -470,7 +472,8 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     """Return a row of a text whose rows are those of a map."""
     for what, line in (("row", table.columns[:, 0]), ("column", table.columns[table.filled[0]])):
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
-        for steps in np.diff(line), np.diff(line[1:]):
+        for part in line, line[1:]:
+            steps = np.diff(part[np.isfinite(part)])
             if steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0)):
                 raise InputError(
                     f"the first {what} of {name} rises or falls throughout, as positions do: "

@@ -86,7 +86,7 @@ def invalid_rows(
     marked = np.zeros(columns.shape[1], dtype=bool)
     notes = []
     for k, column in enumerate(columns):
-        if k in chosen or set(np.unique(column)) != {0.0, 1.0}:
+        if k in chosen or set(column[np.isfinite(column)]) != {0.0, 1.0}:
             continue
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
