@@ -58,7 +58,7 @@ DOUBTS = {
     "form": "what is form and what roughness",
     "noise": "noise of the instrument",
 }
-
+OF_MODEL = {"numerics": "of the loop itself", "zones": "cohesive zones at edges, left out"}
 
 _REMEDIES = {
     "cut-off": "resolve shorter waves",
@@ -66,6 +66,7 @@ _REMEDIES = {
     "form": "measure a longer trace, or give the degree of the form",
     "noise": "average several scans",
     "numerics": "ask for a better accuracy",
+    "zones": "no method follows zones at edges, so take a shorter range if that may be",
 }
 # What makes shorter waves known, by what limits the cut-off.
 _SHORTER_WAVES = {
@@ -526,9 +527,10 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     found = [*answer.main["preload_warnings"], *_one_patch(answer), *_not_converged(answer)]
     if loss.relative > 0.5:
         largest = max(loss.doubts, key=lambda name: loss.doubts[name])
+        words = DOUBTS | OF_MODEL | {"numerics": "error of the loop itself"}
         found.append(
             f"the loss is known to {100 * loss.relative:.0f} % only, mostly for the doubt "
-            f"“{largest}” ({DOUBTS.get(largest, 'error of the loop itself')}; standard uncertainty "
+            f"“{largest}” ({words[largest]}; standard uncertainty "
             f"{100 * loss.doubts[largest]:.0f} %): {_REMEDIES[largest]}"
         )
     for kind in ("fall_warnings", "range_warnings", "strain_warnings"):

@@ -342,6 +342,9 @@ def test_a_loss_that_is_hardly_known_names_its_largest_doubt(spoiled_answer: Ans
     assert "loss        10000, from 0 to 29000 mJ/m²" in summary(
         dataclasses.replace(found, loss=quantity)
     )
+    of_zones = dataclasses.replace(quantity, doubts={"noise": 0.2, "zones": 0.9})
+    (text,) = answers._warnings(found, of_zones)
+    assert "doubt “zones” (cohesive zones at edges, left out; standard uncertainty 90 %)" in text
 
 
 def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer: Answer) -> None:
