@@ -198,6 +198,9 @@ class WithUnit(np.ndarray):
     units = "um"
 
 
+TWO_UNITS = FRAME.copy()
+TWO_UNITS.attrs["units"] = {"z (um)": "nm"}
+
 REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {
     "no unit": (BOTH, {}, InputError, "array states no unit"),
     "no step": (Z, {"unit": "m"}, InputError, "array has heights without positions.*give step"),
@@ -218,6 +221,12 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
         {"columns": [1, 2]},
         InputError,
         r"holds datetime64\[s\]: hei",
+    ),
+    "two units": (
+        TWO_UNITS,
+        {"columns": ["x (mm)", "z (um)"]},
+        InputError,
+        r"column 'z \(um\)' of the table has the unit nm in attrs: correct the wrong one",
     ),
     "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
     "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),

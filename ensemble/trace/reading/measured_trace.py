@@ -17,6 +17,7 @@ from adhesis.ensemble.trace.reading.header_units import (
     names_positions,
     parse_units,
     step_of_header,
+    unit_of_name,
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
@@ -326,6 +327,11 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
         source = source[list(names)]
     units = source.attrs.get("units", {})
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
+    for n in filter(units.get, source.columns):
+        if unit_of_name(str(n)) not in (None, unit_of_name(str(units[n]))):
+            raise InputError(
+                f"column {n!r} of the table has the unit {units[n]} in attrs: correct the wrong one"
+            )
     for n, kind in source.dtypes.items():
         if kind.kind in "bcmM":  # which would become numbers of another meaning
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
