@@ -248,7 +248,7 @@ def read_words(
 _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range touch_range turn_range "
     "position step length height_range adhesion_range tip_radius cut_off noise longest highest "
-    "rise form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip "
+    "rise form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip tip "
     "coefficient_real coefficient_imag narrowest_length",
     "m²": "m0 c0",
     "1/m²": "m4",
@@ -350,8 +350,6 @@ def _unit(path: tuple[str, ...]) -> str:
     name, parent = path[-1], path[-2] if len(path) > 1 else ""
     if parent == "doubts":
         return "1"
-    if parent == "cut_off_limits":
-        return UNITS["cut_off"]
     if name in ("value", "uncertainty"):
         return UNITS.get(parent, "1")
     return UNITS.get(name, "1")

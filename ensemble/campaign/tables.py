@@ -91,7 +91,7 @@ class ProfileTable:
     @property
     def normalisation(self) -> dict[str, float]:
         """The one of h_rms, m2 and c0 that is given, by name."""
-        named = {"h_rms": self.h_rms, "m2": self.m2, "c0": self.c0}
+        named = {name: getattr(self, name) for name in NORMALISATIONS}
         return {name: value for name, value in named.items() if value is not None}
 
 

@@ -101,14 +101,12 @@ def to_xarray(result: Result) -> xr.Dataset:
             about[entry.name] = np.array(value) if isinstance(value, tuple) else value
     problem = result.problem
     variables["tangent"][2]["units"] = "m/Pa" if problem.control.is_load else "Pa/m"
-    coefficients = problem.profile.coefficients
-    for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
-        name = f"coefficient_{name}"
-        variables[name] = _variable("harmonic", name, np.array(values))
+    waves = [("harmonic", "coefficient", problem.profile.coefficients)]
     if problem.pattern is not None:
-        waves = problem.pattern.coefficients
-        for name, values in (("pattern_real", waves.real), ("pattern_imag", waves.imag)):
-            variables[name] = _variable("pattern_harmonic", name, np.array(values))
+        waves.append(("pattern_harmonic", "pattern", problem.pattern.coefficients))
+    for dim, stem, values in waves:
+        for name, part in ((f"{stem}_real", values.real), (f"{stem}_imag", values.imag)):
+            variables[name] = _variable(dim, name, np.array(part))
     for name, value in result.numbers().items():
         if value is not None:
             about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
