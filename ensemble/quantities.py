@@ -248,8 +248,8 @@ def read_words(
 _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range touch_range turn_range "
     "position step length height_range adhesion_range tip_radius cut_off noise longest highest "
-    "rise form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip tip "
-    "coefficient_real coefficient_imag narrowest_length",
+    "rise form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip "
+    "coefficient_real coefficient_imag narrowest_length tip",
     "m²": "m0 c0",
     "1/m²": "m4",
     "m³": "power floor",
