@@ -65,6 +65,12 @@ def test_an_array_is_read_in_metres_or_the_unit_given(tmp_path: Path) -> None:
     assert np.array_equal(read_heights(tmp_path / "b.npy"), WAVE)
 
 
+def test_pillars_and_ground_of_one_height_are_heights(tmp_path: Path) -> None:
+    pillars = np.where(np.arange(64) % 16 < 3, 999.0, 0.0) + 0.01 * np.arange(64) % 0.05
+    np.save(tmp_path / "a.npy", pillars)
+    assert np.array_equal(read_heights(tmp_path / "a.npy", unit="nm"), 1e-9 * pillars)
+
+
 def archive(name: str) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as file:
@@ -149,6 +155,16 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
         [*METRES[:5], "pause", *METRES[5:]],
         {},
         "line 6 of .* is 'pause': it ends the rows .* lines 1 to 5",
+    ),
+    "a code": (
+        [*NM[:5], "-9999", *NM[5:]],
+        {"unit": "nm"},
+        "has 1 height of -9999, which instruments write for missing ones: --heights needs every",
+    ),
+    "two codes": (
+        [*NM[:5], "-32768", *NM[5:9], "32767", *NM[9:]],
+        {"unit": "nm"},
+        "has 2 heights of -32768, 32767, which instruments write for missing ones",
     ),
     "two rows": (METRES[:2], {}, "holds 2 rows of numbers: at least 3 are needed"),
 }
