@@ -104,9 +104,9 @@ def to_xarray(result: Result) -> xr.Dataset:
     waves = [("harmonic", "coefficient", problem.profile.coefficients)]
     if problem.pattern is not None:
         waves.append(("pattern_harmonic", "pattern", problem.pattern.coefficients))
-    for dim, stem, values in waves:
-        for name, part in ((f"{stem}_real", values.real), (f"{stem}_imag", values.imag)):
-            variables[name] = _variable(dim, name, np.array(part))
+    for dim, stem, found in waves:
+        for name, values in ((f"{stem}_real", found.real), (f"{stem}_imag", found.imag)):
+            variables[name] = _variable(dim, name, np.array(values))
     for name, value in result.numbers().items():
         if value is not None:
             about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
