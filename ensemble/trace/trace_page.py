@@ -178,7 +178,8 @@ def table_of_runs(answer: Answer) -> Any:
 
     rows = pd.DataFrame(run_rows(answer)).rename(columns={"said": "description"})
     hidden = ["range_warnings", "preload_warnings", "fall_warnings", "strain_warnings", "failed"]
-    return with_units(rows.drop(columns=hidden, errors="ignore"))
+    rows = rows.drop(columns=hidden, errors="ignore")
+    return with_units(rows, answer.cycle.control.is_load)
 
 
 # ---------------------------------------------------------------------- content

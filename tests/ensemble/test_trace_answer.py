@@ -554,6 +554,13 @@ def of_the_answer_alone(cycle: Any, trace: Prepared) -> Answer:
     return run_plan(trace, cycle, only(make_plan(trace, cycle, quick=True, processes=0), "answer"))
 
 
+def test_turning_points_of_a_table_have_their_unit() -> None:
+    for control, turn, unit in ((Control(), 0.3, ""), (Control(0.0), 100.0, "Pa")):
+        cycle = make_cycle(HALF_SPACE, 1e-4, turn, 4, "auto", 1e-2, control)
+        table = of_the_answer_alone(cycle, prepared()).to_dataframe()
+        assert (table.turning_point[0], table.attrs["units"]["turning_point"]) == (turn, unit)
+
+
 def test_stripes_reach_every_loop_of_a_trace_with_their_width() -> None:
     cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-2, pattern=stripes(20, 0.3))
     trace = prepared()
