@@ -285,6 +285,19 @@ def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -
     np.testing.assert_allclose(trace.heights[good], Z[good], atol=1e-11)
 
 
+def test_positions_that_do_not_begin_at_nought_are_pointed_out(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    for begin, said in ((0.0, False), (7.5, True), (-49.75, True)):
+        x = begin + 1e6 * X
+        table = np.column_stack([x, 1e6 * Z])
+        np.savetxt(path, table, "%.5f", delimiter=",", header="x (um),z (um)")
+        note = (
+            f"positions begin at {begin:g} µm: those named below, and those to exclude, count "
+            "from there"
+        )
+        assert (note in read_trace(path).notes) == said
+
+
 def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
     trace = read(tmp_path, [UM, *rows(";", ".")[::-1]])
     assert_right(trace)

@@ -413,6 +413,12 @@ def _from_table(
             )
         heights, step, more = equal_steps(name, columns[0], LENGTH.units[x_unit], heights, lines)
         notes.extend(more)
+        begin = float(columns[0].min()) * LENGTH.units[x_unit]
+        if abs(begin) > step / 2:
+            notes.append(
+                f"positions begin at {length_text(begin, 6)}: those named below, and those to "
+                "exclude, count from there"
+            )
     elif step is None:
         step = step_of_header(name, table.header, table.decimal)
         if step is None:
