@@ -200,6 +200,8 @@ class WithUnit(np.ndarray):
 
 TWO_UNITS = FRAME.copy()
 TWO_UNITS.attrs["units"] = {"z (um)": "nm"}
+ONE_UNIT = NAMED[["x", "z"]].copy()
+ONE_UNIT.attrs["units"] = "um"
 
 REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {
     "no unit": (BOTH, {}, InputError, "array states no unit"),
@@ -222,6 +224,7 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
         InputError,
         r"holds datetime64\[s\]: hei",
     ),
+    "one unit": (ONE_UNIT, {}, InputError, r"attrs\['units'\] of the table is 'um': it must map"),
     "two units": (
         TWO_UNITS,
         {"columns": ["x (mm)", "z (um)"]},

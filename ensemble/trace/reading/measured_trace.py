@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -326,6 +326,11 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         source = source[list(names)]
     units = source.attrs.get("units", {})
+    if not isinstance(units, Mapping):
+        raise InputError(
+            f"attrs['units'] of the table is {checks.shown(units)}: it must map the names of the "
+            "columns to their units"
+        )
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
     for n in filter(units.get, source.columns):
         if unit_of_name(str(n)) not in (None, unit_of_name(str(units[n]))):
