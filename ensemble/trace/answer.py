@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
+from importlib import import_module
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from adhesis.ensemble.trace.loops import Cycle, Loops, Result, Watch
 from adhesis.ensemble.trace.options import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import TABLES, Plan, Run, make_plan
-from adhesis.solver import checks, views
+from adhesis.solver import checks
 from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -141,6 +142,11 @@ def _least(name: str, none: str = "") -> Any:
     return property(least, doc=f"Least ``{name}`` in m of the answer's loop and variants{none}.")
 
 
+def _views() -> Any:
+    """Return the module that shows answers: it imports this one, and loads matplotlib."""
+    return import_module("adhesis.ensemble.trace.trace_page")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Answer(ByValue):
     """Loss, pull-off stress and contact fraction of a trace, with their doubts.
@@ -176,11 +182,11 @@ class Answer(ByValue):
 
     def __str__(self) -> str:
         """Summarise the answer for a terminal: loss, pull-off, contact, doubts, warnings."""
-        return str(views.maker().summary(self))
+        return str(_views().summary(self))
 
     def _repr_html_(self) -> str:
         """Return the main numbers and the figure of the loop, for notebooks."""
-        return str(views.maker().notebook_page(self))
+        return str(_views().notebook_page(self))
 
     def page(self, folder: str | os.PathLike[str]) -> Path:
         """Write what ``adhesis trace --to`` writes: the page, its figures, and every number.
@@ -203,7 +209,7 @@ class Answer(ByValue):
         TypeError
             If ``folder`` is no path.
         """
-        return Path(views.maker().write_all(self, folder))
+        return Path(_views().write_all(self, folder))
 
     def to_dataframe(self) -> Any:
         """Return the numbers of every loop, that of the answer and the others.
@@ -214,7 +220,7 @@ class Answer(ByValue):
             A row for each loop; ``group`` is the doubt or the table that it belongs to.
             ``attrs["units"]`` holds the unit of every column.
         """
-        return views.maker().table_of_runs(self)
+        return _views().table_of_runs(self)
 
     def result(self, name: str) -> Result | None:
         """Numbers of a loop, or None if it failed or was not run."""

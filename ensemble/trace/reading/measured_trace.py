@@ -262,17 +262,17 @@ def read_trace(
             "mark, is to be saved as UTF-8): export the trace as text, or, if it is an "
             f"instrument's file, install the optional package SurfaceTopography, {HINT}"
         )
-    scan = read_scan(source, row, channel)
-    heights, gaps = without_codes(scan.heights)
-    heights, step, notes = equal_steps(source.name, scan.positions, 1.0, heights, None)
+    positions, heights, description, tip_radius = read_scan(source, row, channel)
+    heights, gaps = without_codes(heights)
+    heights, step, notes = equal_steps(source.name, positions, 1.0, heights, None)
     length, slope = (heights.size - 1) * step, _slope(heights, step)
     if not _SHORTEST <= length <= _LONGEST or slope > _STEEPEST:
         raise InputError(
             f"{source} would be {length_text(length)} long, and rise by {slope:.3g} times its step "
             "from point to point: its lengths are wrong or damaged, so export it as text with units"
         )
-    notes = [scan.description, *filter(None, [gaps]), *notes]
-    return Trace(heights, step, source.name, tuple(notes), scan.tip_radius)
+    notes = [description, *filter(None, [gaps]), *notes]
+    return Trace(heights, step, source.name, tuple(notes), tip_radius)
 
 
 def _refuse_options(to_what: str, **options: object) -> None:

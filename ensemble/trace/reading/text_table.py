@@ -108,8 +108,6 @@ def read_column(source: Source, delimiter: str | None = None, decimal: str | Non
 
 def _lines(source: Source) -> list[str]:
     data = source.read()
-    if not data.strip():
-        raise InputError(f"{source} is empty")
     if data[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
         text = data.decode("utf-32", errors="replace")
     elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
