@@ -249,7 +249,7 @@ _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range touch_range turn_range "
     "position step length height_range adhesion_range tip_radius cut_off noise longest highest "
     "rise form_height rms_level noise_rms begin end beyond rms limit_step limit_noise limit_tip "
-    "coefficient_real coefficient_imag narrowest_length",
+    "coefficient_real coefficient_imag narrowest_length tip",
     "m²": "m0 c0",
     "1/m²": "m4",
     "m³": "power floor",
@@ -267,13 +267,21 @@ _NAMES = {
 UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 """Unit by the name of a quantity; others are dimensionless (penetrations are in units of h_max)."""
 
+# Of the turning points: in Pa under a load, else dimensionless.
+_TURNING = ("turning_point", "turning_points", "start", "turn")
 _TWO_DIGITS = 2.95  # an error below has two significant digits
 _MOST_PLACES = 9
 
 
-def with_units(table: Any) -> Any:
+def units_under(is_load: bool) -> Mapping[str, str]:
+    """Return :data:`UNITS`, with that of turning points, which are stresses under a load."""
+    return UNITS | dict.fromkeys(_TURNING, "Pa") if is_load else UNITS
+
+
+def with_units(table: Any, is_load: bool = False) -> Any:
     """Return a DataFrame with the unit of every column in ``attrs["units"]``."""
-    table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
+    units = units_under(is_load)
+    table.attrs["units"] = {name: units.get(name, "") for name in table.columns}
     return table
 
 
@@ -312,8 +320,6 @@ def gamma_text(work_of_adhesion: float) -> str:
     return with_unit("work_of_adhesion", work_of_adhesion)
 
 
-# Of the turning points: in Pa under a load, else dimensionless.
-_TURNING = ("turning_point", "turning_points", "start", "turn")
 # Not listed: settings of a method, which its documentation describes, and loops with the keys of
 # the whole document.
 _LEFT_OUT = ("method_details", "turns", "provenance")
@@ -325,7 +331,7 @@ def units_of(document: Mapping[str, Any]) -> dict[str, str]:
     The keys are paths ("jumps.energy_drop"), entries of a list have one of them.
     """
     found: dict[str, str] = {}
-    turning = "Pa" if document.get("stiffness") == 0 else "1"
+    units = units_under(document.get("stiffness") == 0)
 
     def visit(path: tuple[str, ...], value: Any) -> None:
         if isinstance(value, Mapping):
@@ -338,7 +344,7 @@ def units_of(document: Mapping[str, Any]) -> dict[str, str]:
         elif value is None and path[-1] not in UNITS:
             pass  # unknown whether it would be a number
         elif value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
-            found[".".join(path)] = turning if path[-1] in _TURNING else _unit(path)
+            found[".".join(path)] = _unit(path, units)
 
     for name, value in document.items():
         if name not in _LEFT_OUT:
@@ -346,15 +352,13 @@ def units_of(document: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-def _unit(path: tuple[str, ...]) -> str:
+def _unit(path: tuple[str, ...], units: Mapping[str, str]) -> str:
     name, parent = path[-1], path[-2] if len(path) > 1 else ""
     if parent == "doubts":
         return "1"
-    if parent == "cut_off_limits":
-        return UNITS["cut_off"]
     if name in ("value", "uncertainty"):
-        return UNITS.get(parent, "1")
-    return UNITS.get(name, "1")
+        return units.get(parent, "1")
+    return units.get(name, "1")
 
 
 def duration(seconds: float) -> str:

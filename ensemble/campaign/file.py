@@ -243,19 +243,16 @@ def _check_together(campaign: Campaign) -> None:
             f"[stop] most is {campaign.stop.most}: it must be at least realisations, the "
             f"number that every cell gets ({campaign.sweep.realisations})"
         )
-    if campaign.output.field_penetrations and campaign.has_axis("max_penetration"):
-        raise InputError(
-            "[output] field_penetrations is given beside several max_penetration: it "
-            "must be left out there (a third, two thirds and all of each are kept) or be empty"
-        )
-    if campaign.output.field_penetrations and cycle.turns_at_stress:
-        where, turn = ("under a load", "max_stress")
-        if cycle.preload is not None:
-            where, turn = "beside a preload", "preload"
-        raise InputError(
-            f"[output] field_penetrations is given {where}: it must be left out "
-            f"there (a third, two thirds and all of {turn} are kept) or be empty"
-        )
+    for holds, where, turn in (
+        (campaign.has_axis("max_penetration"), "beside several max_penetration", "each"),
+        (cycle.preload is not None, "beside a preload", "preload"),
+        (cycle.under_load, "under a load", "max_stress"),
+    ):
+        if campaign.output.field_penetrations and holds:
+            raise InputError(
+                f"[output] field_penetrations is given {where}: it must be left out "
+                f"there (a third, two thirds and all of {turn} are kept) or be empty"
+            )
     for value in campaign.output.field_penetrations or ():
         if not cycle.unloading_until <= value <= cycle.turning_point:
             raise InputError(

@@ -91,7 +91,7 @@ class ProfileTable:
     @property
     def normalisation(self) -> dict[str, float]:
         """The one of h_rms, m2 and c0 that is given, by name."""
-        named = {"h_rms": self.h_rms, "m2": self.m2, "c0": self.c0}
+        named = {name: getattr(self, name) for name in NORMALISATIONS}
         return {name: value for name, value in named.items() if value is not None}
 
 
@@ -298,7 +298,7 @@ class StopTable:
 
 
 Table = Literal["profile", "material", "sweep", "cycle", "solver", "output", "stop"]
-_SWEEP_UNITS = {"hurst": "1", "work_of_adhesion": "J m-2"}
+_SWEEP_UNITS = {"sweep.hurst": "1", "sweep.work_of_adhesion": "J m-2"}
 TABLES: dict[Table, type] = {
     "profile": ProfileTable,
     "material": MaterialTable,
@@ -312,6 +312,8 @@ KEYS: dict[str, Field[Any]] = {
     f"{table}.{entry.name}": entry for table in TABLES for entry in fields(TABLES[table])
 }
 """Every key ("cycle.load_steps") with its rule, meaning and default."""
+# Those that may have several values, in the order of the axes; H and γ always are axes.
+_AXES = (*_SWEEP_UNITS, *(key for key, entry in KEYS.items() if entry.metadata["axis"] is not None))
 
 
 @dataclass(frozen=True)
@@ -338,24 +340,21 @@ class Campaign:
 
     @cached_property
     def _groups(self) -> list[list[Axis]]:
-        given = {(table, name): values for table, name, values in self.lists}
-        given["sweep", "hurst"] = self.sweep.hurst
-        given["sweep", "work_of_adhesion"] = self.sweep.work_of_adhesion
+        given = {f"{table}.{name}": values for table, name, values in self.lists}
+        given |= {key: self.value(key) for key in _SWEEP_UNITS}
         axes = []
-        for table in ("sweep", "profile", "material", "cycle"):
-            for entry in fields(TABLES[table]):
-                if (table, entry.name) in given:
-                    values = given[table, entry.name]
-                    unit = _SWEEP_UNITS.get(entry.name) or entry.metadata["axis"]
-                    axes.append(Axis(table, entry.name, values, unit, entry.metadata["meaning"]))
+        for key in _AXES:
+            if key in given:
+                table, name = key.split(".")
+                unit = _SWEEP_UNITS.get(key) or KEYS[key].metadata["axis"]
+                axes.append(Axis(table, name, given[key], unit, KEYS[key].metadata["meaning"]))
         return aligned(axes, self.sweep.zip)
 
     @cached_property
     def axes(self) -> tuple[Axis, ...]:
         """H, γ, and every key of the profile, material and cycle that has several values."""
         found = {axis.key: axis for group in self._groups for axis in group}
-        first = [found.pop("sweep.hurst"), found.pop("sweep.work_of_adhesion")]
-        return (*first, *(found[key] for key in KEYS if key in found))
+        return tuple(found[key] for key in _AXES if key in found)
 
     @cached_property
     def cells(self) -> list[tuple[Value, ...]]:
@@ -442,7 +441,7 @@ class Campaign:
     def identity(self, task: Task) -> tuple[Any, ...]:
         """Return what identifies the cell of a task, also in a campaign that grew new axes."""
         here = self.at(task)
-        rest = (here.value(key) for key, e in KEYS.items() if e.metadata["axis"] is not None)
+        rest = map(here.value, _AXES[len(_SWEEP_UNITS) :])
         return (task.hurst, task.work_of_adhesion, *rest)
 
     def tasks(self, part: Part = WHOLE) -> Tasks:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from adhesis.ensemble.errors import InputError, quoted
@@ -22,25 +22,18 @@ _TURNS = ("max_penetration", "max_stress", "preload")
 
 
 @dataclass(frozen=True)
-class Turns:
-    """Turning points of loops."""
+class Cycle:
+    """Loading path and control of a loop.
+
+    The turning points are one for each loop; those of one path, in order, if ``is_path``.
+    """
 
     # Δ/h_max, u_tot/h_max, or Pa under a load; preloads in Pa, if ``are_preloads``
     points: tuple[float, ...]
-    are_preloads: bool = False
-    latest: float | None = None  # where a loop turns whose preload is not reached, if it is given
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cycle(Turns):
-    """Loading path and control of a loop.
-
-    The turning points are one for each loop, ascending; those of one path, in order, if
-    ``is_path``.
-    """
-
     control: Control
     load_steps: int
+    are_preloads: bool = False
+    latest: float | None = None  # where a loop turns whose preload is not reached, if it is given
     is_path: bool = False
     out: bool = True  # whether a path continues until contact is lost
 
@@ -70,15 +63,13 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
             raise InputError(f"--path is {quoted(args.path)}: it holds no turning point")
         rule = "numbers with commas between them, and perhaps 'out' behind the last"
         points = read_words("--path", words, rule=rule, text=args.path)
-        steps = args.load_steps
-        return Cycle(points=points, control=control, load_steps=steps, is_path=True, out=out)
-    turns = {**vars(turns_of(args, control))}
-    turns["points"] = tuple(sorted(turns["points"]))
-    return Cycle(**turns, control=control, load_steps=args.load_steps)
+        return Cycle(points, control, args.load_steps, is_path=True, out=out)
+    cycle = turns_of(args, control)
+    return replace(cycle, points=tuple(sorted(cycle.points)))
 
 
-def turns_of(args: argparse.Namespace, control: Control) -> Turns:
-    """Read the turning points of a control, in the given order (InputError)."""
+def turns_of(args: argparse.Namespace, control: Control) -> Cycle:
+    """Read the cycle of a control, its turning points in the given order (InputError)."""
     _refuse_several(args, "max_stress", "preload")
     if control.is_load:
         if args.preload is not None:
@@ -90,7 +81,8 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
         _refuse_several(args, "max_penetration", "max_stress")
         if args.max_stress is None:
             raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
-        return Turns(_distinct("--max-stress", args.max_stress, STRESS.read))
+        stresses = _distinct("--max-stress", args.max_stress, STRESS.read)
+        return Cycle(stresses, control, args.load_steps)
     if args.max_stress is not None:
         raise InputError(
             "--max-stress belongs to load control, and --stiffness 0 is not given: a weight or a "
@@ -104,14 +96,15 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
     if args.max_penetration is not None:
         penetrations = _distinct("--max-penetration", args.max_penetration, float, rule)
     if args.preload is None:
-        return Turns((MAX_PENETRATION,) if penetrations is None else penetrations)
+        return Cycle(penetrations or (MAX_PENETRATION,), control, args.load_steps)
     if penetrations is not None and len(penetrations) > 1:
         raise InputError(
             f"--max-penetration is {args.max_penetration} beside --preload: it must be one number, "
             "at which a loop turns that has not reached its preload"
         )
     preloads = _distinct("--preload", args.preload, STRESS.read)
-    return Turns(preloads, True, None if penetrations is None else penetrations[0])
+    latest = None if penetrations is None else penetrations[0]
+    return Cycle(preloads, control, args.load_steps, True, latest)
 
 
 def _distinct(

@@ -11,6 +11,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_header
 from adhesis.ensemble.trace.reading.measured_trace import load_array
+from adhesis.ensemble.trace.reading.missing_heights import without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_column
 from adhesis.solver.model.profile import Array
@@ -81,7 +82,17 @@ def _unit(text: str) -> str:
 
 
 def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
-    """Convert heights to m; without a unit they are taken as metres, if they can be."""
+    """Convert heights to m; without a unit they are taken as metres, if they can be.
+
+    InputError for numbers that instruments write for missing heights.
+    """
+    codes = without_codes(heights, known_alone=True)[1]
+    if codes:
+        raise InputError(
+            f"{source} has {codes.removesuffix(' taken as drop-outs')}, which instruments write "
+            "for missing ones: --heights needs every height of the period (adhesis trace fills "
+            "gaps)"
+        )
     if unit is not None:
         return np.asarray(heights * LENGTH.units[unit])
     size = float(np.ptp(heights)) if heights.size else 0.0

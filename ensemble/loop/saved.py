@@ -25,7 +25,7 @@ import xarray as xr
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, whole_file
-from adhesis.ensemble.quantities import UNITS, with_units
+from adhesis.ensemble.quantities import units_under, with_units
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
@@ -82,6 +82,13 @@ def to_xarray(result: Result) -> xr.Dataset:
     variables: dict[str, Any] = {}
     kind = next(name for name, kind in _KINDS.items() if isinstance(result, kind))
     about: dict[str, Any] = {_KIND: kind, "adhesis_version": __version__}
+    problem = result.problem
+    is_load = problem.control.is_load
+    units = {**units_under(is_load), "tangent": "m/Pa" if is_load else "Pa/m"}
+
+    def variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str]]:
+        return dim, values, {"units": units.get(name, "1")}
+
     for entry in fields(result):
         value = getattr(result, entry.name)
         if entry.name in _NOT_KEPT:
@@ -91,24 +98,20 @@ def to_xarray(result: Result) -> xr.Dataset:
             for column in fields(part):
                 entries = [getattr(one, column.name) for one in value]
                 array = np.array(entries, dtype=_TYPES.get(str(column.type), str))
-                variables[f"{dim}_{column.name}"] = _variable(dim, column.name, array)
+                variables[f"{dim}_{column.name}"] = variable(dim, column.name, array)
         elif isinstance(value, np.ndarray):
             dim = "jump" if entry.name == "jump_leg" else "state"
-            variables[entry.name] = _variable(dim, entry.name, value)
+            variables[entry.name] = variable(dim, entry.name, value)
         elif is_dataclass(value) and not isinstance(value, type):
             about[entry.name] = json.dumps(asdict(value))
         elif value is not None:
             about[entry.name] = np.array(value) if isinstance(value, tuple) else value
-    problem = result.problem
-    variables["tangent"][2]["units"] = "m/Pa" if problem.control.is_load else "Pa/m"
-    coefficients = problem.profile.coefficients
-    for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
-        name = f"coefficient_{name}"
-        variables[name] = _variable("harmonic", name, np.array(values))
+    waves = [("harmonic", "coefficient", problem.profile.coefficients)]
     if problem.pattern is not None:
-        waves = problem.pattern.coefficients
-        for name, values in (("pattern_real", waves.real), ("pattern_imag", waves.imag)):
-            variables[name] = _variable("pattern_harmonic", name, np.array(values))
+        waves.append(("pattern_harmonic", "pattern", problem.pattern.coefficients))
+    for dim, stem, found in waves:
+        for name, values in ((f"{stem}_real", found.real), (f"{stem}_imag", found.imag)):
+            variables[name] = variable(dim, name, np.array(values))
     for name, value in result.numbers().items():
         if value is not None:
             about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
@@ -120,10 +123,6 @@ def to_xarray(result: Result) -> xr.Dataset:
         "method": json.dumps(report, default=lambda v: v.tolist()),
     }
     return xr.Dataset(variables, attrs=about)
-
-
-def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str]]:
-    return dim, values, {"units": UNITS.get(name, "1")}
 
 
 # ---------------------------------------------------------------------- files

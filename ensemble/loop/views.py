@@ -9,7 +9,6 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
-from importlib import import_module
 from typing import Any
 
 from adhesis.ensemble.quantities import UNITS, drive_text, stress_text
@@ -50,20 +49,12 @@ def film(
     return made
 
 
-# Made by other modules, and loaded when they are asked for: of a loop, and of a trace's answer.
-_ELSEWHERE = {
-    **dict.fromkeys(("to_dataframe", "to_xarray", "save"), "adhesis.ensemble.loop.saved"),
-    **dict.fromkeys(
-        ("summary", "notebook_page", "write_all", "table_of_runs"),
-        "adhesis.ensemble.trace.trace_page",
-    ),
-}
-
-
 def __getattr__(name: str) -> Any:
-    if name not in _ELSEWHERE:
+    if name not in ("to_dataframe", "to_xarray", "save"):
         raise AttributeError(name)
-    return getattr(import_module(_ELSEWHERE[name]), name)
+    from adhesis.ensemble.loop import saved  # loads pandas and xarray
+
+    return getattr(saved, name)
 
 
 # ---------------------------------------------------------------------- in notebooks

@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
+from importlib import import_module
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from adhesis.ensemble.trace.loops import Cycle, Loops, Result, Watch
 from adhesis.ensemble.trace.options import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import TABLES, Plan, Run, make_plan
-from adhesis.solver import checks, views
+from adhesis.solver import checks
 from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -58,7 +59,7 @@ DOUBTS = {
     "form": "what is form and what roughness",
     "noise": "noise of the instrument",
 }
-
+OF_MODEL = {"numerics": "of the loop itself", "zones": "cohesive zones at edges, left out"}
 
 _REMEDIES = {
     "cut-off": "resolve shorter waves",
@@ -66,6 +67,7 @@ _REMEDIES = {
     "form": "measure a longer trace, or give the degree of the form",
     "noise": "average several scans",
     "numerics": "ask for a better accuracy",
+    "zones": "no method follows zones at edges, so take a shorter range if that may be",
 }
 # What makes shorter waves known, by what limits the cut-off.
 _SHORTER_WAVES = {
@@ -140,6 +142,11 @@ def _least(name: str, none: str = "") -> Any:
     return property(least, doc=f"Least ``{name}`` in m of the answer's loop and variants{none}.")
 
 
+def _views() -> Any:
+    """Return the module that shows answers: it imports this one, and loads matplotlib."""
+    return import_module("adhesis.ensemble.trace.trace_page")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Answer(ByValue):
     """Loss, pull-off stress and contact fraction of a trace, with their doubts.
@@ -175,11 +182,11 @@ class Answer(ByValue):
 
     def __str__(self) -> str:
         """Summarise the answer for a terminal: loss, pull-off, contact, doubts, warnings."""
-        return str(views.maker().summary(self))
+        return str(_views().summary(self))
 
     def _repr_html_(self) -> str:
         """Return the main numbers and the figure of the loop, for notebooks."""
-        return str(views.maker().notebook_page(self))
+        return str(_views().notebook_page(self))
 
     def page(self, folder: str | os.PathLike[str]) -> Path:
         """Write what ``adhesis trace --to`` writes: the page, its figures, and every number.
@@ -202,7 +209,7 @@ class Answer(ByValue):
         TypeError
             If ``folder`` is no path.
         """
-        return Path(views.maker().write_all(self, folder))
+        return Path(_views().write_all(self, folder))
 
     def to_dataframe(self) -> Any:
         """Return the numbers of every loop, that of the answer and the others.
@@ -213,7 +220,7 @@ class Answer(ByValue):
             A row for each loop; ``group`` is the doubt or the table that it belongs to.
             ``attrs["units"]`` holds the unit of every column.
         """
-        return views.maker().table_of_runs(self)
+        return _views().table_of_runs(self)
 
     def result(self, name: str) -> Result | None:
         """Numbers of a loop, or None if it failed or was not run."""
@@ -526,9 +533,10 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     found = [*answer.main["preload_warnings"], *_one_patch(answer), *_not_converged(answer)]
     if loss.relative > 0.5:
         largest = max(loss.doubts, key=lambda name: loss.doubts[name])
+        words = DOUBTS | OF_MODEL | {"numerics": "error of the loop itself"}
         found.append(
             f"the loss is known to {100 * loss.relative:.0f} % only, mostly for the doubt "
-            f"“{largest}” ({DOUBTS.get(largest, 'error of the loop itself')}; standard uncertainty "
+            f"“{largest}” ({words[largest]}; standard uncertainty "
             f"{100 * loss.doubts[largest]:.0f} %): {_REMEDIES[largest]}"
         )
     for kind in ("fall_warnings", "range_warnings", "strain_warnings"):

@@ -165,7 +165,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--exclude",
         action="append",
         metavar="A:B",
-        help="a range of positions to bridge, 1.2mm:1.3mm; may be given several times",
+        help="a range to bridge, from the first point on, 1.2mm:1.3mm; may be given several times",
     )
     making.add_argument("--keep-outliers", action="store_true", help="leave spikes in")
     making.add_argument("--invert", action="store_true", help="z points into the sample: turn it")

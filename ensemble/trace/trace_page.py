@@ -25,6 +25,7 @@ from adhesis.ensemble.trace.answer import (
     FIGURE_FILES,
     FIGURES,
     LEAST,
+    OF_MODEL,
     Answer,
     Uncertain,
     document,
@@ -39,8 +40,6 @@ from adhesis.solver.loading.equilibrium_path import (
     in_works_of_adhesion,
     sticking_text,
 )
-
-_OF_MODEL = {"numerics": "of the loop itself", "zones": "cohesive zones at edges, left out"}
 
 
 def summary(answer: Answer) -> str:
@@ -179,7 +178,8 @@ def table_of_runs(answer: Answer) -> Any:
 
     rows = pd.DataFrame(run_rows(answer)).rename(columns={"said": "description"})
     hidden = ["range_warnings", "preload_warnings", "fall_warnings", "strain_warnings", "failed"]
-    return with_units(rows.drop(columns=hidden, errors="ignore"))
+    rows = rows.drop(columns=hidden, errors="ignore")
+    return with_units(rows, answer.cycle.control.is_load)
 
 
 # ---------------------------------------------------------------------- content
@@ -240,7 +240,7 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
 def _doubt_rows(answer: Answer) -> list[list[str]]:
     rows = [["doubt", "loss", "pull-off", "contact"]]
     quantities = (answer.loss, answer.pull_off_stress, answer.contact_fraction)
-    for name, words in (DOUBTS | _OF_MODEL).items():
+    for name, words in (DOUBTS | OF_MODEL).items():
         shares = [q.doubts.get(name) for q in quantities]
         if any(share is not None for share in shares):
             cells = ["" if share is None else rounded_percent(share) for share in shares]

@@ -33,11 +33,14 @@ COMMAS = [h.replace(".", ",") for h in NM]
 
 TEXTS: dict[str, tuple[str, bytes, dict[str, str]]] = {
     "metres": ("a.csv", "\n".join(METRES).encode(), {}),
+    "a UTF-8 mark": ("a.csv", "\n".join(METRES).encode("utf-8-sig"), {}),
     "a header without a unit": ("a.csv", "\n".join(["height", *METRES]).encode(), {}),
     "a comment": ("a.csv", "\n".join(["# one period (in m)", *METRES]).encode(), {}),
     "a header with a unit": ("a.csv", "\n".join(["z (nm)", *NM]).encode(), {}),
     "decimal commas": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode(), {}),
+    "UTF-16": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode("utf-16"), {}),
     "UTF-32": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode("utf-32"), {}),
+    "CR": ("a.csv", "\r".join(["z (nm)", *NM, ""]).encode(), {}),
     "a unit by option": ("a.csv", "\n".join(NM).encode(), {"unit": "nm"}),
     "one row": ("a.csv", ",".join(METRES).encode(), {}),
     "one row, spaces": ("a.csv", " ".join(METRES).encode(), {}),
@@ -59,6 +62,12 @@ def test_an_array_is_read_in_metres_or_the_unit_given(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_heights(tmp_path / "a.npy", unit="nm"), WAVE, rtol=1e-12)
     np.save(tmp_path / "b.npy", WAVE)
     assert np.array_equal(read_heights(tmp_path / "b.npy"), WAVE)
+
+
+def test_pillars_and_ground_of_one_height_are_heights(tmp_path: Path) -> None:
+    pillars = np.where(np.arange(64) % 16 < 3, 999.0, 0.0) + 0.01 * np.arange(64) % 0.05
+    np.save(tmp_path / "a.npy", pillars)
+    assert np.array_equal(read_heights(tmp_path / "a.npy", unit="nm"), 1e-9 * pillars)
 
 
 def archive(name: str) -> bytes:
@@ -85,10 +94,12 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "xlsx": ("x.xlsx", archive("xl/workbook.xml"), r"is a workbook: save its columns as text"),
     "xls": ("x.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "is a workbook"),
     "xlsx as csv": ("x.csv", archive("xl/workbook.xml"), "is a workbook: save its columns as text"),
+    "zip as dat": ("x.dat", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
     "npz": ("x.npz", saved(WAVE), r"archive of arrays: save the one of the heights as \.npy"),
     "npz as npy": ("x.npy", saved(WAVE), "archive of arrays"),
     "pdf": ("x.pdf", b"%PDF-1.7\n", "is a PDF: export the heights as text"),
     "png": ("x.png", PNG, r"is a picture \(PNG\)"),
+    "png as csv": ("x.csv", PNG, r"is a picture \(PNG\)"),
     "jpeg": ("x.jpg", b"\xff\xd8\xff\xe0" + bytes(40), r"is a picture \(JPEG\)"),
     "empty": ("x.csv", b"", "is empty"),
     "blank": ("x.csv", b" \n\n", "is empty"),
@@ -137,6 +148,16 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
     "overflow": ([*METRES[:5], "-1e400", *METRES[5:]], {}, "has no finite height on line 6"),
     "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "has no finite height on line 6"),
     "nan at the beginning": (["1", "nan", *METRES], {}, "has no finite height on line 2"),
+    "a code": (
+        [*NM[:5], "-9999", *NM[5:]],
+        {"unit": "nm"},
+        "has 1 height of -9999, which instruments write for missing ones: --heights needs every",
+    ),
+    "two codes": (
+        [*NM[:5], "-32768", *NM[5:9], "32767", *NM[9:]],
+        {"unit": "nm"},
+        "has 2 heights of -32768, 32767, which instruments write for missing ones",
+    ),
 }
 
 

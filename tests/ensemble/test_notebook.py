@@ -146,6 +146,15 @@ def test_tables_dataset_and_numbers_hold_every_state_and_jump_with_units(result)
     assert json.loads(json.dumps(numbers, allow_nan=False)) == numbers
 
 
+def test_turning_points_under_a_load_are_stresses() -> None:
+    for control, points, unit in (
+        (None, [0.5, 0.2, 0.4], "1"),
+        (Control(0.0), [400, 150, 300], "Pa"),
+    ):
+        data = run_path(wave_method(control), points, load_steps=4).to_xarray()
+        assert (data.minor_start.units, data.minor_turn.units) == (unit, unit)
+
+
 def test_what_was_saved_is_loaded_as_it_was(result, tmp_path):
     file = tmp_path / "result.nc"
     result.save(file)

@@ -346,6 +346,9 @@ def test_a_loss_that_is_hardly_known_names_its_largest_doubt(spoiled_answer: Ans
     assert "loss        10000, from 0 to 29000 mJ/m²" in summary(
         dataclasses.replace(found, loss=quantity)
     )
+    of_zones = dataclasses.replace(quantity, doubts={"noise": 0.2, "zones": 0.9})
+    (text,) = answers._warnings(found, of_zones)
+    assert "doubt “zones” (cohesive zones at edges, left out; standard uncertainty 90 %)" in text
 
 
 def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer: Answer) -> None:
@@ -545,6 +548,13 @@ def test_a_plan_expects_no_more_patches_than_crests_that_are_reached(gamma: floa
 def of_the_answer_alone(cycle: Any, trace: Prepared) -> Answer:
     """Run the answer's own loop of a trace."""
     return run_plan(trace, cycle, only(make_plan(trace, cycle, quick=True, processes=0), "answer"))
+
+
+def test_turning_points_of_a_table_have_their_unit() -> None:
+    for control, turn, unit in ((Control(), 0.3, ""), (Control(0.0), 100.0, "Pa")):
+        cycle = make_cycle(HALF_SPACE, 1e-4, turn, 4, "auto", 1e-2, control)
+        table = of_the_answer_alone(cycle, prepared()).to_dataframe()
+        assert (table.turning_point[0], table.attrs["units"]["turning_point"]) == (turn, unit)
 
 
 def test_stripes_reach_every_loop_of_a_trace_with_their_width() -> None:

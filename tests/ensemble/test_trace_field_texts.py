@@ -161,6 +161,26 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
         prepare_trace(long)
 
 
+def test_a_row_of_words_for_missing_numbers_keeps_its_place(tmp_path: Path) -> None:
+    rows = ["n;x (um);z (um)", *(f"{k};{x};{z}" for k, (x, z) in enumerate(PAIRS))]
+    rows[51] = "NaN;NaN;NaN"
+    trace = read_trace(put(tmp_path / "t.csv", rows), columns=[3], step=STEP)
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [50]
+    assert np.array_equal(np.delete(trace.heights, 50), np.delete(Z, 50))
+    rows[51] = ";;"
+    trace = read_trace(put(tmp_path / "t.csv", rows), columns=[3], step=STEP)
+    assert trace.points == N - 1
+    assert "1 empty row left out" in trace.notes
+    of_map = [" ".join(ZS[k : k + 40]) for k in range(0, 400, 40)]
+    of_map[2] = " ".join(["nan"] * 40)
+    trace = read_trace(put(tmp_path / "t.txt", of_map), row=3, unit="um", step=STEP)
+    assert np.array_equal(trace.heights, Z[120:160])
+    flagged = ["x (um),z (um),valid", *(f"{row},{int(k != 40)}" for k, row in enumerate(TWO))]
+    flagged[11] = flagged[11][:-1]  # one row has no flag
+    trace = read_trace(put(tmp_path / "t.csv", flagged), columns=[1, 2])
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40]
+
+
 @pytest.mark.parametrize(
     ("step", "decimals"), [(0.156, 1), (0.25, 0), (1.08, 0), (0.37, 0), (3.3, 0)]
 )

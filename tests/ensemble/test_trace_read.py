@@ -97,6 +97,11 @@ def test_names_of_positions_and_heights_have_units_in_many_languages(names, tmp_
         assert_right(read(tmp_path, [head, *rows("\t", decimal, 1e3, 1e6, ".7f")]))
 
 
+def test_units_by_option(tmp_path: Path) -> None:
+    assert_right(read(tmp_path, rows(" ", "."), unit="um"))
+    assert_right(read(tmp_path, rows(",", ".", 1e3, 1e9, ".7f"), unit="mm,nm"))
+
+
 def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path) -> None:
     heights = [f"{z * 1e6:.6f}" for z in Z]
     assert_right(read(tmp_path, ["Height (µm)", *heights], step=STEP))
@@ -106,6 +111,13 @@ def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path)
     assert_right(read(tmp_path, ["Schrittweite: 0,5 µm", "Höhe (µm)", *commas]))
     with pytest.raises(InputError, match="give step"):
         read(tmp_path, ["Height (µm)", *heights])
+
+
+def test_columns_are_chosen_where_there_are_more(tmp_path: Path) -> None:
+    lines = [f"{k},{row}" for k, row in enumerate(rows(",", "."))]
+    with pytest.raises(InputError, match=r"3 columns: give columns X,Z"):
+        read(tmp_path, ["n,x (um),z (um)", *lines])
+    assert_right(read(tmp_path, ["n,x (um),z (um)", *lines], columns=(2, 3)))
 
 
 def test_npy_of_one_column_and_of_two(tmp_path: Path) -> None:
@@ -181,6 +193,11 @@ def test_missing_heights_in_memory_are_gaps() -> None:
 WORDS = FRAME.assign(**{"z (um)": "high"})
 
 
+TWO_UNITS = FRAME.copy()
+TWO_UNITS.attrs["units"] = {"z (um)": "nm"}
+ONE_UNIT = NAMED[["x", "z"]].copy()
+ONE_UNIT.attrs["units"] = "um"
+
 REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {
     "no unit": (BOTH, {}, InputError, "array states no unit"),
     "no step": (Z, {"unit": "m"}, InputError, "array has heights without positions.*give step"),
@@ -195,6 +212,13 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "an empty stream": (io.BytesIO(b""), {}, InputError, "the stream is empty"),
     "a zip": (io.BytesIO(b"\x1f\x8b0"), {}, InputError, "the stream is compressed"),
     "booleans": (FRAME.assign(**{"z (um)": True}), {"columns": [1, 2]}, InputError, "holds bool"),
+    "one unit": (ONE_UNIT, {}, InputError, r"attrs\['units'\] of the table is 'um': it must map"),
+    "two units": (
+        TWO_UNITS,
+        {"columns": ["x (mm)", "z (um)"]},
+        InputError,
+        r"column 'z \(um\)' of the table has the unit nm in attrs: correct the wrong one",
+    ),
     "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
     "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),
     "a unit that is none": (BOTH, {"unit": 5}, TypeError, "unit is 5: it must be a text"),
@@ -246,6 +270,19 @@ def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -
     np.testing.assert_allclose(trace.heights[good], Z[good], atol=1e-11)
 
 
+def test_positions_that_do_not_begin_at_nought_are_pointed_out(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    for begin, said in ((0.0, False), (7.5, True), (-49.75, True)):
+        x = begin + 1e6 * X
+        table = np.column_stack([x, 1e6 * Z])
+        np.savetxt(path, table, "%.5f", delimiter=",", header="x (um),z (um)")
+        note = (
+            f"positions begin at {begin:g} µm: those named below, and those to exclude, count "
+            "from there"
+        )
+        assert (note in read_trace(path).notes) == said
+
+
 def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
     trace = read(tmp_path, [UM, *rows(";", ".")[::-1]])
     assert_right(trace)
@@ -269,6 +306,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
     "kilometres": ([UM.replace("µm", "m"), *rows(";", ".")], {}, "m long: is its unit right"),
     "heights in mm, positions in µm": (rows(" ", "."), {"unit": "um,mm"}, "in the same unit"),
+    "words within": ([UM, *rows(";", ".")[:50], "pause", *rows(";", ".")[50:]], {}, "line 52 of"),
     "turning back": (SPIKED, {"unit": "um"}, "positions turn back at line 61"),
     "twice the same place": (
         ["x (um) z (um)", "0.0 1.0", "0.0 1.0", *rows(" ", ".")[1:]],

@@ -184,6 +184,11 @@ class _Column:
         return bool(self.words & own or not self.words & others)
 
 
+def unit_of_name(text: str) -> str | None:
+    """Return the unit of length in the name of a column, or alone; None without one."""
+    return _Column(text).unit
+
+
 def names_positions(text: str) -> bool:
     """Return whether a column's name is known, and that of positions."""
     return bool((_Column(text).words or frozenset()) & _X)

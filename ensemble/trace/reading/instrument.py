@@ -9,7 +9,6 @@ first to last point. So the step is always computed from its positions.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, NoReturn
 
@@ -27,16 +26,6 @@ HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
 _TAKE_ANYTHING = ("asc", "xyz", "hgt")
 
 
-@dataclass(frozen=True, eq=False)
-class Scan:
-    """Positions and heights (NaN: not measured) of an instrument file in m, and a description."""
-
-    positions: Array
-    heights: Array
-    description: str
-    tip_radius: float | None
-
-
 def available() -> bool:
     """Return whether the optional dependency is installed."""
     from importlib.util import find_spec
@@ -44,11 +33,14 @@ def available() -> bool:
     return find_spec("SurfaceTopography") is not None
 
 
-def read_scan(source: Source, row: int | None = None, channel: int | None = None) -> Scan:
+def read_scan(
+    source: Source, row: int | None, channel: int | None
+) -> tuple[Array, Array, str, float | None]:
     """Read a line scan, or one row of a map, from an instrument file.
 
-    InputError if no reader knows the file, it is damaged, it gives no length or unit, it holds a
-    map and no row is chosen, or the chosen channel or row is not there.
+    Returns positions and heights (NaN: not measured) in m, a description, and the radius of the
+    tip in m, if it is known. InputError if no reader knows the file, it is damaged, it gives no
+    length or unit, it holds a map and no row is chosen, or the chosen channel or row is not there.
     """
     io = _library()
     import warnings
@@ -82,7 +74,7 @@ def read_scan(source: Source, row: int | None = None, channel: int | None = None
             _refuse(source, f"cannot be read as heights: {_one_line(error)}")
     metres = LENGTH.units[LENGTH.unit_named(str(topography.unit))]
     label = f"{_name(reader)}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
-    return Scan(positions * metres, heights * metres, label, _tip_radius(topography))
+    return positions * metres, heights * metres, label, _tip_radius(topography)
 
 
 def _refuse(source: Source, sentence: str) -> NoReturn:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from adhesis.ensemble.trace.reading.header_units import (
     names_positions,
     parse_units,
     step_of_header,
+    unit_of_name,
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
@@ -261,17 +262,17 @@ def read_trace(
             "mark, is to be saved as UTF-8): export the trace as text, or, if it is an "
             f"instrument's file, install the optional package SurfaceTopography, {HINT}"
         )
-    scan = read_scan(source, row, channel)
-    heights, gaps = without_codes(scan.heights)
-    heights, step, notes = equal_steps(source.name, scan.positions, 1.0, heights, None)
+    positions, heights, description, tip_radius = read_scan(source, row, channel)
+    heights, gaps = without_codes(heights)
+    heights, step, notes = equal_steps(source.name, positions, 1.0, heights, None)
     length, slope = (heights.size - 1) * step, _slope(heights, step)
     if not _SHORTEST <= length <= _LONGEST or slope > _STEEPEST:
         raise InputError(
             f"{source} would be {length_text(length)} long, and rise by {slope:.3g} times its step "
             "from point to point: its lengths are wrong or damaged, so export it as text with units"
         )
-    notes = [scan.description, *filter(None, [gaps]), *notes]
-    return Trace(heights, step, source.name, tuple(notes), scan.tip_radius)
+    notes = [description, *filter(None, [gaps]), *notes]
+    return Trace(heights, step, source.name, tuple(notes), tip_radius)
 
 
 def _refuse_options(to_what: str, **options: object) -> None:
@@ -325,7 +326,17 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         source = source[list(names)]
     units = source.attrs.get("units", {})
+    if not isinstance(units, Mapping):
+        raise InputError(
+            f"attrs['units'] of the table is {checks.shown(units)}: it must map the names of the "
+            "columns to their units"
+        )
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
+    for n in filter(units.get, source.columns):
+        if unit_of_name(str(n)) not in (None, unit_of_name(str(units[n]))):
+            raise InputError(
+                f"column {n!r} of the table has the unit {units[n]} in attrs: correct the wrong one"
+            )
     for n, kind in source.dtypes.items():
         if kind.kind in "bcmM":  # which would become numbers of another meaning
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
@@ -407,6 +418,12 @@ def _from_table(
             )
         heights, step, more = equal_steps(name, columns[0], LENGTH.units[x_unit], heights, lines)
         notes.extend(more)
+        begin = float(columns[0].min()) * LENGTH.units[x_unit]
+        if abs(begin) > step / 2:
+            notes.append(
+                f"positions begin at {length_text(begin, 6)}: those named below, and those to "
+                "exclude, count from there"
+            )
     elif step is None:
         step = step_of_header(name, table.header, table.decimal)
         if step is None:
@@ -415,6 +432,8 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
+    if len(columns) == 1 and table.left_out:
+        notes.append(f"{counted(table.left_out, 'empty row')} left out")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
@@ -470,7 +489,8 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     """Return a row of a text whose rows are those of a map."""
     for what, line in (("row", table.columns[:, 0]), ("column", table.columns[table.filled[0]])):
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
-        for steps in np.diff(line), np.diff(line[1:]):
+        for part in line, line[1:]:
+            steps = np.diff(part[np.isfinite(part)])
             if steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0)):
                 raise InputError(
                     f"the first {what} of {name} rises or falls throughout, as positions do: "

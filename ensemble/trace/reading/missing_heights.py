@@ -31,8 +31,11 @@ def is_known_code(value: float) -> bool:
     return abs(value) >= _ENORMOUS or any(abs(abs(value) - code) <= 1.0 for code in _CODES)
 
 
-def without_codes(heights: Array) -> tuple[Array, str]:
-    """Replace numbers that stand for missing heights by NaN; return heights and a description."""
+def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, str]:
+    """Replace numbers that stand for missing heights by NaN; return heights and a description.
+
+    ``known_alone``: only those that instruments write, beyond the range of all others.
+    """
     heights = np.where(np.isfinite(heights), heights, np.nan)
     values, times = np.unique(heights[np.isfinite(heights)], return_counts=True)
     known = np.array([is_known_code(value) for value in values], dtype=bool)
@@ -48,9 +51,10 @@ def without_codes(heights: Array) -> tuple[Array, str]:
     # Where hardly a height occurs twice, noughts and nines that do stand for no height even within
     # the range.
     are_single = float(np.median(times)) == 1.0
-    codes = far | (likely & (away > _BEYOND_KNOWN * (high - low)))
-    codes |= (nines | (values == 0)) & repeated & are_single
-    codes |= nines & np.isin(-values, values[codes])
+    codes = likely & (away > _BEYOND_KNOWN * (high - low))
+    if not known_alone:
+        codes |= far | ((nines | (values == 0)) & repeated & are_single)
+        codes |= nines & np.isin(-values, values[codes])
     if not codes.any():
         return heights, ""
     shown = ", ".join(f"{value:.10g}" for value in values[codes][:4])
@@ -86,7 +90,7 @@ def invalid_rows(
     marked = np.zeros(columns.shape[1], dtype=bool)
     notes = []
     for k, column in enumerate(columns):
-        if k in chosen or set(np.unique(column)) != {0.0, 1.0}:
+        if k in chosen or set(column[np.isfinite(column)]) != {0.0, 1.0}:
             continue
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"

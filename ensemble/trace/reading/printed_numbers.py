@@ -69,9 +69,7 @@ def value(field: str, decimal: str) -> float | None:
     plain = field.strip()
     if is_missing(plain):
         return float("nan")
-    if not _NUMBER.fullmatch(plain) or (decimal == "," and "." in plain):
-        return None
-    if decimal == "." and "," in plain:
+    if not _NUMBER.fullmatch(plain) or ("." if decimal == "," else ",") in plain:
         return None
     return float(plain.replace(",", ".").replace("D", "e").replace("d", "e"))
 

@@ -22,20 +22,19 @@ from adhesis.solver import checks
 
 MOST_BYTES = 200_000_000
 
-# By their first bytes: name of the format, and program that unpacks it.
-_COMPRESSED = {
-    b"\x1f\x8b": ("gzip", "gunzip"),
-    b"BZh": ("bzip2", "bunzip2"),
-    b"\xfd7zXZ\0": ("xz", "unxz"),
-    b"\x28\xb5\x2f\xfd": ("zstd", "unzstd"),
-    b"7z\xbc\xaf\x27\x1c": ("7z", "7z x"),
-    b"Rar!": ("rar", "unrar x"),
-}
-_DOCUMENTS = {
-    b"%PDF": "a PDF",
-    b"\x89PNG": "a picture (PNG)",
-    b"\xff\xd8\xff": "a picture (JPEG)",
-    b"GIF8": "a picture (GIF)",
+# By their first bytes: what a file is, and the program that unpacks it; without one the heights are
+# to be exported.
+_NO_TRACES = {
+    b"\x1f\x8b": ("compressed (gzip)", "gunzip"),
+    b"BZh": ("compressed (bzip2)", "bunzip2"),
+    b"\xfd7zXZ\0": ("compressed (xz)", "unxz"),
+    b"\x28\xb5\x2f\xfd": ("compressed (zstd)", "unzstd"),
+    b"7z\xbc\xaf\x27\x1c": ("compressed (7z)", "7z x"),
+    b"Rar!": ("compressed (rar)", "unrar x"),
+    b"%PDF": ("a PDF", None),
+    b"\x89PNG": ("a picture (PNG)", None),
+    b"\xff\xd8\xff": ("a picture (JPEG)", None),
+    b"GIF8": ("a picture (GIF)", None),
 }
 _ZIP, _COMPOUND = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 _BOOK = "Workbook".encode("utf-16-le")
@@ -134,14 +133,11 @@ class Source:
             begin = stream.read(_BEGIN)
         if not begin.strip():
             raise InputError(f"{self} is empty")
-        for magic, (name, program) in _COMPRESSED.items():
+        for magic, (what, program) in _NO_TRACES.items():
             if begin.startswith(magic):
-                raise InputError(
-                    f"{self} is compressed ({name}): unpack it first ({program} {self})"
-                )
-        for magic, name in _DOCUMENTS.items():
-            if begin.startswith(magic):
-                raise InputError(f"{self} is {name}: export the heights as text")
+                mend = "export the heights as text"
+                mend = f"unpack it first ({program} {self})" if program else mend
+                raise InputError(f"{self} is {what}: {mend}")
         return begin
 
     def container(self) -> str | None:

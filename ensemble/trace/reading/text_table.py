@@ -74,6 +74,7 @@ class Table:
     decimal: str
     # Lines of a single column that are empty, each a missing height
     empty_lines: tuple[int, ...] = ()
+    left_out: int = 0  # rows of empty fields between the others, which are no rows
 
     @property
     def form(self) -> str:
@@ -107,8 +108,6 @@ def read_column(source: Source, delimiter: str | None = None, decimal: str | Non
 
 def _lines(source: Source) -> list[str]:
     data = source.read()
-    if not data.strip():
-        raise InputError(f"{source} is empty")
     if data[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
         text = data.decode("utf-32", errors="replace")
     elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -182,6 +181,11 @@ class _Reader:
         """Return whether a line holds as many fields as there are columns."""
         return len(split(self.lines[place], self.delimiter)) >= self.count
 
+    def holds_row(self, place: int) -> bool:
+        """Return whether a row holds a number, or a word for a missing one in its columns."""
+        row = self.rows[place]
+        return not row.is_empty or (self.is_whole(place) and any(row.fields))
+
     def may_be_row(self, place: int, adjoins: bool) -> bool:
         """Return whether a line holds a row of numbers, or what may be a damaged one.
 
@@ -221,7 +225,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     places = _block(reader, start)
     _refuse_numbers_outside(reader, start, places[-1])
     filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
-    places = _without_empty_rows(reader, places, len(filled))
+    block, places = places, _without_empty_rows(reader, places, len(filled))
     rows = [reader.rows[place] for place in places]
     columns = [[row.fields[k] for row in rows] for k in filled]
     if not is_given:
@@ -246,6 +250,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         delimiter=delimiter,
         decimal=decimal,
         empty_lines=tuple(place + 1 for place in places if not lines[place].strip()),
+        left_out=len(block) - len(places),
     )
 
 
@@ -310,7 +315,7 @@ def _block(reader: _Reader, start: int) -> list[int]:
 def _without_empty_rows(reader: _Reader, places: list[int], columns: int) -> list[int]:
     """Leave out empty rows; of one column they are gaps, which have their places."""
     if columns > 1:
-        return [place for place in places if not reader.rows[place].is_empty]
+        return [place for place in places if reader.holds_row(place)]
     blank = [not reader.lines[place].strip() for place in places]
     # A text with double line ends has no gaps.
     is_double = len(places) > _TO_JUDGE and all(blank[1::2]) and not any(blank[::2])
