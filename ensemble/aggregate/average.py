@@ -8,7 +8,7 @@ averages of a file that a run is still writing are consistent.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain, pairwise
@@ -77,7 +77,6 @@ class Aggregate:
     campaign: Campaign
     attributes: dict[str, Any]  # root attributes of the file
     cells: tuple[AveragedCell, ...]  # by H, then γ, then further axes, ascending
-    paired: tuple[PairedDifference, ...]
     failures: tuple[tuple[int, str], ...]  # row and error text of the first failed tasks
     companions: tuple[Companion, ...] = ()  # other campaigns that the report compares with this one
     # One sentence for each file, this one or a companion, that has damaged rows (left out), or no
@@ -128,9 +127,21 @@ class Aggregate:
             stacks.setdefault((cell.hurst, cell.work_of_adhesion), []).append(cell)
         layers = list(zip(*stacks.values(), strict=False))
         layer = next(m for m in reversed(layers) if any(cell.done for cell in m))
-        keys = {(cell.hurst, cell.others) for cell in layer}
-        paired = tuple(p for p in self.paired if (p.lower.hurst, p.lower.others) in keys)
-        return replace(self, cells=layer, paired=paired)
+        return replace(self, cells=layer)
+
+    @cached_property
+    def paired(self) -> list[PairedDifference]:
+        """Each step from one γ to the next, where both have realisations in common."""
+        rows: dict[tuple[Any, ...], list[Cell]] = {}
+        for cell in self.cells:
+            rows.setdefault((cell.hurst, cell.others), []).append(cell)
+        found = []
+        for lower, upper in chain.from_iterable(map(pairwise, rows.values())):
+            loss = difference(lower, upper, "loss")
+            scaled = difference(lower, upper, "loss_dimensionless")
+            if loss is not None and scaled is not None:
+                found.append(PairedDifference(lower, upper, loss, scaled))
+        return found
 
     def finished(
         self, hursts: Collection[float], works_of_adhesion: Collection[float]
@@ -155,7 +166,6 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
             campaign=results.campaign,
             attributes=results.attributes,
             cells=cells,
-            paired=tuple(_paired(cells)),
             failures=tuple(zip(failed.tolist(), results.errors(failed), strict=True)),
             companions=companions,
             doubts=(*results.doubts(), *(d for other in companions for d in other.doubts)),
@@ -184,14 +194,3 @@ def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedC
         jumps=count_jumps(results, cell.rows),
         fields=average_fields(results, cell.rows, kept),
     )
-
-
-def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:
-    rows: dict[tuple[Any, ...], list[Cell]] = {}
-    for cell in cells:
-        rows.setdefault((cell.hurst, cell.others), []).append(cell)
-    for lower, upper in chain.from_iterable(map(pairwise, rows.values())):
-        loss = difference(lower, upper, "loss")
-        scaled = difference(lower, upper, "loss_dimensionless")
-        if loss is not None and scaled is not None:
-            yield PairedDifference(lower, upper, loss, scaled)

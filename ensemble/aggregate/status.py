@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.aggregate.cells import (
+    COUNTS,
     Cell,
     doubtful_loops,
     loops_beyond_zero_range,
@@ -26,7 +27,7 @@ from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
-from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
+from adhesis.ensemble.results.schema import FAILED, axis_datasets
 from adhesis.ensemble.task import doubt
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import RANGES
@@ -34,7 +35,6 @@ from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
-_CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
 _OF_TIMES = ("mean", "median", "max", "sum")
 _AVERAGED = ("wall_time", "loss", "loss_dimensionless")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
@@ -81,7 +81,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     return {
         "file": str(path),
         "tasks": len(state),
-        **{name: int(np.sum(state == code)) for name, code in _CODES.items()},
+        **{name: int(np.sum(state == code)) for name, code in COUNTS.items()},
         "damaged": [_named(tasks, row) for row in damaged.tolist()],
         "computed_by": origins,
         "seconds": {name: float(getattr(np, name)(times)) for name in _OF_TIMES}
@@ -109,7 +109,7 @@ def _group(cell: Cell) -> dict[str, Any]:
     values = np.array([cell.values[name] for name in _AVERAGED])
     seconds, loss, scaled = estimates(values, with_interval=False)  # which loads scipy
     group: dict[str, Any] = {
-        **{name: getattr(cell, name) for name in _CODES},
+        **{name: getattr(cell, name) for name in COUNTS},
         "mean_seconds": finite(seconds.mean),
         "loss": finite(loss.mean),
         "loss_standard_error": finite(loss.sem),
