@@ -50,6 +50,16 @@ def symbols(others: Sequence[tuple[str, float]]) -> str:
     return ", ".join(named)
 
 
+def gamma_label(work_of_adhesion: float) -> str:
+    """Return the label of one γ in a figure."""
+    return rf"$\gamma$ = {gamma_text(work_of_adhesion)}"
+
+
+def cell_label(cell: Cell) -> str:
+    """Return the label of H and γ of a cell in a figure."""
+    return f"H = {cell.hurst:g}, {gamma_label(cell.work_of_adhesion)}"
+
+
 def from_to(
     values: Sequence[float], show: Callable[[float], str] = "{:g}".format, between: str = " to "
 ) -> str:
@@ -99,8 +109,7 @@ def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
     parts = [symbols(others)] if others else []
     if failed := failed_cells(cells):
         first = failed[0]
-        gamma = f"$\\gamma$ = {gamma_text(first.work_of_adhesion)}"
-        name = ", ".join(filter(None, (f"H = {first.hurst:g}", gamma, symbols(first.others))))
+        name = ", ".join(filter(None, (cell_label(first), symbols(first.others))))
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         parts.append(f"missing, as all tasks failed: {name}{more}")
     drawn = [cell for cell in cells if cell.done]

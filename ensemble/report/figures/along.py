@@ -16,6 +16,7 @@ from adhesis.ensemble.report.further_axes import (
     below,
     common,
     from_to,
+    gamma_label,
     lines_along,
     own_axes,
     symbols,
@@ -133,7 +134,7 @@ def _lines(
     for cell in sorted(data.cells, key=lambda cell: cell.further_values[axis.name]):
         if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
             continue
-        title, label = f"H = {cell.hurst:g}", style.gamma_label(cell.work_of_adhesion)
+        title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
         if second is not None:
             value = cell.further_values[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])
