@@ -142,12 +142,17 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
     for name in ("paper", "beside/ratio-200", "beside/equal-c0", "beside/penetration-0.93"):
         assert of_paper(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
     text = (ROOT / "jobs" / "paper.toml").read_text()
+    text = re.sub(r"field_penetrations = .*", "", text)  # none at a preload
+    assert of_paper(parse_campaign(text))
     for old, new in (
         ("max_penetration = 0.9 ", "max_penetration = 0.98 "),
         ("ratio = 100", "ratio = 10"),
         ("young = 1e6", "young = 2e6"),
         ("poisson = 0.5", "poisson = 0.3"),
         ("poisson = 0.5", "poisson = 0.5\nwork_of_adhesion_open = 1"),
+        ("poisson = 0.5", "poisson = 0.5\nstrength = 1e6"),
+        ("poisson = 0.5", "poisson = 0.5\nadhesion_range = 1e-9"),
+        ("max_penetration = 0.9 ", "preload = 500\nmax_penetration = 0.9 "),
         ("n0 = 10", "n0 = 9"),
         ("h_rms = 1e-6", "h_rms = 2e-6"),
     ):
