@@ -22,6 +22,7 @@ from adhesis.ensemble.report.further_axes import (
     from_to,
     lines_along,
     own_axes,
+    state_sign,
     together,
 )
 from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
@@ -97,12 +98,7 @@ def turning_point(data: Aggregate) -> str:
     if cycle.turns_at_stress:
         what = "mean stress" if cycle.under_load else "preload"
         return f"a {what} of {in_one_unit('mean_stress', sorted({min(ends), max(ends)}), ' … ')}"
-    return f"{penetration_sign(data)} = {from_to(ends, between=' … ')}"
-
-
-def penetration_sign(data: Aggregate) -> str:
-    """Return what is prescribed along the loops of a campaign, in units of h_max."""
-    return "Δ/h_max" if data.campaign.cycle.stiffness is None else "u_tot/h_max"
+    return f"{state_sign(data)} = {from_to(ends, between=' … ')}"
 
 
 def _loss(cell: Cell) -> str:
@@ -434,10 +430,10 @@ def _spectrum(data: Aggregate) -> Iterator[str]:
                 parts.append(f"{fit} at {cell.name}")
     if parts:
         depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
-        sign = "p̄/p̄_max" if data.campaign.cycle.turns_at_stress else penetration_sign(data)
         yield (
             "Slope of the loading spectrum of the deformed surface at small wave numbers and "
-            f"{sign} = {' or '.join(sorted(depths))}, fitted, against Persson's -(2+H): "
+            f"{state_sign(data)} = {' or '.join(sorted(depths))}, fitted, against Persson's "
+            "-(2+H): "
             f"{_listed(parts)}."
         )
 

@@ -60,6 +60,16 @@ def cell_label(cell: Cell) -> str:
     return f"H = {cell.hurst:g}, {gamma_label(cell.work_of_adhesion)}"
 
 
+def state_sign(data: Aggregate) -> str:
+    """Return by what the states of loops are given: "Δ/h_max", or "u_tot/h_max" of a machine.
+
+    Where loops turn at a mean stress, states are at parts of it.
+    """
+    if data.campaign.cycle.turns_at_stress:
+        return "p̄/p̄_max"
+    return "Δ/h_max" if data.campaign.cycle.stiffness is None else "u_tot/h_max"
+
+
 def from_to(
     values: Sequence[float], show: Callable[[float], str] = "{:g}".format, between: str = " to "
 ) -> str:

@@ -822,3 +822,6 @@ def test_loops_of_a_machine_are_drawn_against_its_own_penetration(tmp_path):
     with style():
         figure = loops.loop_against_penetration(data)
     assert "u_\\mathrm{tot}" in figure.axes[0].get_xlabel()
+    assert "| u_tot/h_max |" in mechanism_tables.slopes(data).markdown().splitlines()[0]
+    (spectrum,) = (text for text in findings.agreement(data) if "loading spectrum" in text)
+    assert " and u_tot/h_max = 0.90, fitted" in spectrum
