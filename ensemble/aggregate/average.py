@@ -100,6 +100,11 @@ class Aggregate:
         return sum(cell.pending for cell in self.cells)
 
     @property
+    def total(self) -> int:
+        """Number of tasks, without those that are not needed."""
+        return self.done + self.failed + self.pending + self.damaged
+
+    @property
     def hursts(self) -> tuple[float, ...]:
         """Hurst exponents, ascending."""
         return tuple(sorted({cell.hurst for cell in self.cells}))

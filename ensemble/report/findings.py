@@ -160,15 +160,14 @@ def precision(data: Aggregate) -> Iterator[str]:
 def missing(data: Aggregate) -> Iterator[str]:
     """Sentences on tasks that are not in the averages; none if the campaign is complete."""
     yield from (f"{doubt}." for doubt in data.doubts)
-    total = data.done + data.failed + data.pending + data.damaged
     if data.pending:
         yield (
-            f"The campaign is not finished: {data.pending} of {total} tasks are pending. All "
+            f"The campaign is not finished: {data.pending} of {data.total} tasks are pending. All "
             f"averages are over the {data.done} finished ones."
         )
     if data.failed:
         why = f" First reason: {data.failures[0][1]}." if data.failures else ""
-        yield f"{data.failed} of {total} tasks failed; the averages leave them out.{why}"
+        yield f"{data.failed} of {data.total} tasks failed; the averages leave them out.{why}"
     if empty := [cell.name for cell in data.cells if not cell.done and cell.pending]:
         yield f"No task is finished yet for {_listed(empty)}."
     if failed := [cell.name for cell in failed_cells(data.cells)]:

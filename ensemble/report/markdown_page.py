@@ -122,7 +122,7 @@ def _summary(data: Aggregate) -> str:
         counts = [cell.done for cell in data.cells]
         many = f"{min(counts)} to {max(counts)} realisations by `[stop]`"
     return (
-        f"{data.done} loops of {data.done + data.failed + data.pending} tasks: "
+        f"{data.done} loops of {data.total} tasks: "
         f"H = {in_one_unit('hurst', sweep.hurst)}; "
         f"γ = {in_one_unit('work_of_adhesion', sweep.work_of_adhesion)}; {further}"
         f"{many}. Each loop was loaded to {findings.turning_point(data)} "
