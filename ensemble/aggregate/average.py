@@ -171,7 +171,10 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
             campaign=results.campaign,
             attributes=results.attributes,
             cells=cells,
-            failures=tuple(zip(failed.tolist(), results.errors(failed), strict=True)),
+            failures=tuple(
+                (row, text or "no reason given")
+                for row, text in zip(failed.tolist(), results.errors(failed), strict=True)
+            ),
             companions=companions,
             doubts=(*results.doubts(), *(d for other in companions for d in other.doubts)),
             damaged=results.damaged().size,

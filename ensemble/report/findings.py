@@ -166,8 +166,10 @@ def missing(data: Aggregate) -> Iterator[str]:
             f"averages are over the {data.done} finished ones."
         )
     if data.failed:
-        why = f" First reason: {data.failures[0][1]}." if data.failures else ""
-        yield f"{data.failed} of {data.total} tasks failed; the averages leave them out.{why}"
+        yield (
+            f"{data.failed} of {data.total} tasks failed; the averages leave them out. First "
+            f"reason: {data.failures[0][1]}."
+        )
     if empty := [cell.name for cell in data.cells if not cell.done and cell.pending]:
         yield f"No task is finished yet for {_listed(empty)}."
     if failed := [cell.name for cell in failed_cells(data.cells)]:

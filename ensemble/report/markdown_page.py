@@ -98,7 +98,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         *_bullets(*findings.quality(data)),
     ]
     if data.failures:
-        failed = [f"row {row}: {text or 'no reason given'}" for row, text in data.failures]
+        failed = (f"row {row}: {text}" for row, text in data.failures)
         out += ["### Failed tasks", *_bullets(*failed)]
     text = printable(data.campaign.text.replace("\r\n", "\n").strip())
     out += ["## The campaign", f"{fence(text)}toml\n{text}\n{fence(text)}", _origin(data)]

@@ -490,6 +490,7 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(
         assert "1 of 12 tasks failed" in text
         assert "No task is finished yet for H = 0.8, γ = 0.01 J/m²" in text
         assert "Only one realisation" in text
+    assert "First reason: the sum diverged." in page
     assert "row 5: the sum diverged" in page
     assert len(quick_figures) == 13
 
