@@ -41,6 +41,7 @@ from adhesis.ensemble.task.dataset import KEPT
 from adhesis.solver.method import BRANCHES
 
 _MAX_FAILURES = 20
+_H_AND_GAMMA = frozenset(("hurst", "work_of_adhesion"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,16 +124,19 @@ class Aggregate:
     def shown(self) -> Aggregate:
         """One cell for each (H, γ), all at the last finished point of the further axes.
 
-        At the last point all further axes have their largest value, if they are combined.
+        At the last point all further axes have their largest value, if they are combined. Keys that
+        vary together with H or γ are where these are. A part of a campaign may lack some cells.
         """
         if not self.further:
             return self
-        stacks: dict[tuple[float, float], list[AveragedCell]] = {}
+        groups = [names for names in self.campaign.sweep.zip if _H_AND_GAMMA.intersection(names)]
+        following = set(chain.from_iterable(groups))
+        layers: dict[tuple[float, ...], list[AveragedCell]] = {}
         for cell in self.cells:
-            stacks.setdefault((cell.hurst, cell.work_of_adhesion), []).append(cell)
-        layers = list(zip(*stacks.values(), strict=False))
-        layer = next(m for m in reversed(layers) if any(cell.done for cell in m))
-        return replace(self, cells=layer)
+            point = tuple(value for name, value in cell.others if name not in following)
+            layers.setdefault(point, []).append(cell)
+        last = max(point for point, layer in layers.items() if any(cell.done for cell in layer))
+        return replace(self, cells=tuple(layers[last]))
 
     @cached_property
     def paired(self) -> list[PairedDifference]:

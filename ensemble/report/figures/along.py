@@ -129,10 +129,10 @@ def _lines(
     def at(cell: AveragedCell) -> list[tuple[str, float]]:
         return [other for other in cell.others if other[0] not in moving]
 
-    wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
+    wanted = [at(cell) for cell in data.shown.cells]
     lines: dict[tuple[str, str], list[AveragedCell]] = {}
     for cell in sorted(data.cells, key=lambda cell: cell.further_values[axis.name]):
-        if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
+        if at(cell) not in wanted:
             continue
         title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
         if second is not None:

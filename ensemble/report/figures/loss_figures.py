@@ -210,9 +210,12 @@ def pull_off(data: Aggregate) -> style.PublishedFigure:
 
 
 def _second_scale(axes: Axes, data: Aggregate) -> None:
-    """Beside kPa, σ~ at the mean h_max of all cells."""
-    h_max = np.concatenate([cell.values["h_max"] for cell in data.cells])
-    scale = float(stress_scale(data.cells[0].campaign, h_max.mean(keepdims=True))[0])
+    """Beside kPa, σ~ at the mean h_max of all cells; none where these have several units of it."""
+    h_max = np.concatenate([cell.values["h_max"] for cell in data.cells]).mean(keepdims=True)
+    scales = {float(stress_scale(cell.campaign, h_max)[0]) for cell in data.cells}
+    if len(scales) > 1:  # as where the modulus or the period varies with H
+        return
+    (scale,) = scales
     to_and_fro = (lambda stress: 1e3 * stress / scale, lambda stress: stress * scale / 1e3)
     axes.tick_params(right=False)
     right = axes.secondary_yaxis("right", functions=to_and_fro)
