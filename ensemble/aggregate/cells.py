@@ -72,14 +72,10 @@ class Cell:
     values: dict[str, Array]
 
     @property
-    def point(self) -> tuple[float, ...]:
-        """Values on the axes of the campaign: H, γ, and those of further axes."""
-        return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
-
-    @property
-    def further_values(self) -> dict[str, float]:
-        """Values on the further axes, by name."""
-        return dict(self.others)
+    def at(self) -> dict[str, float]:
+        """Values on the axes of the campaign by name: H, γ, and those of further axes."""
+        gamma = self.work_of_adhesion
+        return {"hurst": self.hurst, "work_of_adhesion": gamma, **dict(self.others)}
 
     @property
     def name(self) -> str:

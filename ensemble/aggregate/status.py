@@ -95,7 +95,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(units),
         "axis_units": units,
-        "groups": [dict(zip(units, cell.point, strict=True)) | _group(cell) for cell in cells],
+        "groups": [
+            dict(zip(units, cell.at.values(), strict=True)) | _group(cell) for cell in cells
+        ],
         "failures": failures,
     }
 

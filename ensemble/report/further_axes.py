@@ -97,7 +97,7 @@ def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
         fixed = tuple(other for other in cell.others if other[0] not in moving)
         if cell.done:
             lines.setdefault((cell.hurst, cell.work_of_adhesion, fixed), []).append(cell)
-    return [sorted(line, key=lambda c: c.further_values[axis.name]) for line in lines.values()]
+    return [sorted(line, key=lambda c: c.at[axis.name]) for line in lines.values()]
 
 
 def common(data: Aggregate) -> list[tuple[str, float]]:

@@ -74,7 +74,7 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
                 line = lines.get((title, of_line), [])
                 if not line:
                     continue
-                x = np.array([cell.further_values[axis.name] for cell in line], dtype=float)
+                x = np.array([cell.at[axis.name] for cell in line], dtype=float)
                 aside = (k - (len(labels) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 x /= axis_unit
@@ -131,12 +131,12 @@ def _lines(
 
     wanted = [at(cell) for cell in data.shown.cells]
     lines: dict[tuple[str, str], list[AveragedCell]] = {}
-    for cell in sorted(data.cells, key=lambda cell: cell.further_values[axis.name]):
+    for cell in sorted(data.cells, key=lambda cell: cell.at[axis.name]):
         if at(cell) not in wanted:
             continue
         title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
         if second is not None:
-            value = cell.further_values[second.name]
+            value = cell.at[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])
         lines.setdefault((title, label), []).append(cell)
     return [other for other in common(data.shown) if other[0] not in moving], lines

@@ -14,7 +14,7 @@ from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.tables.key import axis_columns, estimated, gamma_column, key_columns
+from adhesis.ensemble.report.tables.key import axis_column, estimated, key_columns
 from adhesis.ensemble.report.tables.table import (
     Table,
     TableColumn,
@@ -256,11 +256,11 @@ def _deviation(kind: str, data: Aggregate, cell: Cell) -> float | None:
 def paired(data: Aggregate) -> Table:
     """Tabulate the growth of the loss from one γ to the next on the same profiles."""
     scaled, loss = "loss_dimensionless.difference", "loss.difference"
+    hurst, gamma, *further = data.campaign.axes
     columns = [
-        TableColumn("hurst", "lower.hurst", "H"),
-        *axis_columns(data.further, "lower."),
-        gamma_column(data, "_from", "lower.work_of_adhesion", "γ from"),
-        gamma_column(data, "_to", "upper.work_of_adhesion", "to"),
+        *(axis_column(axis, "lower.") for axis in (hurst, *further)),
+        axis_column(gamma, "lower.", "_from", "γ from"),
+        axis_column(gamma, "upper.", "_to", "to"),
         TableColumn("pairs", "loss.difference.n", "pairs"),
         *estimated("loss_dimensionless_difference", _DIFFERENCE, "W~ grows by", of=scaled),
         *estimated("loss_difference", "value", "loss by (mJ/m²)", **_MILLI, of=loss),
@@ -271,10 +271,10 @@ def paired(data: Aggregate) -> Table:
 
 def profiles(data: Aggregate) -> Table:
     """Statistics of the profiles of each H (and further key of the profile), the paper's slope."""
-    further = [axis for axis in data.further if axis.table == "profile"]
+    hurst, _, *further = data.campaign.axes
+    of_profiles = [hurst, *(axis for axis in further if axis.table == "profile")]
     columns = [
-        TableColumn("hurst", "hurst", "H"),
-        *axis_columns(further),
+        *map(axis_column, of_profiles),
         *estimated("h_rms", "mean", "mean h_rms (µm)", size=1e-6),
         *estimated("h_max", "mean", "mean h_max (µm)", size=1e-6),
         *estimated("m0", "mean", "m0 (µm²)", size=1e-12),
@@ -284,7 +284,7 @@ def profiles(data: Aggregate) -> Table:
     ]
     best: dict[tuple[float, ...], Cell] = {}  # all cells of a key have the same profiles
     for cell in data.cells:
-        at = (cell.hurst, *(cell.further_values[axis.name] for axis in further))
+        at = tuple(cell.at[axis.name] for axis in of_profiles)
         if at not in best or cell.done > best[at].done:
             best[at] = cell
     return make_table("Profiles", columns, best.values())
