@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -27,6 +28,8 @@ from adhesis.ensemble.report.tables.table import Table
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT, Dataset
+from adhesis.ensemble.task.fields import FIELD_DATASETS
+from adhesis.ensemble.task.row import CURVES, JUMP_COUNT, JUMPS, NUMBERS, TIMES
 from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
 
 if TYPE_CHECKING:
@@ -41,7 +44,6 @@ _RENAMED = {
     "field_position": "position",
 }
 _NO_RESULTS = ("error", schema.CHECKSUM.name, schema.ORIGIN.name)
-_SPECTRA = ("psd_height", "height_density", "psd_displacement", "gap_density")
 
 
 class Plots:
@@ -204,24 +206,19 @@ class CampaignResults:
         and the penetration of either branch;
         NaN (-1 for counts) where a task is not done. A damaged one counts as pending.
         """
-        wanted = [
-            d
-            for d in schema.DATASETS
-            if d.dims[0] == "task"
-            and d.name not in (*self.axes, *_SPECTRA, *_NO_RESULTS)
-            and (d.name == "jump_count" or not d.name.startswith("jump_"))
-        ]
-        return self._arranged(wanted)
+        numbers = (*schema.TASK_DATASETS, *schema.RUN_DATASETS, *TIMES, *NUMBERS)
+        wanted = (*numbers, *chain(*CURVES.values()), JUMP_COUNT)
+        return self._arranged([d for d in wanted if d.name not in (*self.axes, *_NO_RESULTS)])
 
     @cached_property
     def spectra(self) -> xr.Dataset:
         """Spectral densities, and densities of heights and gaps, of every loop."""
-        return self._arranged([d for d in schema.DATASETS if d.name in _SPECTRA])
+        return self._arranged([d for d in FIELD_DATASETS if d.dims[0] != KEPT])
 
     @cached_property
     def fields(self) -> xr.Dataset:
         """Profile, displacement, stress and gap of the first realisations, as far as kept."""
-        return self._arranged([d for d in schema.DATASETS if d.dims[0] == KEPT])
+        return self._arranged([d for d in FIELD_DATASETS if d.dims[0] == KEPT])
 
     @cached_property
     def curves(self) -> xr.Dataset:
@@ -248,15 +245,12 @@ class CampaignResults:
     @cached_property
     def jumps(self) -> pd.DataFrame:
         """The catalogue: one row for each jump of each finished loop, in the order of the path."""
-        columns = [
-            d for d in schema.DATASETS if d.name.startswith("jump_") and d.dims[1:] == ("jump",)
-        ]
         with Results(self.path) as results:
             rows = np.flatnonzero(results.status() == schema.DONE)
             used = results.column("jump_kind", rows) >= 0
             loop, _ = np.nonzero(used)
             out = {name: values[rows][loop] for name, values in _axes(results).items()}
-            for d in columns:
+            for d in JUMPS:
                 out[d.name.removeprefix("jump_")] = results.column(d.name, rows)[used]
         out["branch"] = np.array(BRANCHES)[out["branch"]]
         out["kind"] = np.array(JUMP_KINDS)[out["kind"]]
