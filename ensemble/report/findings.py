@@ -227,6 +227,7 @@ def quality(data: Aggregate) -> Iterator[str]:
             f"{percent(data.campaign.solver.accuracy)} of the loss: {_listed(rows)}."
         )
     yield from _limit(data)
+    yield from _doubtful_companions(data)
     if data.campaign.cycle.preload is not None:
         yield _preload(data)
     slopes = [(cell, np.sqrt(cell.estimates["m2"].mean)) for cell in data.cells if cell.done]
@@ -247,6 +248,17 @@ def quality(data: Aggregate) -> Iterator[str]:
             f"{cut} loops detached below Δ/h_max = {from_to(ends)}, where the stored unloading "
             "curve ends: their curves are cut, their losses are complete."
         )
+
+
+def _doubtful_companions(data: Aggregate) -> Iterator[str]:
+    """Sentences on the campaigns beside this one that have doubtful losses."""
+    for other in data.companions:
+        wrong = sum(int(np.sum(cell.doubtful | cell.beyond_zero_range)) for cell in other.cells)
+        if wrong:
+            yield (
+                f"WARNING: {wrong} of {sum(cell.done for cell in other.cells)} losses of "
+                f"{other.path.name}, beside this campaign, are doubtful: adhesis status lists them."
+            )
 
 
 def _preload(data: Aggregate) -> str:

@@ -581,6 +581,11 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     steps = companion(tmp_path, "steps.h5", 0.99, a=("load_steps = 20", "load_steps = 40"))
     alone = {row[:2]: row for row in loss_tables.losses(data).rows}
     both = aggregate(file, [finer, steps])
+    doubts = [text for text in findings.quality(both) if "beside this campaign" in text]
+    wrong = [row["row"] for row in read_status(finer)["doubtful"]]
+    wrong += [row["row"] for row in read_status(finer)["beyond_limit"]]
+    assert doubts[0].startswith(f"WARNING: {len(set(wrong))} of 30 losses of finer.h5, beside")
+    assert not any("beside this campaign" in text for text in findings.quality(data))
     assert [c.kind for c in both.companions] == ["resolution", "load steps"]
     assert both.companions[1].differs == ("cycle.load_steps = 40",)
     names = [column.name for column in loss_tables.losses(both).columns]
