@@ -599,6 +599,15 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
         assert alone[row[:2]][by_grid] is None
         audit = np.abs(cell.values["loss"] - cell.values["loss_from_drops"]) / cell.values["loss"]
         assert alone[row[:2]][by_steps] == pytest.approx(np.mean(audit * loss))
+    difference = "± steps: the difference from the campaign with other load steps beside this one"
+    assert f"{difference};" in loss_tables.losses(both).notes()
+    with h5py.File(steps, "r+") as other:
+        other["status"][:5] = 0
+    some = loss_tables.losses(aggregate(file, [steps]))
+    assert some.rows[0][by_steps] == alone[some.rows[0][:2]][by_steps]
+    assert f"{difference}, mean |loop integral - sum of drops| where that lacks a cell;" in (
+        some.notes()
+    )
 
 
 @pytest.mark.usefixtures("undrawn", "quick_figures")

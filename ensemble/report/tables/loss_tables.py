@@ -63,9 +63,7 @@ def losses(data: Aggregate) -> Table:
             partial(_error_of_load_steps, data),
             *("± steps", number(1)),
             last=True,
-            note="± steps: the difference from the campaign with other load steps beside this one"
-            if any(companion.kind == "load steps" for companion in data.companions)
-            else "± steps: mean |loop integral - sum of drops|",
+            note=_note_on_load_steps(data),
         ),
         TableColumn(
             "loss_dimensionless_error_resolution",
@@ -156,6 +154,19 @@ def _note(data: Aggregate) -> str:
         "W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max) and Δ~ = Δ/h_max, each realisation with its own "
         f"h_max; s.e.: standard error of the mean{interval if methods else ''}"
         f"{weight if data.campaign.cycle.under_load else ''}"
+    )
+
+
+def _note_on_load_steps(data: Aggregate) -> str:
+    """Return what the error of the load steps of each cell is; see :func:`_error_of_load_steps`."""
+    audit = "mean |loop integral - sum of drops|"
+    found = {_deviation("load steps", data, cell) is not None for cell in data.cells if cell.done}
+    if found == {False}:
+        return f"± steps: {audit}"
+    elsewhere = f", {audit} where that lacks a cell" if False in found else ""
+    return (
+        "± steps: the difference from the campaign with other load steps beside this "
+        f"one{elsewhere}"
     )
 
 
