@@ -29,10 +29,12 @@ from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval,
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached, why_beyond
 from adhesis.solver.loading.zero_range import ANY_RANGE
+from adhesis.solver.method import BRANCHES
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
 _MOST_LISTED = 4
+_STRESS_AND_AREA = ("mean_stress_dimensionless", "contact_fraction")
 
 
 def verdict(data: Aggregate) -> list[str]:
@@ -468,13 +470,18 @@ def area_ratio(cell: AveragedCell) -> float | None:
 
     Unloading up to its largest tension only: afterwards patches are lost while the tension falls.
     Loading between a tenth and 95 % of its final contact: at the turning point both branches meet.
-    None without common stresses.
+    None without common stresses. Loops that turn at one mean stress end at several penetrations:
+    where one of them has no state, the mean is unknown, and left out.
     """
-    stress_up, area_up, stress_down, area_down = (
-        cell.curves[f"{branch}_{name}"].mean
-        for branch in ("loading", "unloading")
-        for name in ("mean_stress_dimensionless", "contact_fraction")
+    (stress_up, area_up), (stress_down, area_down) = (
+        branch[:, np.isfinite(branch).all(axis=0)]
+        for branch in (
+            np.array([cell.curves[f"{name}_{of}"].mean for of in _STRESS_AND_AREA])
+            for name in BRANCHES
+        )
     )
+    if not stress_up.size or not stress_down.size:
+        return None
     part = slice(0, int(np.argmin(stress_down)) + 1)
     stress_down, area_down = stress_down[part], area_down[part]
     wanted = (area_up > 0.1 * area_up[-1]) & (area_up < 0.95 * area_up[-1])
