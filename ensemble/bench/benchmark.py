@@ -2,8 +2,9 @@
 
 On every scene (:mod:`adhesis.ensemble.bench.scenes`) each method runs the same loop at several
 resolutions, every run in a process of its own (:mod:`adhesis.ensemble.bench.measure`). Errors are
-those of the loop integral, relative to the closed form or to a reference run of ``sharp`` that is
-more accurate than every measured one.
+those of the loop integral, relative to the closed form or to a reference run of ``sharp``: the most
+accurate that finishes in time, which the page names. With little time it can be less accurate than
+measured runs, whose errors are then its own.
 """
 
 from __future__ import annotations
