@@ -626,6 +626,8 @@ def test_another_largest_penetration_is_compared_with(file, tmp_path):
     data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
     assert "cycle.max_penetration = 0.6" in write_page(data, {})
     assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
+    write_report(file, tmp_path / "out", io.StringIO())
+    assert not (tmp_path / "out" / "beside.csv").exists()
 
 
 def test_the_reading_nearest_to_the_paper_is_named(file, data, tmp_path):
