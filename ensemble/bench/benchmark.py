@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from adhesis.ensemble.bench.measure import Measurement, Run, measure
-from adhesis.ensemble.bench.scenes import FULL, Scene
+from adhesis.ensemble.bench.scenes import Scene
 from adhesis.ensemble.report.tables.table import BLANK, TableColumn, fixed, make_table
 
 # Doubling the nodes multiplies the time of a grid run by up to this factor.
@@ -65,7 +65,7 @@ class Line:
         return self.measured.loss / self.reference.loss - 1
 
 
-def benchmark(scenes: Sequence[Scene] = FULL, *, seconds: float = 360.0) -> Iterator[Line]:
+def benchmark(scenes: Sequence[Scene], *, seconds: float) -> Iterator[Line]:
     """Measure the methods on the scenes, one line after the other.
 
     A run is given up after so many CPU seconds. A grid that would take longer, estimated from the

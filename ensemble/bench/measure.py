@@ -117,12 +117,11 @@ def main() -> None:
 
 
 def _loop(run: Run) -> LoopResult:
-    problem = run.scene.problem()
+    accuracy, nodes = run.setting, None
     if run.method == "grid":
-        nodes = int(run.setting)
-        built = make_method("grid", problem, accuracy=_GRID_ACCURACY, nodes_per_wave=nodes)
-    else:
-        built = make_method(run.method, problem, accuracy=run.setting)
+        accuracy, nodes = _GRID_ACCURACY, int(run.setting)
+    problem = run.scene.problem()
+    built = make_method(run.method, problem, accuracy=accuracy, nodes_per_wave=nodes)
     return run_loop(built, max_penetration=run.scene.max_penetration, load_steps=run.load_steps)
 
 

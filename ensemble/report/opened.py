@@ -100,7 +100,7 @@ class Plots:
         if name not in axes:
             known = ", ".join(axes) or "none"
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
-        return self._draw(along(axes[name]), ax)
+        return self._draw(partial(along, axes[name]), ax)
 
 
 class CampaignResults:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
@@ -40,12 +38,7 @@ def with_figure(data: Aggregate) -> list[Axis]:
     return [axis for axis in axes if any(len(line) > 1 for line in lines_along(data, axis))]
 
 
-def along(axis: Axis) -> Callable[[Aggregate], style.PublishedFigure]:
-    """Return the function that draws the figure of one axis."""
-    return lambda data: _draw(data, axis)
-
-
-def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
+def along(axis: Axis, data: Aggregate) -> style.PublishedFigure:
     """Means with intervals against an axis, every cell of it and of one more further axis.
 
     With one more: a column for each (H, γ), a line for each of its values. Else a column for each

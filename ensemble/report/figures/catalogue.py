@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.campaign.axes import Axis
@@ -238,4 +239,4 @@ def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
     if len(further) > 1:
         caption += " Further axes beside these two stand at one value, as written below the panels."
     name, title = f"loss_along_{axis.name}", f"Loss against {axis.name}"
-    return Illustration(name, title, caption, along(axis), whole=True)
+    return Illustration(name, title, caption, partial(along, axis), whole=True)
