@@ -99,7 +99,10 @@ def turning_point(data: Aggregate) -> str:
     ends = [cell.campaign.cycle.turning_point for cell in data.cells if cell.done]
     if cycle.turns_at_stress:
         what = "mean stress" if cycle.under_load else "preload"
-        return f"a {what} of {in_one_unit('mean_stress', sorted({min(ends), max(ends)}), ' … ')}"
+        short = sum(cell.short_of_preload for cell in data.cells)
+        rest = f" ({short} of {data.done} loops turned before they reached it)" if short else ""
+        ends = sorted({min(ends), max(ends)})
+        return f"a {what} of {in_one_unit('mean_stress', ends, ' … ')}{rest}"
     return f"{state_sign(data)} = {from_to(ends, between=' … ')}"
 
 
