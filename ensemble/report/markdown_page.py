@@ -30,10 +30,16 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
 
     losses = loss_tables.losses(data)
     beside = loss_tables.beside_the_paper(data)
+    quality = list(findings.quality(data))
     out = [
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
-        *_bullets(*findings.pattern(data), *findings.precision(data), *findings.missing(data)),
+        *_bullets(
+            *findings.pattern(data),
+            *findings.precision(data),
+            *findings.missing(data),
+            *(sentence for sentence in quality if sentence.startswith("WARNING")),
+        ),
         _summary(data),
         left_out(data),
         shown_cells(data),
@@ -95,7 +101,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         "## Profiles",
         loss_tables.profiles(data).markdown(),
         "## Accuracy and completeness",
-        *_bullets(*findings.quality(data)),
+        *_bullets(*(sentence for sentence in quality if not sentence.startswith("WARNING"))),
     ]
     if data.failures:
         failed = (f"row {row}: {text}" for row, text in data.failures)

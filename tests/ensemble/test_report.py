@@ -683,6 +683,8 @@ def test_doubtful_losses_and_steep_profiles_are_said(tmp_path):
     doubtful, steep = (text for text in findings.quality(data) if "WARNING" in text)
     assert "2 of 8 losses are doubtful" in doubtful
     assert doubtful.index("row 2, H = 0.7, γ = 0.01 J/m² (19 %)") < doubtful.index("row 5")
+    first = write_page(data, {}).split("\n\n")[2]
+    assert f"- {doubtful}" in first.splitlines()  # above the numbers that are doubted
     assert "slope exceeds" in steep
     assert "γ = 0.02" in steep
     assert "γ = 0.01" not in steep
