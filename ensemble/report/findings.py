@@ -341,11 +341,15 @@ def _growth(data: Aggregate, of_paper: bool) -> Iterator[str]:
         return
     rest = [pair for pair in data.paired if not pair.loss.difference.low > 0]
     if not rest:
-        everywhere = "H and further axis" if data.further else "H"
+        steps = len(data.cells) - len({(cell.hurst, cell.others) for cell in data.cells})
+        where = f"at every {'H and further axis' if data.further else 'H'}"
+        if len(data.paired) < steps:
+            unknown = steps - len(data.paired)
+            where = f"in all {len(data.paired)} steps of γ that can be compared ({unknown} cannot)"
         same = "; the paper says the same" if of_paper else ""
         yield (
-            f"The loss in J/m² grows with γ at every {everywhere}, profile by profile, beyond "
-            f"the 95 % interval{same}."
+            f"The loss in J/m² grows with γ {where}, profile by profile, beyond the 95 % "
+            f"interval{same}."
         )
         return
     down = []

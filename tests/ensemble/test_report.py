@@ -545,6 +545,17 @@ def test_findings_compare_with_the_paper(data):
     assert f"at least {min(ratios):.2f}" in text
 
 
+def test_growth_is_claimed_where_it_is_known_alone(data):
+    """Of the steps of γ, two of which have one side without results."""
+    unknown = replace(data.cells[0], seed=data.cells[0].seed + 1)
+    some = replace(data, cells=(unknown, *data.cells[1:]))
+    every, known = (next(findings._growth(found, of_paper=False)) for found in (data, some))
+    assert every.startswith("The loss in J/m² grows with γ at every H, profile by profile")
+    assert known.startswith(
+        "The loss in J/m² grows with γ in all 3 steps of γ that can be compared (1 cannot), profile"
+    )
+
+
 def test_contact_is_compared_at_equal_load():
     """Unloading has twice the contact of loading at each stress, by construction."""
     stress = np.linspace(-1, 3, 41)
