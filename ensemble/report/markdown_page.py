@@ -34,7 +34,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
     out = [
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
-        *_bullets(
+        _bullets(
             *findings.pattern(data),
             *findings.precision(data),
             *findings.missing(data),
@@ -51,7 +51,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         *(["### Along further axes", *show("axes")] if figures.get("axes") else []),
         *_table("## What agrees with the paper, and what does not", beside),
         "" if beside.rows else "## What the averages show",
-        *_bullets(*findings.agreement(data)),
+        _bullets(*findings.agreement(data)),
         *_table(
             "### Growth of the loss with γ, profile by profile",
             loss_tables.paired(data),
@@ -64,7 +64,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
             "## Beside other campaigns",
             "The same realisations of both campaigns, profile by profile.",
             loss_tables.companions(data).markdown(),
-            *_bullets(*findings.readings(data)),
+            _bullets(*findings.readings(data)),
         ]
     out += ["## Loops", *show("loops")]
     if figures.get("fields"):
@@ -101,11 +101,11 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         "## Profiles",
         loss_tables.profiles(data).markdown(),
         "## Accuracy and completeness",
-        *_bullets(*(sentence for sentence in quality if not sentence.startswith("WARNING"))),
+        _bullets(*(sentence for sentence in quality if not sentence.startswith("WARNING"))),
     ]
     if data.failures:
         failed = (f"row {row}: {text}" for row, text in data.failures)
-        out += ["### Failed tasks", *_bullets(*failed)]
+        out += ["### Failed tasks", _bullets(*failed)]
     text = printable(data.campaign.text.replace("\r\n", "\n").strip())
     out += ["## The campaign", f"{fence(text)}toml\n{text}\n{fence(text)}", _origin(data)]
     return "\n\n".join(part for part in out if part) + "\n"
@@ -144,8 +144,8 @@ def _origin(data: Aggregate) -> str:
     return f"Results file: {'; '.join(parts)}." if parts else ""
 
 
-def _bullets(*sentences: str) -> list[str]:
-    return ["\n".join(f"- {markdown(sentence)}" for sentence in sentences)] if sentences else []
+def _bullets(*sentences: str) -> str:
+    return "\n".join(f"- {markdown(sentence)}" for sentence in sentences)
 
 
 def _shown(item: Illustration, data: Aggregate, of_paper: bool, first_numbered: bool) -> str:

@@ -22,7 +22,7 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.findings import typical_cell
-from adhesis.ensemble.report.further_axes import cell_label
+from adhesis.ensemble.report.further_axes import cell_label, state_sign
 from adhesis.ensemble.report.paper import PaperFigure
 from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, FieldPlan, field_plan
 from adhesis.solver.method import BRANCHES
@@ -37,6 +37,12 @@ _LEAST_DENSITY = 1e-6
 _FEWEST_NODES, _BEYOND = 1000, 4
 # Colour of a branch where both are drawn over the rigid profile.
 _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
+# Signs of :func:`state_sign` in formulas, without their index.
+_SIGNS = {
+    "Δ/h_max": r"\Delta/h",
+    "u_tot/h_max": r"u_\mathrm{tot}/h",
+    "p̄/p̄_max": r"\bar p/\bar p",
+}
 _SLOPE: Any = {"color": "0.3", "linewidth": 0.7}
 
 
@@ -234,7 +240,7 @@ def _penetration_handles(
 ) -> list[Line2D]:
     # Where the largest penetration varies with H or γ, only its share is the same for all.
     tops = {cell.campaign.cycle.turning_point for cell in data.cells}
-    unit = _penetration_sign(data)
+    unit = _SIGNS[state_sign(data)]
     if len(tops) > 1 and not data.campaign.cycle.turns_at_stress:
         unit = r"\Delta/\Delta"
     penetration = (data.cells[0].plan if len(tops) == 1 else field_plan(data.campaign)).penetration
@@ -248,16 +254,9 @@ def _penetration_handles(
     ]
 
 
-def _penetration_sign(data: Aggregate) -> str:
-    cycle = data.campaign.cycle
-    if cycle.turns_at_stress:
-        return r"\bar p/\bar p"
-    return r"\Delta/h" if cycle.stiffness is None else r"u_\mathrm{tot}/h"
-
-
 def _depth(data: Aggregate, cell: Cell, k: int) -> str:
     """Return "Δ/h_max = 0.41" for the state at one place."""
-    return rf"${_penetration_sign(data)}_\mathrm{{max}}$ = {cell.plan.penetration[k]:.2f}"
+    return rf"${_SIGNS[state_sign(data)]}_\mathrm{{max}}$ = {cell.plan.penetration[k]:.2f}"
 
 
 # ---------------------------------------------------------------------- which cells and states
