@@ -84,6 +84,7 @@ LOOPS = (
         at_stress=_ENDS,
     ),
 )
+_STATES = "Loops turn at a mean stress, and states are at parts of it instead of penetrations."
 _BELOW = "A caret at 0 marks an interval that goes on below."
 LOSSES = (
     Illustration(
@@ -128,6 +129,7 @@ FIELDS = (
         shapes_and_spectra.spectra_of_branches,
         "Fig. 4",
         paper.FIGURE_4,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -137,6 +139,7 @@ FIELDS = (
         shapes_and_spectra.spectra_on_loading,
         "Fig. 5(a)",
         paper.FIGURE_5,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -146,6 +149,7 @@ FIELDS = (
         shapes_and_spectra.spectra_on_unloading,
         "Fig. 5(b)",
         paper.FIGURE_5,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -160,6 +164,7 @@ FIELDS = (
         shapes_and_spectra.gap_density,
         "Fig. 8",
         paper.FIGURE_8,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
