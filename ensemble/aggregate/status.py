@@ -215,7 +215,7 @@ def _listed(
 def _range_of(row: Mapping[str, Any]) -> str:
     known = {name: row[name] for name in RANGES if row[name] is not None}
     least = min(known, key=lambda name: known[name]) if known else None
-    shown = "range unknown" if least is None else f"{least} {known[least]:.2g} m"
+    shown = "no finite range" if least is None else f"{least} {known[least]:.2g} m"
     return f"{shown}, loss {row['loss']:.3g} J/m²"
 
 

@@ -717,6 +717,8 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     values["edge_range"][7] = 0.3e-9
     values["turn_range"][4] = 0.2e-9
     values["loss"][6] = 21 * 0.02 * 0.5
+    for name in ("valid_range", "edge_range", "touch_range"):
+        values[name][6] = np.inf
     path = write(tmp_path / "r.h5", plan, values)
     data, status = aggregate(path), read_status(path)
     (warning,) = (text for text in findings.quality(data) if "turn_range is below" in text)
@@ -726,6 +728,8 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     told = f"5 losses are doubtful: {ranges} is below 1e-09 m"
     assert told in as_text(status)
     assert "touch_range 4e-10 m" in as_text(status)
+    assert "row 6: H = 0.7, γ = 0.02 J/m², realisation 2" in as_text(status)
+    assert "no finite range, loss 0.21 J/m²" in as_text(status)
     table = loss_tables.losses(data)
     names = [column.name for column in table.columns]
     shown = [row[names.index("valid_range_least [m]")] for row in table.rows]
