@@ -54,8 +54,8 @@ class Plots:
     are averages over the realisations that are finished.
     """
 
-    def __init__(self, averages: Callable[[], Aggregate]) -> None:
-        self._averages = averages
+    def __init__(self, results: CampaignResults) -> None:
+        self._results = results
 
     def __dir__(self) -> list[str]:
         from adhesis.ensemble.report.figures.catalogue import ALL
@@ -84,7 +84,7 @@ class Plots:
         from adhesis.ensemble.report.figures.style import drawn_into
 
         with drawn_into(ax):
-            return function(self._averages()).finish()
+            return function(self._results.averages).finish()
 
     def loss_along(self, name: str, ax: object = None) -> Figure:
         """Loss along a further axis of the campaign ("max_penetration"), with intervals.
@@ -96,7 +96,7 @@ class Plots:
         """
         from adhesis.ensemble.report.figures.along import along, with_figure
 
-        axes = {axis.name: axis for axis in with_figure(self._averages())}
+        axes = {axis.name: axis for axis in with_figure(self._results.averages)}
         if name not in axes:
             known = ", ".join(axes) or "none"
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
@@ -147,7 +147,7 @@ class CampaignResults:
         self._counts = {name: int(np.sum(status == state)) for name, state in states.items()}
         if schema.DAMAGED in status:
             self._counts["damaged"] = int(np.sum(status == schema.DAMAGED))
-        self.plot = Plots(partial(getattr, self, "averages"))  # which can be pickled
+        self.plot = Plots(self)
 
     def __enter__(self) -> Self:
         return self

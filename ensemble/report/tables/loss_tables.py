@@ -15,14 +15,7 @@ from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.tables.key import axis_column, estimated, key_columns
-from adhesis.ensemble.report.tables.table import (
-    Table,
-    TableColumn,
-    fixed,
-    make_table,
-    number,
-    plain,
-)
+from adhesis.ensemble.report.tables.table import Table, TableColumn, fixed, make_table, number
 from adhesis.solver.loading.zero_range import ANY_RANGE, RANGES
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import finite
@@ -43,7 +36,7 @@ def losses(data: Aggregate) -> Table:
     if cycle.preload is not None:
         columns.append(
             TableColumn(
-                *("short_of_preload", "short_of_preload", "short", plain),
+                *("short_of_preload", "short_of_preload", "short"),
                 only_if_any=True,
                 note="short: loops that turned before their preload was reached",
             )
@@ -109,7 +102,7 @@ def losses(data: Aggregate) -> Table:
         TableColumn(
             "races",
             lambda cell: int(cell.values["races"].sum()) if cell.done else None,
-            *("races", plain),
+            "races",
             only_if_any=True,
             note="races: jumps that another rule of descent would have ended elsewhere, all loops",
         ),
