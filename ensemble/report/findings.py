@@ -255,6 +255,12 @@ def quality(data: Aggregate) -> Iterator[str]:
         )
 
 
+def warnings(data: Aggregate) -> list[str]:
+    """Return what :func:`quality` warns of, to be said where the numbers stand."""
+    found = (text.partition("WARNING: ") for text in quality(data))
+    return [text for _, warning, text in found if warning]
+
+
 def _doubtful_companions(data: Aggregate) -> Iterator[str]:
     """Sentences on the campaigns beside this one that have doubtful losses."""
     for other in data.companions:

@@ -30,7 +30,6 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
 
     losses = loss_tables.losses(data)
     beside = loss_tables.beside_the_paper(data)
-    quality = list(findings.quality(data))
     out = [
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
@@ -38,7 +37,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
             *findings.pattern(data),
             *findings.precision(data),
             *findings.missing(data),
-            *(sentence for sentence in quality if sentence.startswith("WARNING")),
+            *(f"WARNING: {sentence}" for sentence in findings.warnings(data)),
         ),
         _summary(data),
         left_out(data),
@@ -101,7 +100,9 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         "## Profiles",
         loss_tables.profiles(data).markdown(),
         "## Accuracy and completeness",
-        _bullets(*(sentence for sentence in quality if not sentence.startswith("WARNING"))),
+        _bullets(
+            *(sentence for sentence in findings.quality(data) if not sentence.startswith("WARNING"))
+        ),
     ]
     if data.failures:
         failed = (f"row {row}: {text}" for row, text in data.failures)

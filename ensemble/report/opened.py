@@ -162,13 +162,15 @@ class CampaignResults:
         return f"<CampaignResults {self.path}: {counts}>"
 
     def _repr_html_(self) -> str:
-        """Return counts, mean losses and their figure, for notebooks."""
+        """Return counts, mean losses with the warnings of the report, and their figure."""
+        from adhesis.ensemble.report import findings
         from adhesis.ensemble.report.figures import along
 
         rows = [("file", str(self.path)), *((k, str(n)) for k, n in self._counts.items())]
-        page = table_of([*rows, ("axes", ", ".join(self.axes))])
+        rows.append(("axes", ", ".join(self.axes)))
         if not self._counts["done"]:
-            return page
+            return table_of(rows)
+        rows += [("warning", text) for text in findings.warnings(self.averages)]
         names = [f"loss_{part} [J/m^2]" for part in ("mean", "ci_low", "ci_high")]
         losses = self.losses[names]
         # Of an index pandas writes six decimals, which small lengths have in common.
@@ -178,7 +180,7 @@ class CampaignResults:
         several = along.with_figure(self.averages) if len(self.averages.hursts) == 1 else []
         draw = partial(self.plot.loss_along, several[0].name) if several else None
         figure: Any = (draw or self.plot.loss_against_hurst)()
-        return page + table + picture_of(figure, "losses")
+        return table_of(rows) + table + picture_of(figure, "losses")
 
     @cached_property
     def averages(self) -> Aggregate:

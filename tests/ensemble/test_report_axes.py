@@ -333,4 +333,5 @@ def test_a_notebook_tells_small_values_of_an_axis_apart(tmp_path):
     page = results._repr_html_()
     assert ">1e-06</th>" in page
     assert ">1.4e-06</th>" in page
+    assert "<th>warning</th><td>4 of 4 losses are doubtful, as their audit residual" in page
     assert results.losses.index.get_level_values("h_rms").tolist() == [1e-6, 1.4e-6]
