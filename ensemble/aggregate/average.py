@@ -8,7 +8,7 @@ averages of a file that a run is still writing are consistent.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain, pairwise
@@ -41,6 +41,7 @@ from adhesis.ensemble.task.dataset import KEPT
 from adhesis.solver.method import BRANCHES
 
 _MAX_FAILURES = 20
+_H_AND_GAMMA = frozenset(("hurst", "work_of_adhesion"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,6 @@ class Aggregate:
     campaign: Campaign
     attributes: dict[str, Any]  # root attributes of the file
     cells: tuple[AveragedCell, ...]  # by H, then γ, then further axes, ascending
-    paired: tuple[PairedDifference, ...]
     failures: tuple[tuple[int, str], ...]  # row and error text of the first failed tasks
     companions: tuple[Companion, ...] = ()  # other campaigns that the report compares with this one
     # One sentence for each file, this one or a companion, that has damaged rows (left out), or no
@@ -101,6 +101,11 @@ class Aggregate:
         return sum(cell.pending for cell in self.cells)
 
     @property
+    def total(self) -> int:
+        """Number of tasks, without those that are not needed."""
+        return self.done + self.failed + self.pending + self.damaged
+
+    @property
     def hursts(self) -> tuple[float, ...]:
         """Hurst exponents, ascending."""
         return tuple(sorted({cell.hurst for cell in self.cells}))
@@ -119,18 +124,33 @@ class Aggregate:
     def shown(self) -> Aggregate:
         """One cell for each (H, γ), all at the last finished point of the further axes.
 
-        At the last point all further axes have their largest value, if they are combined.
+        At the last point all further axes have their largest value, if they are combined. Keys that
+        vary together with H or γ are where these are. A part of a campaign may lack some cells.
         """
         if not self.further:
             return self
-        stacks: dict[tuple[float, float], list[AveragedCell]] = {}
+        groups = [names for names in self.campaign.sweep.zip if _H_AND_GAMMA.intersection(names)]
+        following = set(chain.from_iterable(groups))
+        layers: dict[tuple[float, ...], list[AveragedCell]] = {}
         for cell in self.cells:
-            stacks.setdefault((cell.hurst, cell.work_of_adhesion), []).append(cell)
-        layers = list(zip(*stacks.values(), strict=False))
-        layer = next(m for m in reversed(layers) if any(cell.done for cell in m))
-        keys = {(cell.hurst, cell.others) for cell in layer}
-        paired = tuple(p for p in self.paired if (p.lower.hurst, p.lower.others) in keys)
-        return replace(self, cells=layer, paired=paired)
+            point = tuple(value for name, value in cell.others if name not in following)
+            layers.setdefault(point, []).append(cell)
+        last = max(point for point, layer in layers.items() if any(cell.done for cell in layer))
+        return replace(self, cells=tuple(layers[last]))
+
+    @cached_property
+    def paired(self) -> list[PairedDifference]:
+        """Each step from one γ to the next, where both have realisations in common."""
+        rows: dict[tuple[Any, ...], list[Cell]] = {}
+        for cell in self.cells:
+            rows.setdefault((cell.hurst, cell.others), []).append(cell)
+        found = []
+        for lower, upper in chain.from_iterable(map(pairwise, rows.values())):
+            loss = difference(lower, upper, "loss")
+            scaled = difference(lower, upper, "loss_dimensionless")
+            if loss is not None and scaled is not None:
+                found.append(PairedDifference(lower, upper, loss, scaled))
+        return found
 
     def finished(
         self, hursts: Collection[float], works_of_adhesion: Collection[float]
@@ -155,8 +175,10 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
             campaign=results.campaign,
             attributes=results.attributes,
             cells=cells,
-            paired=tuple(_paired(cells)),
-            failures=tuple(zip(failed.tolist(), results.errors(failed), strict=True)),
+            failures=tuple(
+                (row, text or "no reason given")
+                for row, text in zip(failed.tolist(), results.errors(failed), strict=True)
+            ),
             companions=companions,
             doubts=(*results.doubts(), *(d for other in companions for d in other.doubts)),
             damaged=results.damaged().size,
@@ -184,14 +206,3 @@ def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedC
         jumps=count_jumps(results, cell.rows),
         fields=average_fields(results, cell.rows, kept),
     )
-
-
-def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:
-    rows: dict[tuple[Any, ...], list[Cell]] = {}
-    for cell in cells:
-        rows.setdefault((cell.hurst, cell.others), []).append(cell)
-    for lower, upper in chain.from_iterable(map(pairwise, rows.values())):
-        loss = difference(lower, upper, "loss")
-        scaled = difference(lower, upper, "loss_dimensionless")
-        if loss is not None and scaled is not None:
-            yield PairedDifference(lower, upper, loss, scaled)

@@ -54,7 +54,7 @@ def average_curves(
     points = results.column(name, slice(0, 1)).shape[1]
     shapes = (points, points, (len(QUANTILES), points))
     out = {curve: Curve(*(np.full(shape, np.nan) for shape in shapes)) for curve in scales}
-    for columns in _column_blocks(rows.size, points) if rows.size else ():
+    for columns in _blocks(points, rows.size, HELD_AT_ONCE) if rows.size else ():
         raw = results.column(name, rows, columns).astype(float)
         if name.endswith("patches"):  # -1 beyond the turning point of a load: not known
             raw[raw < 0] = np.nan
@@ -143,8 +143,8 @@ def _average(
     """
     shape = results.column(name, slice(0, 1)).shape[1:]
     total, count = np.zeros(shape), np.zeros(shape[:-1], dtype=np.int64)
-    for block in _row_blocks(rows, int(np.prod(shape))):
-        values = results.column(name, block).astype(float)
+    for block in _blocks(rows.size, int(np.prod(shape)), READ_AT_ONCE):
+        values = results.column(name, rows[block]).astype(float)
         held = np.isfinite(values).all(axis=-1)
         total += np.where(held[..., None], values, 0.0).sum(axis=0)
         count += held.sum(axis=0)
@@ -168,7 +168,8 @@ def count_jumps(results: Results, rows: NDArray[np.intp]) -> JumpStatistics:
     slots, bins = results.campaign.output.jumps, BIN_EDGES.size - 1
     number, energy = np.zeros(len(JUMP_KINDS), dtype=np.int64), np.zeros(len(JUMP_KINDS))
     histogram = np.zeros((len(JUMP_KINDS), bins), dtype=np.int64)
-    for block in _row_blocks(rows, slots):
+    for part in _blocks(rows.size, slots, READ_AT_ONCE):
+        block = rows[part]
         flags = results.column("jump_kind", block)
         used = flags >= 0
         if results.campaign.cycle.under_load:
@@ -183,15 +184,8 @@ def count_jumps(results: Results, rows: NDArray[np.intp]) -> JumpStatistics:
     return JumpStatistics(number, energy, histogram, truncated)
 
 
-def _row_blocks(rows: NDArray[np.intp], width: int) -> Iterator[NDArray[np.intp]]:
-    """Split rows of ``width`` numbers, a bounded number of bytes each."""
-    step = max(1, READ_AT_ONCE // max(1, width))
-    for start in range(0, rows.size, step):
-        yield rows[start : start + step]
-
-
-def _column_blocks(rows: int, points: int) -> Iterator[slice]:
-    """Split the columns of so many rows: at most :data:`HELD_AT_ONCE` numbers, or one column."""
-    width = max(1, HELD_AT_ONCE // max(1, rows))
-    for start in range(0, points, width):
-        yield slice(start, min(points, start + width))
+def _blocks(count: int, width: int, most: int) -> Iterator[slice]:
+    """Split so many rows or columns of ``width`` numbers: at most ``most`` numbers, or one line."""
+    step = max(1, most // max(1, width))
+    for start in range(0, count, step):
+        yield slice(start, start + step)

@@ -34,6 +34,8 @@ _NOT_AVERAGED = (
     *(*RANGES, "opening_strength", "largest_interior_tension"),
     *("interior_tension_position", "interior_tension_penetration"),
 )
+# Numbers of tasks by their state, under the names of :class:`Cell`.
+COUNTS = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
 # Energies that are also given per largest contact area, in J/m² of contact.
 _PER_CONTACT = {
     "loss_per_contact": "loss",
@@ -70,14 +72,10 @@ class Cell:
     values: dict[str, Array]
 
     @property
-    def point(self) -> tuple[float, ...]:
-        """Values on the axes of the campaign: H, γ, and those of further axes."""
-        return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
-
-    @property
-    def further_values(self) -> dict[str, float]:
-        """Values on the further axes, by name."""
-        return dict(self.others)
+    def at(self) -> dict[str, float]:
+        """Values on the axes of the campaign by name: H, γ, and those of further axes."""
+        gamma = self.work_of_adhesion
+        return {"hurst": self.hurst, "work_of_adhesion": gamma, **dict(self.others)}
 
     @property
     def name(self) -> str:
@@ -168,7 +166,8 @@ def read_cells(results: Results) -> list[Cell]:
     cells = []
     for task, rows_of_cell in tasks.by_cell():
         of_cell, unit = campaign.at(task), campaign.penetration_unit(task)
-        rows = rows_of_cell[status[rows_of_cell] == DONE]
+        of_rows = status[rows_of_cell]
+        rows = rows_of_cell[of_rows == DONE]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
         drops = values["loss_from_drops"]
         if campaign.cycle.under_load:  # without the drop that closes the loop
@@ -183,10 +182,6 @@ def read_cells(results: Results) -> list[Cell]:
         values["pull_off_stress_dimensionless"] = values["pull_off_stress"] / scale
         for name in ("loss_error", "energy_at_stake"):
             values[f"{name}_dimensionless"] = values[name] / (scale * values["h_max"])
-        counts = {
-            name: int(np.sum(status[rows_of_cell] == code))
-            for name, code in (("failed", FAILED), ("pending", PENDING), ("not_needed", NOT_NEEDED))
-        }
         cells.append(
             Cell(
                 hurst=task.hurst,
@@ -198,8 +193,7 @@ def read_cells(results: Results) -> list[Cell]:
                     "unloading": campaign.unloading_penetration * unit,
                 },
                 plan=field_plan(campaign, task),
-                done=rows.size,
-                **counts,
+                **{name: int(np.sum(of_rows == code)) for name, code in COUNTS.items()},
                 rows=rows,
                 seed=seed[rows],
                 values=values,

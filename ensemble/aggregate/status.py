@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.aggregate.cells import (
+    COUNTS,
     Cell,
     doubtful_loops,
     loops_beyond_zero_range,
@@ -26,7 +27,7 @@ from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
-from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
+from adhesis.ensemble.results.schema import FAILED, axis_datasets
 from adhesis.ensemble.task import doubt
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import RANGES
@@ -34,7 +35,6 @@ from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
-_CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
 _OF_TIMES = ("mean", "median", "max", "sum")
 _AVERAGED = ("wall_time", "loss", "loss_dimensionless")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
@@ -81,7 +81,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     return {
         "file": str(path),
         "tasks": len(state),
-        **{name: int(np.sum(state == code)) for name, code in _CODES.items()},
+        **{name: int(np.sum(state == code)) for name, code in COUNTS.items()},
         "damaged": [_named(tasks, row) for row in damaged.tolist()],
         "computed_by": origins,
         "seconds": {name: float(getattr(np, name)(times)) for name in _OF_TIMES}
@@ -95,7 +95,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(units),
         "axis_units": units,
-        "groups": [dict(zip(units, cell.point, strict=True)) | _group(cell) for cell in cells],
+        "groups": [
+            dict(zip(units, cell.at.values(), strict=True)) | _group(cell) for cell in cells
+        ],
         "failures": failures,
     }
 
@@ -109,7 +111,7 @@ def _group(cell: Cell) -> dict[str, Any]:
     values = np.array([cell.values[name] for name in _AVERAGED])
     seconds, loss, scaled = estimates(values, with_interval=False)  # which loads scipy
     group: dict[str, Any] = {
-        **{name: getattr(cell, name) for name in _CODES},
+        **{name: getattr(cell, name) for name in COUNTS},
         "mean_seconds": finite(seconds.mean),
         "loss": finite(loss.mean),
         "loss_standard_error": finite(loss.sem),
@@ -213,7 +215,7 @@ def _listed(
 def _range_of(row: Mapping[str, Any]) -> str:
     known = {name: row[name] for name in RANGES if row[name] is not None}
     least = min(known, key=lambda name: known[name]) if known else None
-    shown = "range unknown" if least is None else f"{least} {known[least]:.2g} m"
+    shown = "no finite range" if least is None else f"{least} {known[least]:.2g} m"
     return f"{shown}, loss " + ("unknown" if row["loss"] is None else f"{row['loss']:.3g} J/m²")
 
 

@@ -16,7 +16,7 @@ import sys
 from dataclasses import asdict, dataclass, replace
 from time import process_time
 
-from adhesis.ensemble.bench.scenes import SMALL_ROUGH, Scene
+from adhesis.ensemble.bench.scenes import SCENES, SMALL_ROUGH, Scene
 from adhesis.ensemble.run.launch import (
     ONE_THREAD,
     end_with_parent,
@@ -78,9 +78,10 @@ def measure(run: Run) -> Measurement:
 
     A run that fails or takes too long is a :class:`Measurement` with a note, not an exception.
     """
+    given = {**vars(run), "scene": run.scene.name}
     # One thread: on matrices of a few dozen rows, threads of the linear algebra only add CPU time.
     child = subprocess.run(
-        python("-m", "adhesis.ensemble.bench.measure", json.dumps(asdict(run))),
+        python("-m", "adhesis.ensemble.bench.measure", json.dumps(given)),
         env=python_environment() | ONE_THREAD,
         capture_output=True,
         text=True,
@@ -96,8 +97,8 @@ def measure(run: Run) -> Measurement:
 
 def main() -> None:
     """Measure the run in the first argument in this process; end it when its seconds are over."""
-    fields = json.loads(sys.argv[1])
-    run = Run(**{**fields, "scene": Scene(**fields["scene"])})
+    given = json.loads(sys.argv[1])
+    run = Run(**{**given, "scene": SCENES[given["scene"]]})
     _limit(_START_LIMIT)
     # Touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
     _loop(replace(run, scene=SMALL_ROUGH, setting=_WARM_UP[run.method], load_steps=4))
@@ -116,12 +117,11 @@ def main() -> None:
 
 
 def _loop(run: Run) -> LoopResult:
-    problem = run.scene.problem()
+    accuracy, nodes = run.setting, None
     if run.method == "grid":
-        nodes = int(run.setting)
-        built = make_method("grid", problem, accuracy=_GRID_ACCURACY, nodes_per_wave=nodes)
-    else:
-        built = make_method(run.method, problem, accuracy=run.setting)
+        accuracy, nodes = _GRID_ACCURACY, int(run.setting)
+    problem = run.scene.problem()
+    built = make_method(run.method, problem, accuracy=accuracy, nodes_per_wave=nodes)
     return run_loop(built, max_penetration=run.scene.max_penetration, load_steps=run.load_steps)
 
 

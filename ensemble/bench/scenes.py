@@ -5,8 +5,9 @@ All have the paper's period 2π mm and material (E = 1 MPa, ν = 0.5, arXiv 1511
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
 
 import numpy as np
 
@@ -15,14 +16,12 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 
-Shape = Literal["one wave", "two waves", "rough"]
-
 HALF_SPACE = HalfSpace(1e6, 0.5)
 _PERIOD = 2e-3 * np.pi
 # With this amplitude (m) the area along the profile (solver) and the flat one (closed form) give
 # the same loss to 1e-8.
 _SHALLOW = 1e-4 * _PERIOD / (2 * np.pi)
-_ALPHA = 0.2
+_EXACT = SingleWave.with_alpha(0.2, _SHALLOW, _PERIOD, HALF_SPACE.modulus)
 _AMPLITUDE = 1e-6
 # The ripple pins the edges some ten times in each direction. It is out of phase: in a symmetric
 # profile both edges of the patch become unstable at once, and the path then depends on rounding, or
@@ -37,14 +36,9 @@ class Scene:
 
     name: str
     title: str
-    # A cos(q0 x), the same with a ripple, or self-affine (H = 0.8, h_rms = 1 µm, seed 1)
-    shape: Shape = "rough"
-    work_of_adhesion: float = 0.0  # γ in J/m²; not read for one wave, where it follows from α = 0.2
+    problem: Callable[[], Problem]
     max_penetration: float = 0.9
     load_steps: int = 40  # steps from first touch to ``max_penetration`` (Δ~max)
-    # n0, ratio: lowest harmonic, and highest over lowest, of the rough shape
-    n0: int = 1
-    ratio: int = 1
     # Lower bounds of the nodes per shortest wave, coarse to fine
     grids: tuple[int, ...] = (8, 16, 32, 64)
     # Requested accuracies of the loss, low to high
@@ -54,35 +48,37 @@ class Scene:
     tightest: tuple[float, ...] = ()
     reference_load_steps: int = 80  # load steps of the reference run
 
-    def problem(self) -> Problem:
-        """Return the problem of this scene."""
-        if self.shape == "one wave":
-            gamma = _single_wave().work_of_adhesion
-            return Problem(single_wave(_SHALLOW, _PERIOD), HALF_SPACE, gamma)
-        if self.shape == "two waves":
-            waves = np.zeros(_RIPPLE_HARMONIC + 1, dtype=np.complex128)
-            waves[1], waves[-1] = 0.5, 0.5 * _RIPPLE * np.exp(1j * _RIPPLE_PHASE)
-            profile = Profile(_PERIOD, waves).scaled(_AMPLITUDE)
-        else:
-            profile = self_affine_profile(
-                _HURST, period=_PERIOD, n0=self.n0, ratio=self.ratio, seed=_SEED, h_rms=_H_RMS
-            )
-        return Problem(profile, HALF_SPACE, self.work_of_adhesion)
-
     @property
     def exact_loss(self) -> float | None:
         """Loss in J/m² of nominal area, if it is known in closed form."""
-        return _single_wave().loop.loss if self.shape == "one wave" else None
+        return _EXACT.loop.loss if self.problem is _one_wave else None
 
 
-def _single_wave() -> SingleWave:
-    return SingleWave.with_alpha(_ALPHA, _SHALLOW, _PERIOD, HALF_SPACE.modulus)
+def _one_wave() -> Problem:
+    """A cos(q0 x)."""
+    return Problem(single_wave(_SHALLOW, _PERIOD), HALF_SPACE, _EXACT.work_of_adhesion)
+
+
+def _two_waves(work_of_adhesion: float) -> Problem:
+    """A cos(q0 x) with a ripple."""
+    waves = np.zeros(_RIPPLE_HARMONIC + 1, dtype=np.complex128)
+    waves[1], waves[-1] = 0.5, 0.5 * _RIPPLE * np.exp(1j * _RIPPLE_PHASE)
+    profile = Profile(_PERIOD, waves).scaled(_AMPLITUDE)
+    return Problem(profile, HALF_SPACE, work_of_adhesion)
+
+
+def _rough(work_of_adhesion: float, n0: int, ratio: int) -> Problem:
+    """A self-affine profile; ``ratio``: highest harmonic over the lowest, ``n0``."""
+    profile = self_affine_profile(
+        _HURST, period=_PERIOD, n0=n0, ratio=ratio, seed=_SEED, h_rms=_H_RMS
+    )
+    return Problem(profile, HALF_SPACE, work_of_adhesion)
 
 
 ONE_WAVE = Scene(
     name="one-wave",
     title="one wave, α = 0.2",
-    shape="one wave",
+    problem=_one_wave,
     max_penetration=0.5,
     load_steps=10,
     # The wave is the whole profile: its contact of 0.18 λ needs many nodes.
@@ -91,8 +87,7 @@ ONE_WAVE = Scene(
 TWO_WAVES = Scene(
     name="two-waves",
     title="two waves, m = 1 and 12, γ = 0.01",
-    shape="two waves",
-    work_of_adhesion=0.01,
+    problem=partial(_two_waves, 0.01),
     load_steps=20,
     grids=(16, 64, 256),
     tightest=(1e-8, 1e-7, 1e-6),
@@ -101,30 +96,25 @@ TWO_WAVES = Scene(
 SMALL_ROUGH = Scene(
     name="rough-32",
     title="rough, m = 2 … 32, γ = 0.01",
-    work_of_adhesion=0.01,
+    problem=partial(_rough, 0.01, n0=2, ratio=16),
     load_steps=20,
-    n0=2,
-    ratio=16,
     tightest=(1e-8, 1e-7, 1e-6, 1e-5),
     reference_load_steps=40,
 )
 ROUGH = Scene(
     name="rough-250",
     title="rough, m = 10 … 250, γ = 0.01",
-    work_of_adhesion=0.01,
-    n0=10,
-    ratio=25,
+    problem=partial(_rough, 0.01, n0=10, ratio=25),
     grids=(8, 16, 32, 64, 128, 256),
     tightest=(1e-7, 1e-6, 1e-5, 1e-4),
 )
 PAPER = Scene(
     name="paper",
     title="the paper's scale, m = 10 … 1000, γ = 0.04",
-    work_of_adhesion=0.04,
-    n0=10,
-    ratio=100,
+    problem=partial(_rough, 0.04, n0=10, ratio=100),
     tightest=(1e-7, 1e-6, 1e-5, 1e-4),
 )
 
+SCENES = {scene.name: scene for scene in (ONE_WAVE, TWO_WAVES, SMALL_ROUGH, ROUGH, PAPER)}
 QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
 FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)

@@ -30,9 +30,8 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
     campaign = data.campaign
     depth = f"penetration/{'max_penetration' if campaign.has_axis('max_penetration') else 'h_max'}"
     names = [axis.name for axis in campaign.axes]
-    places = zip(*(cell.point for cell in data.cells), strict=True)
     out = xr.Dataset(
-        coords={name: ("cell", list(values)) for name, values in zip(names, places, strict=True)},
+        coords={name: ("cell", [cell.at[name] for cell in data.cells]) for name in names},
         attrs={
             "title": "Loading-unloading curves averaged over realisations",
             "source": data.path.name,

@@ -22,16 +22,19 @@ from adhesis.ensemble.report.further_axes import (
     from_to,
     lines_along,
     own_axes,
+    state_sign,
     together,
 )
 from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached, why_beyond
 from adhesis.solver.loading.zero_range import ANY_RANGE
+from adhesis.solver.method import BRANCHES
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
 _MOST_LISTED = 4
+_STRESS_AND_AREA = ("mean_stress_dimensionless", "contact_fraction")
 
 
 def verdict(data: Aggregate) -> list[str]:
@@ -96,13 +99,11 @@ def turning_point(data: Aggregate) -> str:
     ends = [cell.campaign.cycle.turning_point for cell in data.cells if cell.done]
     if cycle.turns_at_stress:
         what = "mean stress" if cycle.under_load else "preload"
-        return f"a {what} of {in_one_unit('mean_stress', sorted({min(ends), max(ends)}), ' … ')}"
-    return f"{penetration_sign(data)} = {from_to(ends, between=' … ')}"
-
-
-def penetration_sign(data: Aggregate) -> str:
-    """Return what is prescribed along the loops of a campaign, in units of h_max."""
-    return "Δ/h_max" if data.campaign.cycle.stiffness is None else "u_tot/h_max"
+        short = sum(cell.short_of_preload for cell in data.cells)
+        rest = f" ({short} of {data.done} loops turned before they reached it)" if short else ""
+        ends = sorted({min(ends), max(ends)})
+        return f"a {what} of {in_one_unit('mean_stress', ends, ' … ')}{rest}"
+    return f"{state_sign(data)} = {from_to(ends, between=' … ')}"
 
 
 def _loss(cell: Cell) -> str:
@@ -164,15 +165,16 @@ def precision(data: Aggregate) -> Iterator[str]:
 def missing(data: Aggregate) -> Iterator[str]:
     """Sentences on tasks that are not in the averages; none if the campaign is complete."""
     yield from (f"{doubt}." for doubt in data.doubts)
-    total = data.done + data.failed + data.pending + data.damaged
     if data.pending:
         yield (
-            f"The campaign is not finished: {data.pending} of {total} tasks are pending. All "
+            f"The campaign is not finished: {data.pending} of {data.total} tasks are pending. All "
             f"averages are over the {data.done} finished ones."
         )
     if data.failed:
-        why = f" First reason: {data.failures[0][1]}." if data.failures else ""
-        yield f"{data.failed} of {total} tasks failed; the averages leave them out.{why}"
+        yield (
+            f"{data.failed} of {data.total} tasks failed; the averages leave them out. First "
+            f"reason: {data.failures[0][1]}."
+        )
     if empty := [cell.name for cell in data.cells if not cell.done and cell.pending]:
         yield f"No task is finished yet for {_listed(empty)}."
     if failed := [cell.name for cell in failed_cells(data.cells)]:
@@ -230,6 +232,7 @@ def quality(data: Aggregate) -> Iterator[str]:
             f"{percent(data.campaign.solver.accuracy)} of the loss: {_listed(rows)}."
         )
     yield from _limit(data)
+    yield from _doubtful_companions(data)
     if data.campaign.cycle.preload is not None:
         yield _preload(data)
     slopes = [(cell, np.sqrt(cell.estimates["m2"].mean)) for cell in data.cells if cell.done]
@@ -250,6 +253,23 @@ def quality(data: Aggregate) -> Iterator[str]:
             f"{cut} loops detached below Δ/h_max = {from_to(ends)}, where the stored unloading "
             "curve ends: their curves are cut, their losses are complete."
         )
+
+
+def warnings(data: Aggregate) -> list[str]:
+    """Return what :func:`quality` warns of, to be said where the numbers stand."""
+    found = (text.partition("WARNING: ") for text in quality(data))
+    return [text for _, warning, text in found if warning]
+
+
+def _doubtful_companions(data: Aggregate) -> Iterator[str]:
+    """Sentences on the campaigns beside this one that have doubtful losses."""
+    for other in data.companions:
+        wrong = sum(int(np.sum(cell.doubtful | cell.beyond_zero_range)) for cell in other.cells)
+        if wrong:
+            yield (
+                f"WARNING: {wrong} of {sum(cell.done for cell in other.cells)} losses of "
+                f"{other.path.name}, beside this campaign, are doubtful: adhesis status lists them."
+            )
 
 
 def _preload(data: Aggregate) -> str:
@@ -327,11 +347,15 @@ def _growth(data: Aggregate, of_paper: bool) -> Iterator[str]:
         return
     rest = [pair for pair in data.paired if not pair.loss.difference.low > 0]
     if not rest:
-        everywhere = "H and further axis" if data.further else "H"
+        steps = len(data.cells) - len({(cell.hurst, cell.others) for cell in data.cells})
+        where = f"at every {'H and further axis' if data.further else 'H'}"
+        if len(data.paired) < steps:
+            unknown = steps - len(data.paired)
+            where = f"in all {len(data.paired)} steps of γ that can be compared ({unknown} cannot)"
         same = "; the paper says the same" if of_paper else ""
         yield (
-            f"The loss in J/m² grows with γ at every {everywhere}, profile by profile, beyond "
-            f"the 95 % interval{same}."
+            f"The loss in J/m² grows with γ {where}, profile by profile, beyond the 95 % "
+            f"interval{same}."
         )
         return
     down = []
@@ -434,10 +458,10 @@ def _spectrum(data: Aggregate) -> Iterator[str]:
                 parts.append(f"{fit} at {cell.name}")
     if parts:
         depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
-        sign = "p̄/p̄_max" if data.campaign.cycle.turns_at_stress else penetration_sign(data)
         yield (
             "Slope of the loading spectrum of the deformed surface at small wave numbers and "
-            f"{sign} = {' or '.join(sorted(depths))}, fitted, against Persson's -(2+H): "
+            f"{state_sign(data)} = {' or '.join(sorted(depths))}, fitted, against Persson's "
+            "-(2+H): "
             f"{_listed(parts)}."
         )
 
@@ -459,13 +483,18 @@ def area_ratio(cell: AveragedCell) -> float | None:
 
     Unloading up to its largest tension only: afterwards patches are lost while the tension falls.
     Loading between a tenth and 95 % of its final contact: at the turning point both branches meet.
-    None without common stresses.
+    None without common stresses. Loops that turn at one mean stress end at several penetrations:
+    where one of them has no state, the mean is unknown, and left out.
     """
-    stress_up, area_up, stress_down, area_down = (
-        cell.curves[f"{branch}_{name}"].mean
-        for branch in ("loading", "unloading")
-        for name in ("mean_stress_dimensionless", "contact_fraction")
+    (stress_up, area_up), (stress_down, area_down) = (
+        branch[:, np.isfinite(branch).all(axis=0)]
+        for branch in (
+            np.array([cell.curves[f"{name}_{of}"].mean for of in _STRESS_AND_AREA])
+            for name in BRANCHES
+        )
     )
+    if not stress_up.size or not stress_down.size:
+        return None
     part = slice(0, int(np.argmin(stress_down)) + 1)
     stress_down, area_down = stress_down[part], area_down[part]
     wanted = (area_up > 0.1 * area_up[-1]) & (area_up < 0.95 * area_up[-1])

@@ -50,6 +50,26 @@ def symbols(others: Sequence[tuple[str, float]]) -> str:
     return ", ".join(named)
 
 
+def gamma_label(work_of_adhesion: float) -> str:
+    """Return the label of one γ in a figure."""
+    return rf"$\gamma$ = {gamma_text(work_of_adhesion)}"
+
+
+def cell_label(cell: Cell) -> str:
+    """Return the label of H and γ of a cell in a figure."""
+    return f"H = {cell.hurst:g}, {gamma_label(cell.work_of_adhesion)}"
+
+
+def state_sign(data: Aggregate) -> str:
+    """Return by what the states of loops are given: "Δ/h_max", or "u_tot/h_max" of a machine.
+
+    Where loops turn at a mean stress, states are at parts of it.
+    """
+    if data.campaign.cycle.turns_at_stress:
+        return "p̄/p̄_max"
+    return "Δ/h_max" if data.campaign.cycle.stiffness is None else "u_tot/h_max"
+
+
 def from_to(
     values: Sequence[float], show: Callable[[float], str] = "{:g}".format, between: str = " to "
 ) -> str:
@@ -77,7 +97,7 @@ def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
         fixed = tuple(other for other in cell.others if other[0] not in moving)
         if cell.done:
             lines.setdefault((cell.hurst, cell.work_of_adhesion, fixed), []).append(cell)
-    return [sorted(line, key=lambda c: c.further_values[axis.name]) for line in lines.values()]
+    return [sorted(line, key=lambda c: c.at[axis.name]) for line in lines.values()]
 
 
 def common(data: Aggregate) -> list[tuple[str, float]]:
@@ -99,8 +119,7 @@ def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
     parts = [symbols(others)] if others else []
     if failed := failed_cells(cells):
         first = failed[0]
-        gamma = f"$\\gamma$ = {gamma_text(first.work_of_adhesion)}"
-        name = ", ".join(filter(None, (f"H = {first.hurst:g}", gamma, symbols(first.others))))
+        name = ", ".join(filter(None, (cell_label(first), symbols(first.others))))
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         parts.append(f"missing, as all tasks failed: {name}{more}")
     drawn = [cell for cell in cells if cell.done]

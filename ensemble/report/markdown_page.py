@@ -33,7 +33,12 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
     out = [
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
-        *_bullets(*findings.pattern(data), *findings.precision(data), *findings.missing(data)),
+        _bullets(
+            *findings.pattern(data),
+            *findings.precision(data),
+            *findings.missing(data),
+            *(f"WARNING: {sentence}" for sentence in findings.warnings(data)),
+        ),
         _summary(data),
         left_out(data),
         shown_cells(data),
@@ -45,7 +50,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         *(["### Along further axes", *show("axes")] if figures.get("axes") else []),
         *_table("## What agrees with the paper, and what does not", beside),
         "" if beside.rows else "## What the averages show",
-        *_bullets(*findings.agreement(data)),
+        _bullets(*findings.agreement(data)),
         *_table(
             "### Growth of the loss with γ, profile by profile",
             loss_tables.paired(data),
@@ -58,7 +63,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
             "## Beside other campaigns",
             "The same realisations of both campaigns, profile by profile.",
             loss_tables.companions(data).markdown(),
-            *_bullets(*findings.readings(data)),
+            _bullets(*findings.readings(data)),
         ]
     out += ["## Loops", *show("loops")]
     if figures.get("fields"):
@@ -95,11 +100,13 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         "## Profiles",
         loss_tables.profiles(data).markdown(),
         "## Accuracy and completeness",
-        *_bullets(*findings.quality(data)),
+        _bullets(
+            *(sentence for sentence in findings.quality(data) if not sentence.startswith("WARNING"))
+        ),
     ]
     if data.failures:
-        failed = [f"row {row}: {text or 'no reason given'}" for row, text in data.failures]
-        out += ["### Failed tasks", *_bullets(*failed)]
+        failed = (f"row {row}: {text}" for row, text in data.failures)
+        out += ["### Failed tasks", _bullets(*failed)]
     text = printable(data.campaign.text.replace("\r\n", "\n").strip())
     out += ["## The campaign", f"{fence(text)}toml\n{text}\n{fence(text)}", _origin(data)]
     return "\n\n".join(part for part in out if part) + "\n"
@@ -122,7 +129,7 @@ def _summary(data: Aggregate) -> str:
         counts = [cell.done for cell in data.cells]
         many = f"{min(counts)} to {max(counts)} realisations by `[stop]`"
     return (
-        f"{data.done} loops of {data.done + data.failed + data.pending} tasks: "
+        f"{data.done} loops of {data.total} tasks: "
         f"H = {in_one_unit('hurst', sweep.hurst)}; "
         f"γ = {in_one_unit('work_of_adhesion', sweep.work_of_adhesion)}; {further}"
         f"{many}. Each loop was loaded to {findings.turning_point(data)} "
@@ -138,8 +145,8 @@ def _origin(data: Aggregate) -> str:
     return f"Results file: {'; '.join(parts)}." if parts else ""
 
 
-def _bullets(*sentences: str) -> list[str]:
-    return ["\n".join(f"- {markdown(sentence)}" for sentence in sentences)] if sentences else []
+def _bullets(*sentences: str) -> str:
+    return "\n".join(f"- {markdown(sentence)}" for sentence in sentences)
 
 
 def _shown(item: Illustration, data: Aggregate, of_paper: bool, first_numbered: bool) -> str:

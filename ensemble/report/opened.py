@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -27,6 +28,8 @@ from adhesis.ensemble.report.tables.table import Table
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT, Dataset
+from adhesis.ensemble.task.fields import FIELD_DATASETS
+from adhesis.ensemble.task.row import CURVES, JUMP_COUNT, JUMPS, NUMBERS, TIMES
 from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
 
 if TYPE_CHECKING:
@@ -41,7 +44,6 @@ _RENAMED = {
     "field_position": "position",
 }
 _NO_RESULTS = ("error", schema.CHECKSUM.name, schema.ORIGIN.name)
-_SPECTRA = ("psd_height", "height_density", "psd_displacement", "gap_density")
 
 
 class Plots:
@@ -52,8 +54,8 @@ class Plots:
     are averages over the realisations that are finished.
     """
 
-    def __init__(self, averages: Callable[[], Aggregate]) -> None:
-        self._averages = averages
+    def __init__(self, results: CampaignResults) -> None:
+        self._results = results
 
     def __dir__(self) -> list[str]:
         from adhesis.ensemble.report.figures.catalogue import ALL
@@ -82,7 +84,7 @@ class Plots:
         from adhesis.ensemble.report.figures.style import drawn_into
 
         with drawn_into(ax):
-            return function(self._averages()).finish()
+            return function(self._results.averages).finish()
 
     def loss_along(self, name: str, ax: object = None) -> Figure:
         """Loss along a further axis of the campaign ("max_penetration"), with intervals.
@@ -94,11 +96,11 @@ class Plots:
         """
         from adhesis.ensemble.report.figures.along import along, with_figure
 
-        axes = {axis.name: axis for axis in with_figure(self._averages())}
+        axes = {axis.name: axis for axis in with_figure(self._results.averages)}
         if name not in axes:
             known = ", ".join(axes) or "none"
             raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
-        return self._draw(along(axes[name]), ax)
+        return self._draw(partial(along, axes[name]), ax)
 
 
 class CampaignResults:
@@ -145,7 +147,7 @@ class CampaignResults:
         self._counts = {name: int(np.sum(status == state)) for name, state in states.items()}
         if schema.DAMAGED in status:
             self._counts["damaged"] = int(np.sum(status == schema.DAMAGED))
-        self.plot = Plots(partial(getattr, self, "averages"))  # which can be pickled
+        self.plot = Plots(self)
 
     def __enter__(self) -> Self:
         return self
@@ -160,13 +162,15 @@ class CampaignResults:
         return f"<CampaignResults {self.path}: {counts}>"
 
     def _repr_html_(self) -> str:
-        """Return counts, mean losses and their figure, for notebooks."""
+        """Return counts, mean losses with the warnings of the report, and their figure."""
+        from adhesis.ensemble.report import findings
         from adhesis.ensemble.report.figures import along
 
         rows = [("file", str(self.path)), *((k, str(n)) for k, n in self._counts.items())]
-        page = table_of([*rows, ("axes", ", ".join(self.axes))])
+        rows.append(("axes", ", ".join(self.axes)))
         if not self._counts["done"]:
-            return page
+            return table_of(rows)
+        rows += [("warning", text) for text in findings.warnings(self.averages)]
         names = [f"loss_{part} [J/m^2]" for part in ("mean", "ci_low", "ci_high")]
         losses = self.losses[names]
         # Of an index pandas writes six decimals, which small lengths have in common.
@@ -176,7 +180,7 @@ class CampaignResults:
         several = along.with_figure(self.averages) if len(self.averages.hursts) == 1 else []
         draw = partial(self.plot.loss_along, several[0].name) if several else None
         figure: Any = (draw or self.plot.loss_against_hurst)()
-        return page + table + picture_of(figure, "losses")
+        return table_of(rows) + table + picture_of(figure, "losses")
 
     @cached_property
     def averages(self) -> Aggregate:
@@ -204,24 +208,19 @@ class CampaignResults:
         and the penetration of either branch;
         NaN (-1 for counts) where a task is not done. A damaged one counts as pending.
         """
-        wanted = [
-            d
-            for d in schema.DATASETS
-            if d.dims[0] == "task"
-            and d.name not in (*self.axes, *_SPECTRA, *_NO_RESULTS)
-            and (d.name == "jump_count" or not d.name.startswith("jump_"))
-        ]
-        return self._arranged(wanted)
+        numbers = (*schema.TASK_DATASETS, *schema.RUN_DATASETS, *TIMES, *NUMBERS)
+        wanted = (*numbers, *chain(*CURVES.values()), JUMP_COUNT)
+        return self._arranged([d for d in wanted if d.name not in (*self.axes, *_NO_RESULTS)])
 
     @cached_property
     def spectra(self) -> xr.Dataset:
         """Spectral densities, and densities of heights and gaps, of every loop."""
-        return self._arranged([d for d in schema.DATASETS if d.name in _SPECTRA])
+        return self._arranged([d for d in FIELD_DATASETS if d.dims[0] != KEPT])
 
     @cached_property
     def fields(self) -> xr.Dataset:
         """Profile, displacement, stress and gap of the first realisations, as far as kept."""
-        return self._arranged([d for d in schema.DATASETS if d.dims[0] == KEPT])
+        return self._arranged([d for d in FIELD_DATASETS if d.dims[0] == KEPT])
 
     @cached_property
     def curves(self) -> xr.Dataset:
@@ -248,15 +247,12 @@ class CampaignResults:
     @cached_property
     def jumps(self) -> pd.DataFrame:
         """The catalogue: one row for each jump of each finished loop, in the order of the path."""
-        columns = [
-            d for d in schema.DATASETS if d.name.startswith("jump_") and d.dims[1:] == ("jump",)
-        ]
         with Results(self.path) as results:
             rows = np.flatnonzero(results.status() == schema.DONE)
             used = results.column("jump_kind", rows) >= 0
             loop, _ = np.nonzero(used)
             out = {name: values[rows][loop] for name, values in _axes(results).items()}
-            for d in columns:
+            for d in JUMPS:
                 out[d.name.removeprefix("jump_")] = results.column(d.name, rows)[used]
         out["branch"] = np.array(BRANCHES)[out["branch"]]
         out["kind"] = np.array(JUMP_KINDS)[out["kind"]]

@@ -96,12 +96,14 @@ def is_reading(campaign: Campaign, hursts: Sequence[float]) -> bool:
         and profile.amplitudes == "deterministic"
         and profile.rolloff == 1
         and cycle.stiffness is None
+        and cycle.preload is None
         and cycle.max_penetration is not None
         and _is_spectrum(campaign, hursts)
         and _is(material.young, _YOUNG)
         and _is(material.poisson, _POISSON)
         and material.work_of_adhesion_open is None
         and material.stripes is None
+        and not material.opens
         and low - _NEAR <= cycle.max_penetration <= high + _NEAR
     )
 

@@ -31,7 +31,7 @@ def write_report(
     writing = Writing()
     with (
         writing.output("the report in", directory),
-        staged_folder(directory, _older_figures(directory)) as folder,
+        staged_folder(directory, _older_files(directory)) as folder,
     ):
         _write_files(data, folder, progress)
     writing.finish()
@@ -39,13 +39,14 @@ def write_report(
     return data
 
 
-def _older_figures(directory: Path) -> list[str]:
-    """Return the files of all figures that an earlier report has left."""
+def _older_files(directory: Path) -> list[str]:
+    """Return the files that an earlier report can have left, and that not every report writes."""
     from adhesis.ensemble.report.figures.catalogue import ALL
 
     figures = [*directory.glob("*.png"), *directory.glob("*.pdf")]
     known = {item.name for item in ALL}
-    return [f.name for f in figures if f.stem in known or f.stem.startswith("loss_along_")]
+    found = [f.name for f in figures if f.stem in known or f.stem.startswith("loss_along_")]
+    return ["precision.csv", "beside.csv", *found]
 
 
 def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], None]) -> None:

@@ -18,6 +18,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.report.findings import missing
+from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.results import head
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.merge import merge
@@ -279,6 +280,7 @@ def test_status_report_and_python_name_damaged_rows(path):
     assert "damaged: row 3; damaged rows are not used" in text
     sentences = missing(aggregate(path))
     assert any("r.h5 is damaged in row 3" in sentence for sentence in sentences)
+    assert "\n\n6 loops of 8 tasks: " in write_page(aggregate(path), {})
     with pytest.warns(UserWarning, match="damaged in row 3"):
         results = adhesis.open(path)
     assert repr(results).endswith("6 done, 1 failed, 0 pending, 1 damaged>")

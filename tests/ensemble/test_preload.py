@@ -24,6 +24,8 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.command.trace import _progress
 from adhesis.ensemble.report import findings
+from adhesis.ensemble.report.figures.catalogue import sections
+from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.trace import answer as answers
@@ -278,6 +280,8 @@ def test_series_with_loops_short_of_their_preload_show_no_trend(tmp_path):
     (said,) = (s for s in findings.agreement(data) if s.startswith("Along preload"))
     assert " in 1 of 1 series of cells that are else alike; not counted, as loops did not" in said
     assert said.endswith("did not reach their preload: H = 0.8, γ = 0.04 J/m².")
+    page = write_page(data, sections(data))
+    assert page.count("states are at parts of it instead of penetrations.") == 4
 
 
 def test_a_machine_of_a_campaign_may_go_beyond_the_height_of_its_profile():
@@ -318,6 +322,9 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
     assert [row.split(",")[place] for row in table[1:]] == ["0", "1"]
     text = (page / "report.md").read_text()
     assert " | short | " in text
+    turn = "0.0001 … 1 MPa (1 of 2 loops turned before they reached it)"
+    assert text.split("\n\n")[1].startswith(f"A loop to a preload of {turn} and back until")
+    assert f" Each loop was loaded to a preload of {turn} in " in text
     assert "short: loops that turned before their preload was reached" in text
     assert text.count("turn at different penetrations") == 2
     with adhesis.open(out) as results:

@@ -136,12 +136,17 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
     for name in ("paper", "beside/ratio-200", "beside/equal-c0", "beside/penetration-0.93"):
         assert of_paper(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
     text = (ROOT / "jobs" / "paper.toml").read_text()
+    text = re.sub(r"field_penetrations = .*", "", text)  # none at a preload
+    assert of_paper(parse_campaign(text))
     for old, new in (
         ("max_penetration = 0.9 ", "max_penetration = 0.98 "),
         ("ratio = 100", "ratio = 10"),
         ("young = 1e6", "young = 2e6"),
         ("poisson = 0.5", "poisson = 0.3"),
         ("poisson = 0.5", "poisson = 0.5\nwork_of_adhesion_open = 1"),
+        ("poisson = 0.5", "poisson = 0.5\nstrength = 1e6"),
+        ("poisson = 0.5", "poisson = 0.5\nadhesion_range = 1e-9"),
+        ("max_penetration = 0.9 ", "preload = 500\nmax_penetration = 0.9 "),
         ("n0 = 10", "n0 = 9"),
         ("h_rms = 1e-6", "h_rms = 2e-6"),
     ):
@@ -480,6 +485,7 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(
         assert "1 of 12 tasks failed" in text
         assert "No task is finished yet for H = 0.8, γ = 0.01 J/m²" in text
         assert "Only one realisation" in text
+    assert "First reason: the sum diverged." in page
     assert "row 5: the sum diverged" in page
     assert len(quick_figures) == 13
 
@@ -534,6 +540,17 @@ def test_findings_compare_with_the_paper(data):
     assert f"at least {min(ratios):.2f}" in text
 
 
+def test_growth_is_claimed_where_it_is_known_alone(data):
+    """Of the steps of γ, two of which have one side without results."""
+    unknown = replace(data.cells[0], seed=data.cells[0].seed + 1)
+    some = replace(data, cells=(unknown, *data.cells[1:]))
+    every, known = (next(findings._growth(found, of_paper=False)) for found in (data, some))
+    assert every.startswith("The loss in J/m² grows with γ at every H, profile by profile")
+    assert known.startswith(
+        "The loss in J/m² grows with γ in all 3 steps of γ that can be compared (1 cannot), profile"
+    )
+
+
 def test_contact_is_compared_at_equal_load():
     """Unloading has twice the contact of loading at each stress, by construction."""
     stress = np.linspace(-1, 3, 41)
@@ -546,7 +563,15 @@ def test_contact_is_compared_at_equal_load():
     curves = {name: SimpleNamespace(mean=mean) for name, mean in curves.items()}
     fake = SimpleNamespace(done=3, curves=curves)
     assert findings.area_ratio(fake) == pytest.approx(2)
+    for name, curve in curves.items():  # loops that turn at a mean stress end at several places
+        ends = [np.nan, np.nan]
+        curve.mean = np.append(
+            *((curve.mean, ends) if name.startswith("l") else (ends, curve.mean))
+        )
+    assert findings.area_ratio(fake) == pytest.approx(2)
     curves["unloading_mean_stress_dimensionless"].mean -= 10
+    assert findings.area_ratio(fake) is None
+    curves["unloading_mean_stress_dimensionless"].mean *= np.nan
     assert findings.area_ratio(fake) is None
 
 
@@ -570,6 +595,11 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     steps = companion(tmp_path, "steps.h5", 0.99, a=("load_steps = 20", "load_steps = 40"))
     alone = {row[:2]: row for row in loss_tables.losses(data).rows}
     both = aggregate(file, [finer, steps])
+    doubts = [text for text in findings.quality(both) if "beside this campaign" in text]
+    wrong = [row["row"] for row in read_status(finer)["doubtful"]]
+    wrong += [row["row"] for row in read_status(finer)["beyond_limit"]]
+    assert doubts[0].startswith(f"WARNING: {len(set(wrong))} of 30 losses of finer.h5, beside")
+    assert not any("beside this campaign" in text for text in findings.quality(data))
     assert [c.kind for c in both.companions] == ["resolution", "load steps"]
     assert both.companions[1].differs == ("cycle.load_steps = 40",)
     names = [column.name for column in loss_tables.losses(both).columns]
@@ -583,6 +613,15 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
         assert alone[row[:2]][by_grid] is None
         audit = np.abs(cell.values["loss"] - cell.values["loss_from_drops"]) / cell.values["loss"]
         assert alone[row[:2]][by_steps] == pytest.approx(np.mean(audit * loss))
+    difference = "± steps: the difference from the campaign with other load steps beside this one"
+    assert f"{difference};" in loss_tables.losses(both).notes()
+    with h5py.File(steps, "r+") as other:
+        other["status"][:5] = 0
+    some = loss_tables.losses(aggregate(file, [steps]))
+    assert some.rows[0][by_steps] == alone[some.rows[0][:2]][by_steps]
+    assert f"{difference}, mean |loop integral - sum of drops| where that lacks a cell;" in (
+        some.notes()
+    )
 
 
 @pytest.mark.usefixtures("undrawn", "quick_figures")
@@ -593,6 +632,8 @@ def test_another_largest_penetration_is_compared_with(file, tmp_path):
     data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
     assert "cycle.max_penetration = 0.6" in write_page(data, {})
     assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
+    write_report(file, tmp_path / "out", io.StringIO())
+    assert not (tmp_path / "out" / "beside.csv").exists()
 
 
 def test_the_reading_nearest_to_the_paper_is_named(file, data, tmp_path):
@@ -648,6 +689,8 @@ def test_doubtful_losses_and_steep_profiles_are_said(tmp_path):
     doubtful, steep = (text for text in findings.quality(data) if "WARNING" in text)
     assert "2 of 8 losses are doubtful" in doubtful
     assert doubtful.index("row 2, H = 0.7, γ = 0.01 J/m² (19 %)") < doubtful.index("row 5")
+    first = write_page(data, {}).split("\n\n")[2]
+    assert f"- {doubtful}" in first.splitlines()  # above the numbers that are doubted
     assert "slope exceeds" in steep
     assert "γ = 0.02" in steep
     assert "γ = 0.01" not in steep
@@ -669,6 +712,8 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     values["edge_range"][7] = 0.3e-9
     values["turn_range"][4] = 0.2e-9
     values["loss"][6] = 21 * 0.02 * 0.5
+    for name in ("valid_range", "edge_range", "touch_range"):
+        values[name][6] = np.inf
     path = write(tmp_path / "r.h5", plan, values)
     data, status = aggregate(path), read_status(path)
     (warning,) = (text for text in findings.quality(data) if "turn_range is below" in text)
@@ -678,6 +723,8 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     told = f"5 losses are doubtful: {ranges} is below 1e-09 m"
     assert told in as_text(status)
     assert "touch_range 4e-10 m" in as_text(status)
+    assert "row 6: H = 0.7, γ = 0.02 J/m², realisation 2" in as_text(status)
+    assert "no finite range, loss 0.21 J/m²" in as_text(status)
     table = loss_tables.losses(data)
     names = [column.name for column in table.columns]
     shown = [row[names.index("valid_range_least [m]")] for row in table.rows]
@@ -812,3 +859,6 @@ def test_loops_of_a_machine_are_drawn_against_its_own_penetration(tmp_path):
     with style():
         figure = loops.loop_against_penetration(data)
     assert "u_\\mathrm{tot}" in figure.axes[0].get_xlabel()
+    assert "| u_tot/h_max |" in mechanism_tables.slopes(data).markdown().splitlines()[0]
+    (spectrum,) = (text for text in findings.agreement(data) if "loading spectrum" in text)
+    assert " and u_tot/h_max = 0.90, fitted" in spectrum

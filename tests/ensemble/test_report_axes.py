@@ -5,6 +5,7 @@ import io
 import pickle
 import re
 
+import h5py
 import numpy as np
 import pytest
 import xarray
@@ -14,14 +15,15 @@ import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.report import paper
+from adhesis.ensemble.campaign.tasks import Part
+from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import sections
 from adhesis.ensemble.report.figures.style import style
 from adhesis.ensemble.report.tables.loss_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import FAILED
-from tests.support.synthetic_results import campaign, rows, write
+from tests.support.synthetic_results import campaign, rows, sign, write
 
 TOPS = (0.5, 0.7, 0.9)
 AXES = {"ratio": [50, 100], "max_penetration": list(TOPS)}
@@ -73,6 +75,19 @@ def test_figures_show_one_place_on_the_further_axes_that_has_results(file, data,
     values["status"][values["max_penetration"] > 0.8] = 0
     early = aggregate(write(tmp_path / "r.h5", data.campaign, values))
     assert {c.others[1] for c in early.shown.cells} == {("max_penetration", 0.7)}
+
+
+def test_figures_of_a_part_show_one_place_too(data, tmp_path):
+    """Of few realisations a part has not every cell; those shown have the same further values."""
+    plan, part = data.campaign, Part(3, 7)
+    create(tmp_path / "part.h5", plan, part=part)
+    with h5py.File(tmp_path / "part.h5", "r+") as file:
+        file["status"][:] = 1
+    found = aggregate(sign(tmp_path / "part.h5"))
+    assert len(found.cells) < len(data.cells)
+    assert {cell.others for cell in found.shown.cells} == {
+        (("ratio", 100), ("max_penetration", 0.9))
+    }
 
 
 def test_the_papers_cells_alone_stand_beside_the_paper(data):
@@ -156,6 +171,17 @@ def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):
     ]  # fmt: skip
     assert sections(found)["axes"] == []
     assert not found.paired
+
+
+def test_a_second_scale_of_stress_needs_one_modulus(tmp_path):
+    for zipped, scales in (("", 1), ('\nzip = [["hurst", "young"]]', 0)):
+        text = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=2).text
+        text = text.replace("seed = 1", f"seed = 1{zipped}")
+        plan = parse_campaign(text.replace("young = 1e6", "young = [1e6, 2e6]"))
+        path = write(tmp_path / f"{scales}.h5", plan, rows(plan))
+        (axes,) = adhesis.open(path).plot.pull_off().axes
+        found = [child for child in axes.child_axes if "sigma" in child.get_ylabel()]
+        assert len(found) == scales
 
 
 def test_opened_tables_and_figures_have_every_axis(file):
@@ -242,7 +268,9 @@ def test_a_mean_without_the_loops_that_failed_is_hollow(with_failures):
         r"$h_\mathrm{rms}$ = 1 µm 1 of 9 loops failed, and are in no mean "
         "n = 2 to 3 profiles, 95 % interval of the mean"
     )
-    item = sections(aggregate(with_failures))["axes"][0]
+    data = aggregate(with_failures)
+    assert any(text.endswith("First reason: no reason given.") for text in findings.missing(data))
+    item = sections(data)["axes"][0]
     assert "(paired)" in item.caption
     assert "Hollow: means without loops that failed" in item.caption
     assert "line" not in item.caption.lower()  # two points are not joined
@@ -305,4 +333,5 @@ def test_a_notebook_tells_small_values_of_an_axis_apart(tmp_path):
     page = results._repr_html_()
     assert ">1e-06</th>" in page
     assert ">1.4e-06</th>" in page
+    assert "<th>warning</th><td>4 of 4 losses are doubtful, as their audit residual" in page
     assert results.losses.index.get_level_values("h_rms").tolist() == [1e-6, 1.4e-6]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
@@ -16,6 +14,7 @@ from adhesis.ensemble.report.further_axes import (
     below,
     common,
     from_to,
+    gamma_label,
     lines_along,
     own_axes,
     symbols,
@@ -39,12 +38,7 @@ def with_figure(data: Aggregate) -> list[Axis]:
     return [axis for axis in axes if any(len(line) > 1 for line in lines_along(data, axis))]
 
 
-def along(axis: Axis) -> Callable[[Aggregate], style.PublishedFigure]:
-    """Return the function that draws the figure of one axis."""
-    return lambda data: _draw(data, axis)
-
-
-def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
+def along(axis: Axis, data: Aggregate) -> style.PublishedFigure:
     """Means with intervals against an axis, every cell of it and of one more further axis.
 
     With one more: a column for each (H, γ), a line for each of its values. Else a column for each
@@ -73,7 +67,7 @@ def _draw(data: Aggregate, axis: Axis) -> style.PublishedFigure:
                 line = lines.get((title, of_line), [])
                 if not line:
                     continue
-                x = np.array([cell.further_values[axis.name] for cell in line], dtype=float)
+                x = np.array([cell.at[axis.name] for cell in line], dtype=float)
                 aside = (k - (len(labels) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 x /= axis_unit
@@ -128,14 +122,14 @@ def _lines(
     def at(cell: AveragedCell) -> list[tuple[str, float]]:
         return [other for other in cell.others if other[0] not in moving]
 
-    wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
+    wanted = [at(cell) for cell in data.shown.cells]
     lines: dict[tuple[str, str], list[AveragedCell]] = {}
-    for cell in sorted(data.cells, key=lambda cell: cell.further_values[axis.name]):
-        if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
+    for cell in sorted(data.cells, key=lambda cell: cell.at[axis.name]):
+        if at(cell) not in wanted:
             continue
-        title, label = f"H = {cell.hurst:g}", style.gamma_label(cell.work_of_adhesion)
+        title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
         if second is not None:
-            value = cell.further_values[second.name]
+            value = cell.at[second.name]
             title, label = f"{title}, {label}", symbols([(second.name, value)])
         lines.setdefault((title, label), []).append(cell)
     return [other for other in common(data.shown) if other[0] not in moving], lines

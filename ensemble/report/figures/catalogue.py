@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.campaign.axes import Axis
@@ -83,6 +84,7 @@ LOOPS = (
         at_stress=_ENDS,
     ),
 )
+_STATES = "Loops turn at a mean stress, and states are at parts of it instead of penetrations."
 _BELOW = "A caret at 0 marks an interval that goes on below."
 LOSSES = (
     Illustration(
@@ -127,6 +129,7 @@ FIELDS = (
         shapes_and_spectra.spectra_of_branches,
         "Fig. 4",
         paper.FIGURE_4,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -136,6 +139,7 @@ FIELDS = (
         shapes_and_spectra.spectra_on_loading,
         "Fig. 5(a)",
         paper.FIGURE_5,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -145,6 +149,7 @@ FIELDS = (
         shapes_and_spectra.spectra_on_unloading,
         "Fig. 5(b)",
         paper.FIGURE_5,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -159,6 +164,7 @@ FIELDS = (
         shapes_and_spectra.gap_density,
         "Fig. 8",
         paper.FIGURE_8,
+        at_stress=_STATES,
         is_worth=_with_fields,
     ),
     Illustration(
@@ -238,4 +244,4 @@ def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
     if len(further) > 1:
         caption += " Further axes beside these two stand at one value, as written below the panels."
     name, title = f"loss_along_{axis.name}", f"Loss against {axis.name}"
-    return Illustration(name, title, caption, along(axis), whole=True)
+    return Illustration(name, title, caption, partial(along, axis), whole=True)

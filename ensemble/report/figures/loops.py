@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.report.figures import style
+from adhesis.ensemble.report.further_axes import gamma_label
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
@@ -18,12 +19,9 @@ _INTERVALS, _FINE = 60, 50  # of a band, and places between two points that are 
 
 def contact_against_stress(data: Aggregate) -> style.PublishedFigure:
     """Fig. 6: A/A0 against σ~/sqrt(m2), one panel for each H, means over realisations."""
-    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
-    figure = style.new_figure(
-        len(hursts), 1, style.ONE_COLUMN, (16 + 46 * len(hursts)) * style.MM, sharex=True
-    )
-    for (axes,), hurst in zip(figure.rows, hursts, strict=True):
-        for k, cell in _curves_of(data, hurst):
+    figure, rows = style.row_for_each_hurst(data, 1, 16, 46)
+    for (axes,), hurst in rows:
+        for k, cell in style.curves_of(data, hurst):
             for branch in BRANCHES:
                 stress = cell.curves[f"{branch}_mean_stress_over_slope"].mean
                 area = cell.curves[f"{branch}_contact_fraction"]
@@ -72,12 +70,10 @@ def _envelope(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
 
 def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
     """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations."""
-    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
-    height = (13 + 46 * len(hursts)) * style.MM
-    figure = style.new_figure(len(hursts), 2, style.TWO_COLUMNS, height, sharex=True, sharey="col")
-    for row, hurst in zip(figure.rows, hursts, strict=True):
+    figure, rows = style.row_for_each_hurst(data, 2, 13, 46, sharey="col")
+    for row, hurst in rows:
         for axes, name in zip(row, ("mean_stress_dimensionless", "contact_fraction"), strict=True):
-            for k, cell in _curves_of(data, hurst):
+            for k, cell in style.curves_of(data, hurst):
                 for branch in BRANCHES:
                     part = _in_contact(cell, branch)
                     depth, curve = cell.penetration[branch][part], cell.curves[f"{branch}_{name}"]
@@ -97,12 +93,6 @@ def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
     return figure
 
 
-def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, AveragedCell]]:
-    """Cells of one H that have finished tasks, each with the place of its γ among those shown."""
-    shown = style.shown_gammas(data)
-    return [(k, cell) for k, gamma in shown for cell in data.finished([hurst], [gamma])]
-
-
 def _in_contact(cell: AveragedCell, branch: str) -> slice:
     """The part of a branch up to one step after the last realisation has detached."""
     fraction = cell.curves[f"{branch}_contact_fraction"].mean
@@ -120,16 +110,14 @@ def _plot(axes: Axes, x: Array, y: Array, cell: AveragedCell, branch: str, k: in
         *(x, y),
         linestyle=style.LINE_OF_BRANCH[branch],
         markevery=(k * every // style.MOST_CURVES, every),
-        label=f"{style.gamma_label(cell.work_of_adhesion)}, {branch}",
+        label=f"{gamma_label(cell.work_of_adhesion)}, {branch}",
         **style.look(k),
     )
 
 
 def _legend(data: Aggregate, figure: style.PublishedFigure, columns: int) -> None:
     """One entry for each γ, one for each branch."""
-    handles = [
-        style.key(style.gamma_label(gamma), **style.look(k))
-        for k, gamma in style.shown_gammas(data)
-    ]
+    shown = style.shown_gammas(data)
+    handles = [style.key(gamma_label(gamma), **style.look(k)) for k, gamma in shown]
     handles += [style.key(b, color="0.3", linestyle=style.LINE_OF_BRANCH[b]) for b in BRANCHES]
     figure.legend_above(handles, columns)

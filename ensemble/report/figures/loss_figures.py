@@ -17,6 +17,7 @@ from adhesis.ensemble.interval import Estimate
 from adhesis.ensemble.quantities import common_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
+from adhesis.ensemble.report.further_axes import gamma_label
 from adhesis.solver.model.profile import Array
 
 _FEWEST_BARS = 4  # for which there is room
@@ -62,7 +63,7 @@ def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
         x = np.array([cell.hurst for cell in cells])
         errorbar(axes, x, cells, name, unit, k, "_")
         _stars(axes, [(cell.hurst + aside, paper.table_1(cell), style.colour(k)) for cell in cells])
-        style.label_panel(axes, style.gamma_label(gamma))
+        style.label_panel(axes, gamma_label(gamma))
     for axes in figure.panels[len(shown) :]:
         axes.set_axis_off()
     figure.label("Hurst exponent $H$", label)
@@ -90,7 +91,7 @@ def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
             errorbar(axes, m2, cells, name, unit, k, f"H = {hurst:g}")
             _stars(axes, [(paper.m2(c.hurst), paper.table_1(c), style.colour(k)) for c in cells])
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
-        style.label_panel(axes, style.gamma_label(gamma))
+        style.label_panel(axes, gamma_label(gamma))
     figure.label("mean square slope $m_2$", label)
     handles = [style.key(f"H = {h:g}", ls="none", **style.look(k)) for k, h in enumerate(hursts)]
     figure.legend_above([*handles, *_star_handle(data), *hollow_handle(data.cells)], 4)
@@ -155,22 +156,19 @@ def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
 
 def jump_energies(data: Aggregate) -> style.PublishedFigure:
     """Jumps per loop and decade of energy drop: large scale left, small scale right."""
-    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
-    shown, occupied = style.shown_gammas(data), _occupied(data)
-    height = (13 + 44 * len(hursts)) * style.MM
-    figure = style.new_figure(len(hursts), 2, style.TWO_COLUMNS, height, sharex=True, sharey=True)
-    for row, hurst in zip(figure.rows, hursts, strict=True):
+    figure, rows = style.row_for_each_hurst(data, 2, 13, 44, sharey=True)
+    occupied = _occupied(data)
+    for row, hurst in rows:
         for axes, small in zip(row, (False, True), strict=True):
-            for k, gamma in shown:
-                for cell in data.finished([hurst], [gamma]):
-                    _jump_density(axes, cell, small, k, occupied)
+            for k, cell in style.curves_of(data, hurst):
+                _jump_density(axes, cell, small, k, occupied)
             style.label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
     figure.label("energy drop of one jump (J/m²)", "jumps per loop and decade")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
     handles = [
-        style.key(style.gamma_label(g), color=style.colour(k), linestyle=style.LINES[k])
-        for k, g in shown
+        style.key(gamma_label(g), color=style.colour(k), linestyle=style.LINES[k])
+        for k, g in style.shown_gammas(data)
     ]
     style.plain_decades(figure.panels)
     figure.legend_above(handles, len(handles))
@@ -187,7 +185,7 @@ def _jump_density(axes: Axes, cell: AveragedCell, small: bool, k: int, part: sli
     axes.stairs((density + scatter)[part], edges, baseline=below, **band)
     shown = np.where(density > 0, density, np.nan)[part]
     line: Any = {"color": style.colour(k), "linestyle": style.LINES[k], "linewidth": 1.4}
-    label = style.gamma_label(cell.work_of_adhesion)
+    label = gamma_label(cell.work_of_adhesion)
     axes.stairs(shown, edges, baseline=None, label=label, **line)
 
 
@@ -212,9 +210,12 @@ def pull_off(data: Aggregate) -> style.PublishedFigure:
 
 
 def _second_scale(axes: Axes, data: Aggregate) -> None:
-    """Beside kPa, σ~ at the mean h_max of all cells."""
-    h_max = np.concatenate([cell.values["h_max"] for cell in data.cells])
-    scale = float(stress_scale(data.cells[0].campaign, h_max.mean(keepdims=True))[0])
+    """Beside kPa, σ~ at the mean h_max of all cells; none where these have several units of it."""
+    h_max = np.concatenate([cell.values["h_max"] for cell in data.cells]).mean(keepdims=True)
+    scales = {float(stress_scale(cell.campaign, h_max)[0]) for cell in data.cells}
+    if len(scales) > 1:  # as where the modulus or the period varies with H
+        return
+    (scale,) = scales
     to_and_fro = (lambda stress: 1e3 * stress / scale, lambda stress: stress * scale / 1e3)
     axes.tick_params(right=False)
     right = axes.secondary_yaxis("right", functions=to_and_fro)

@@ -22,6 +22,7 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.findings import typical_cell
+from adhesis.ensemble.report.further_axes import cell_label, state_sign
 from adhesis.ensemble.report.paper import PaperFigure
 from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, FieldPlan, field_plan
 from adhesis.solver.method import BRANCHES
@@ -36,6 +37,12 @@ _LEAST_DENSITY = 1e-6
 _FEWEST_NODES, _BEYOND = 1000, 4
 # Colour of a branch where both are drawn over the rigid profile.
 _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
+# Signs of :func:`state_sign` in formulas, without their index.
+_SIGNS = {
+    "Δ/h_max": r"\Delta/h",
+    "u_tot/h_max": r"u_\mathrm{tot}/h",
+    "p̄/p̄_max": r"\bar p/\bar p",
+}
 _SLOPE: Any = {"color": "0.3", "linewidth": 0.7}
 
 
@@ -70,7 +77,7 @@ def shapes(data: Aggregate) -> style.PublishedFigure:
             axes.locator_params(axis="y", nbins=5)
         texts = dict.fromkeys(f"{1e6 * s:.2f}" for s in separation if np.isfinite(s))
         state = f"{_depth(data, cell, k)}, $s$ = {' and '.join(texts)} µm"
-        style.label_panel(whole, f"{_cell_label(cell)}, {state}")
+        style.label_panel(whole, f"{cell_label(cell)}, {state}")
         style.label_panel(detail, "detail")
     figure.label("position $x$ (mm)", "height (µm)")
     handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h$")]
@@ -101,11 +108,9 @@ def spectra_on_unloading(data: Aggregate) -> style.PublishedFigure:
 
 def gap_density(data: Aggregate) -> style.PublishedFigure:
     """Fig. 8: probability density of the gap on either branch, for each H."""
-    hursts = style.spread_out(data.hursts, style.MOST_PANELS)
-    height = (16 + 46 * len(hursts)) * style.MM
-    figure = style.new_figure(len(hursts), 2, style.TWO_COLUMNS, height, sharex=True, sharey=True)
+    figure, rows = style.row_for_each_hurst(data, 2, 16, 46, sharey=True)
     chosen = shown_penetrations(data, style.MOST_CURVES)
-    for row, hurst in zip(figure.rows, hursts, strict=True):
+    for row, hurst in rows:
         cell = cell_of_hurst(data, hurst, paper.FIGURE_8)
         if cell is None:
             continue
@@ -117,7 +122,7 @@ def gap_density(data: Aggregate) -> style.PublishedFigure:
                     y, depth = np.where(values > 0, values, np.nan), cell.plan.penetration[k]
                     line: Any = {"color": style.colour(place), "linestyle": style.LINES[place]}
                     axes.plot(GAP_BINS[1:-1], y, label=f"{depth:.2f}", **line)
-            style.label_panel(axes, f"{_cell_label(cell)}, {branch}")
+            style.label_panel(axes, f"{cell_label(cell)}, {branch}")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
         axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
@@ -196,7 +201,7 @@ def _spectra(panels: Sequence[Panel], handles: list[Line2D]) -> style.PublishedF
         for exponent, factor, line in ((2 * cell.hurst + 1, 0.2, ":"), (2 + cell.hurst, 5.0, "-.")):
             slope = factor * rigid[0] * (ends / q[0]) ** -exponent
             axes.loglog(ends, slope, linestyle=line, label=f"slope {-exponent:.1f}", **_SLOPE)
-        style.label_panel(axes, f"{_cell_label(cell)}{state}")
+        style.label_panel(axes, f"{cell_label(cell)}{state}")
     style.plain_decades(figure.panels)
     figure.label("wave number $q$ (rad/m)", r"spectral density $C(q)$ (m³)")
     profile = style.key("rigid profile", color="0.55", linewidth=2)
@@ -235,7 +240,7 @@ def _penetration_handles(
 ) -> list[Line2D]:
     # Where the largest penetration varies with H or γ, only its share is the same for all.
     tops = {cell.campaign.cycle.turning_point for cell in data.cells}
-    unit = _penetration_sign(data)
+    unit = _SIGNS[state_sign(data)]
     if len(tops) > 1 and not data.campaign.cycle.turns_at_stress:
         unit = r"\Delta/\Delta"
     penetration = (data.cells[0].plan if len(tops) == 1 else field_plan(data.campaign)).penetration
@@ -249,20 +254,9 @@ def _penetration_handles(
     ]
 
 
-def _penetration_sign(data: Aggregate) -> str:
-    cycle = data.campaign.cycle
-    if cycle.turns_at_stress:
-        return r"\bar p/\bar p"
-    return r"\Delta/h" if cycle.stiffness is None else r"u_\mathrm{tot}/h"
-
-
 def _depth(data: Aggregate, cell: Cell, k: int) -> str:
     """Return "Δ/h_max = 0.41" for the state at one place."""
-    return rf"${_penetration_sign(data)}_\mathrm{{max}}$ = {cell.plan.penetration[k]:.2f}"
-
-
-def _cell_label(cell: Cell) -> str:
-    return f"H = {cell.hurst:g}, {style.gamma_label(cell.work_of_adhesion)}"
+    return rf"${_SIGNS[state_sign(data)]}_\mathrm{{max}}$ = {cell.plan.penetration[k]:.2f}"
 
 
 # ---------------------------------------------------------------------- which cells and states

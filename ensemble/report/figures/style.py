@@ -26,9 +26,8 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from matplotlib.ticker import NullFormatter
 
-from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.outputs import whole_file
-from adhesis.ensemble.quantities import gamma_text
 from adhesis.solver.checks import counted, shown
 
 STYLE = Path(__file__).parent / "adhesis.mplstyle"
@@ -99,6 +98,12 @@ def shown_gammas(data: Aggregate) -> list[tuple[int, float]]:
     finished = {cell.work_of_adhesion for cell in data.cells if cell.done}
     shown = spread_out(data.works_of_adhesion, MOST_CURVES)
     return [(k, gamma) for k, gamma in enumerate(shown) if gamma in finished]
+
+
+def curves_of(data: Aggregate, hurst: float) -> list[tuple[int, AveragedCell]]:
+    """Cells of one H that a figure shows, each with the place of the look of its γ."""
+    shown = shown_gammas(data)
+    return [(k, cell) for k, gamma in shown for cell in data.finished([hurst], [gamma])]
 
 
 def left_out(data: Aggregate) -> str:
@@ -253,6 +258,16 @@ def new_figure(
     return figure
 
 
+def row_for_each_hurst(
+    data: Aggregate, columns: int, above: float, each: float, **options: Any
+) -> tuple[PublishedFigure, list[tuple[list[Axes], float]]]:
+    """Return a figure with a row of panels for each H, ``each`` so high in mm, and the rows."""
+    hursts = spread_out(data.hursts, MOST_PANELS)
+    width, height = ONE_COLUMN if columns == 1 else TWO_COLUMNS, (above + each * len(hursts)) * MM
+    figure = new_figure(len(hursts), columns, width, height, sharex=True, **options)
+    return figure, list(zip(figure.rows, hursts, strict=True))
+
+
 def plain_decades(axes: Sequence[Axes]) -> None:
     """Label whole decades of logarithmic axes only."""
     for panel in axes:
@@ -265,11 +280,6 @@ def plain_decades(axes: Sequence[Axes]) -> None:
 def label_panel(axes: Axes, text: str) -> None:
     """Write what a panel shows into its upper left corner."""
     axes.set_title(text, loc="left", pad=3)
-
-
-def gamma_label(work_of_adhesion: float) -> str:
-    """Return the legend of one γ."""
-    return rf"$\gamma$ = {gamma_text(work_of_adhesion)}"
 
 
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:

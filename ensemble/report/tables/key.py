@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from adhesis.ensemble.aggregate.average import Aggregate
@@ -10,41 +9,31 @@ from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.quantities import UNITS, common_unit
 from adhesis.ensemble.report.tables.table import Format, TableColumn, number
 
+_SIGNS = {"hurst": "H", "work_of_adhesion": "γ"}
+
 
 def key_columns(data: Aggregate, cell: str = "") -> list[TableColumn]:
     """Return the columns of what a row is about: H, γ, and every further axis.
 
     ``cell`` is the path to the cell, "cell.", if a row is not about the cell itself.
     """
-    return [
-        TableColumn("hurst", f"{cell}hurst", "H"),
-        gamma_column(data, "", f"{cell}work_of_adhesion", "γ"),
-        *axis_columns(data.further, cell),
-    ]
+    return [axis_column(axis, cell) for axis in data.campaign.axes]
 
 
-def gamma_column(data: Aggregate, suffix: str, path: str, heading: str) -> TableColumn:
-    """Return a column of works of adhesion, for people in the unit of the campaign."""
-    unit, size = common_unit("work_of_adhesion", data.works_of_adhesion)
-    name = f"work_of_adhesion{suffix} [J/m^2]"
-    return TableColumn(name, path, f"{heading} ({unit})", _in_unit(size))
+def axis_column(axis: Axis, cell: str = "", suffix: str = "", heading: str = "") -> TableColumn:
+    """Return the column of an axis, for people in the unit of the campaign.
 
-
-def axis_columns(axes: Sequence[Axis], cell: str = "") -> list[TableColumn]:
-    """Return one column for each axis; ``cell`` as in :func:`key_columns`."""
-    columns = []
-    for axis in axes:
-        shown, size = common_unit(axis.name, axis.values)
-        unit = UNITS.get(axis.name, "").replace("²", "^2")
-        name = f"{axis.name} [{unit}]" if unit else axis.name
-        heading = f"{axis.name} ({shown})" if shown else axis.name
-        path = f"{cell}further_values.{axis.name}"
-        columns.append(TableColumn(name, path, heading, _in_unit(size)))
-    return columns
-
-
-def _in_unit(size: float) -> Format:
-    return lambda value: f"{value / size:g}"
+    ``cell`` as in :func:`key_columns`; ``suffix`` and ``heading`` tell two cells of a row apart.
+    """
+    shown, size = common_unit(axis.name, axis.values)
+    unit = UNITS.get(axis.name, "").replace("²", "^2")
+    name, heading = f"{axis.name}{suffix}", heading or _SIGNS.get(axis.name, axis.name)
+    return TableColumn(
+        f"{name} [{unit}]" if unit else name,
+        f"{cell}at.{axis.name}",
+        f"{heading} ({shown})" if shown else heading,
+        lambda value: f"{value / size:g}",
+    )
 
 
 _HEADINGS = {"std": "", "sem": "s.e.", "ci_low": "95 % from", "ci_high": "to"}

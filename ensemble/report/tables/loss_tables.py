@@ -14,15 +14,8 @@ from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.tables.key import axis_columns, estimated, gamma_column, key_columns
-from adhesis.ensemble.report.tables.table import (
-    Table,
-    TableColumn,
-    fixed,
-    make_table,
-    number,
-    plain,
-)
+from adhesis.ensemble.report.tables.key import axis_column, estimated, key_columns
+from adhesis.ensemble.report.tables.table import Table, TableColumn, fixed, make_table, number
 from adhesis.solver.loading.zero_range import ANY_RANGE, RANGES
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import finite
@@ -43,7 +36,7 @@ def losses(data: Aggregate) -> Table:
     if cycle.preload is not None:
         columns.append(
             TableColumn(
-                *("short_of_preload", "short_of_preload", "short", plain),
+                *("short_of_preload", "short_of_preload", "short"),
                 only_if_any=True,
                 note="short: loops that turned before their preload was reached",
             )
@@ -63,9 +56,7 @@ def losses(data: Aggregate) -> Table:
             partial(_error_of_load_steps, data),
             *("± steps", number(1)),
             last=True,
-            note="± steps: the difference from the campaign with other load steps beside this one"
-            if any(companion.kind == "load steps" for companion in data.companions)
-            else "± steps: mean |loop integral - sum of drops|",
+            note=_note_on_load_steps(data),
         ),
         TableColumn(
             "loss_dimensionless_error_resolution",
@@ -111,7 +102,7 @@ def losses(data: Aggregate) -> Table:
         TableColumn(
             "races",
             lambda cell: int(cell.values["races"].sum()) if cell.done else None,
-            *("races", plain),
+            "races",
             only_if_any=True,
             note="races: jumps that another rule of descent would have ended elsewhere, all loops",
         ),
@@ -156,6 +147,19 @@ def _note(data: Aggregate) -> str:
         "W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max) and Δ~ = Δ/h_max, each realisation with its own "
         f"h_max; s.e.: standard error of the mean{interval if methods else ''}"
         f"{weight if data.campaign.cycle.under_load else ''}"
+    )
+
+
+def _note_on_load_steps(data: Aggregate) -> str:
+    """Return what the error of the load steps of each cell is; see :func:`_error_of_load_steps`."""
+    audit = "mean |loop integral - sum of drops|"
+    found = {_deviation("load steps", data, cell) is not None for cell in data.cells if cell.done}
+    if found == {False}:
+        return f"± steps: {audit}"
+    elsewhere = f", {audit} where that lacks a cell" if False in found else ""
+    return (
+        "± steps: the difference from the campaign with other load steps beside this "
+        f"one{elsewhere}"
     )
 
 
@@ -256,11 +260,11 @@ def _deviation(kind: str, data: Aggregate, cell: Cell) -> float | None:
 def paired(data: Aggregate) -> Table:
     """Tabulate the growth of the loss from one γ to the next on the same profiles."""
     scaled, loss = "loss_dimensionless.difference", "loss.difference"
+    hurst, gamma, *further = data.campaign.axes
     columns = [
-        TableColumn("hurst", "lower.hurst", "H"),
-        *axis_columns(data.further, "lower."),
-        gamma_column(data, "_from", "lower.work_of_adhesion", "γ from"),
-        gamma_column(data, "_to", "upper.work_of_adhesion", "to"),
+        *(axis_column(axis, "lower.") for axis in (hurst, *further)),
+        axis_column(gamma, "lower.", "_from", "γ from"),
+        axis_column(gamma, "upper.", "_to", "to"),
         TableColumn("pairs", "loss.difference.n", "pairs"),
         *estimated("loss_dimensionless_difference", _DIFFERENCE, "W~ grows by", of=scaled),
         *estimated("loss_difference", "value", "loss by (mJ/m²)", **_MILLI, of=loss),
@@ -271,10 +275,10 @@ def paired(data: Aggregate) -> Table:
 
 def profiles(data: Aggregate) -> Table:
     """Statistics of the profiles of each H (and further key of the profile), the paper's slope."""
-    further = [axis for axis in data.further if axis.table == "profile"]
+    hurst, _, *further = data.campaign.axes
+    of_profiles = [hurst, *(axis for axis in further if axis.table == "profile")]
     columns = [
-        TableColumn("hurst", "hurst", "H"),
-        *axis_columns(further),
+        *map(axis_column, of_profiles),
         *estimated("h_rms", "mean", "mean h_rms (µm)", size=1e-6),
         *estimated("h_max", "mean", "mean h_max (µm)", size=1e-6),
         *estimated("m0", "mean", "m0 (µm²)", size=1e-12),
@@ -284,7 +288,7 @@ def profiles(data: Aggregate) -> Table:
     ]
     best: dict[tuple[float, ...], Cell] = {}  # all cells of a key have the same profiles
     for cell in data.cells:
-        at = (cell.hurst, *(cell.further_values[axis.name] for axis in further))
+        at = tuple(cell.at[axis.name] for axis in of_profiles)
         if at not in best or cell.done > best[at].done:
             best[at] = cell
     return make_table("Profiles", columns, best.values())

@@ -10,6 +10,7 @@ import numpy as np
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.by_blocks import SMALL, fitted_slope
 from adhesis.ensemble.quantities import percent
+from adhesis.ensemble.report.further_axes import state_sign
 from adhesis.ensemble.report.tables.key import estimated, key_columns
 from adhesis.ensemble.report.tables.table import Table, TableColumn, fixed, make_table, number
 from adhesis.solver.method import BRANCHES
@@ -81,11 +82,10 @@ def mechanisms(data: Aggregate) -> Table:
 
 def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
-    depth = "p̄/p̄_max" if data.campaign.cycle.turns_at_stress else "Δ/h_max"
     columns = [
         *key_columns(data, "cell."),
         TableColumn("branch", "branch", "branch"),
-        TableColumn("penetration", "penetration", depth, fixed(2)),
+        TableColumn("penetration", "penetration", state_sign(data), fixed(2)),
         TableColumn("realisations", "realisations", "n"),
         TableColumn("slope", "slope", "slope", fixed(2)),
         TableColumn("slope_sem", "error", "s.e.", number(1)),
