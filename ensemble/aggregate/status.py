@@ -6,6 +6,7 @@ result, for their checksums.
 
 from __future__ import annotations
 
+import math
 import os
 import shlex
 from collections import Counter
@@ -213,10 +214,11 @@ def _listed(
 
 
 def _range_of(row: Mapping[str, Any]) -> str:
+    row = {**row, "loss": math.nan if row["loss"] is None else row["loss"]}
     known = {name: row[name] for name in RANGES if row[name] is not None}
     least = min(known, key=lambda name: known[name]) if known else None
     shown = "no finite range" if least is None else f"{least} {known[least]:.2g} m"
-    return f"{shown}, loss " + ("unknown" if row["loss"] is None else f"{row['loss']:.3g} J/m²")
+    return f"{shown}, loss {row['loss']:.3g} J/m²"
 
 
 def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
