@@ -408,4 +408,5 @@ def with_error(value: float, error: float, least: float = -math.inf, most: float
     if least <= value <= most and high - low < 2 * error * (1 - 1e-9):
         middle, *ends = (f"{round(part, places):.{shown}f}" for part in (value, low, high))
         return f"{middle}, from {ends[0]} to {ends[1]}"
-    return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f}"
+    value = round(value, places) + 0.0  # no sign of a nought
+    return f"{value:.{shown}f} ± {round(error, places):.{shown}f}"
