@@ -1,7 +1,7 @@
 """Measure one loop in a process of its own: ``python -m adhesis.ensemble.bench.measure``.
 
 Peak memory belongs to a process, not to a call, and libraries are loaded at their first use. So
-every measured loop has a fresh process: it reads a :class:`Run` as JSON from its argument, runs a
+every measured loop has a fresh process: it reads a pickled :class:`Run` from its argument, runs a
 small loop first, and prints a :class:`Measurement` as JSON.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import resource
 import signal
 import subprocess
@@ -16,7 +17,7 @@ import sys
 from dataclasses import asdict, dataclass, replace
 from time import process_time
 
-from adhesis.ensemble.bench.scenes import SCENES, SMALL_ROUGH, Scene
+from adhesis.ensemble.bench.scenes import SMALL_ROUGH, Scene
 from adhesis.ensemble.run.launch import (
     ONE_THREAD,
     end_with_parent,
@@ -78,10 +79,9 @@ def measure(run: Run) -> Measurement:
 
     A run that fails or takes too long is a :class:`Measurement` with a note, not an exception.
     """
-    given = {**vars(run), "scene": run.scene.name}
     # One thread: on matrices of a few dozen rows, threads of the linear algebra only add CPU time.
     child = subprocess.run(
-        python("-m", "adhesis.ensemble.bench.measure", json.dumps(given)),
+        python("-m", "adhesis.ensemble.bench.measure", pickle.dumps(run).hex()),
         env=python_environment() | ONE_THREAD,
         capture_output=True,
         text=True,
@@ -97,8 +97,7 @@ def measure(run: Run) -> Measurement:
 
 def main() -> None:
     """Measure the run in the first argument in this process; end it when its seconds are over."""
-    given = json.loads(sys.argv[1])
-    run = Run(**{**given, "scene": SCENES[given["scene"]]})
+    run: Run = pickle.loads(bytes.fromhex(sys.argv[1]))
     _limit(_START_LIMIT)
     # Touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
     _loop(replace(run, scene=SMALL_ROUGH, setting=_WARM_UP[run.method], load_steps=4))

@@ -115,6 +115,5 @@ PAPER = Scene(
     tightest=(1e-7, 1e-6, 1e-5, 1e-4),
 )
 
-SCENES = {scene.name: scene for scene in (ONE_WAVE, TWO_WAVES, SMALL_ROUGH, ROUGH, PAPER)}
 QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
 FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)
