@@ -292,14 +292,14 @@ class Follower:
     def _start_at_fold(self, fold: Fold) -> tuple[Array, EventOrders | None]:
         """Return the edges from which a descent at a fold starts, and other orders of events.
 
-        A state that is its own mirror image may go on as a saddle. That is left to either side;
-        which of them counts as an order, as these may differ where several modes soften at once.
-        Else of edges that are mirror images one is moved on a little: the first to the right of the
-        highest crest. If they hold each other back, it goes first, as one does in any other
-        profile; if they help each other, they go together all the same.
+        A symmetric state may go on as a saddle. That is left to either side; which of them counts
+        as an order, as these may differ where several modes soften at once. Else of edges that are
+        alike one is moved on a little: the first to the right of the highest crest. If they hold
+        each other back, it goes first, as one does in any other profile; if they help each other,
+        they go together all the same.
         """
         point = fold.point
-        if not self.jumps.mirror.are_images(point.gaps, point.gaps):
+        if not self.jumps.symmetry.is_symmetric(point.gaps):
             return point.gaps, self._orders_of_folds(fold)
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)

@@ -107,7 +107,8 @@ class Jumps:
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
         problem = states.problem
-        self.mirror = MirrorCheck(edges, problem.profile.q0 * problem.mirror_axes)
+        axes = problem.profile.q0 * problem.mirror_axes
+        self.symmetry = SymmetryCheck(edges, axes, problem.equal_parts)
         self.descents = Descents(edges, states)
         self._first: tuple[float, list[Touch]] | None = None
 
@@ -169,7 +170,8 @@ class Jumps:
                 at_stake = self._at_stake_beyond(before, point, event.orders)
         except (FullContact, NoState):  # elsewhere, or unknown where: no energy to be compared
             at_stake = 0.0
-        if at_stake is None and point is not None and self.mirror.is_broken(event.left, point.gaps):
+        unlike = point is not None and self.symmetry.is_broken(event.left, point.gaps)
+        if at_stake is None and unlike:
             at_stake = 0.0
         jump = self.states.jump(before, after, direction, at_stake, event.barrier)
         misplaced = self.states.work(before, after, event.late)
@@ -194,7 +196,7 @@ class Jumps:
         """Difference of the energies of two ends in J/m²; None if they are one."""
         if self.descents.is_same_minimum(rival, point):
             return None
-        if point and rival and self.mirror.are_images(point.gaps, rival.gaps):
+        if point and rival and self.symmetry.are_images(point.gaps, rival.gaps):
             return 0.0
         ends = [self._after(before, end, d).potential for end in (point, rival)]
         return abs(ends[1] - ends[0]) / self.states.period
@@ -263,17 +265,25 @@ class Jumps:
         return not self.descents.is_same(after.field.gaps, before.field.gaps)
 
 
-class MirrorCheck:
-    """Finds jumps by which a mirror-symmetric state loses its symmetry.
+class SymmetryCheck:
+    """Finds symmetric states, and jumps by which one loses its mirror symmetry.
 
     The mirror image of their end is another end with the same energy: which of the two is reached
     is a convention (docs/methods.md, rule 7).
 
-    ``axes`` are those about which the profile is its own mirror image, in θ.
+    ``axes`` are those about which the profile is its own mirror image, in θ; the period consists of
+    so many equal ``parts``.
     """
 
-    def __init__(self, edges: EdgeMechanics, axes: Array) -> None:
+    def __init__(self, edges: EdgeMechanics, axes: Array, parts: int) -> None:
         self._near, self._axes = OTHER_MINIMUM * edges.wave, axes
+        self._turns = [2 * np.pi / n for n in range(2, parts + 1) if parts % n == 0]
+
+    def is_symmetric(self, gaps: Array) -> bool:
+        """Whether a state is its own mirror image, or consists of equal parts."""
+        return self.are_images(gaps, gaps) or any(
+            self._is_copy(gaps + turn, gaps) for turn in self._turns
+        )
 
     def are_images(self, one: Array, other: Array) -> bool:
         """Whether two states are mirror images of each other."""
@@ -290,7 +300,10 @@ class MirrorCheck:
 
     def _is_image(self, one: Array, other: Array, axis: float) -> bool:
         """Whether the image of some gaps about this axis are others."""
-        image = 2 * axis - one[:, ::-1]
+        return self._is_copy(2 * axis - one[:, ::-1], other)
+
+    def _is_copy(self, image: Array, other: Array) -> bool:
+        """Whether gaps lie at the places of others, on the circle."""
         apart = np.abs((image[:, None] - other[None] + np.pi) % (2 * np.pi) - np.pi)
         nearest = apart.max(axis=2).min(axis=1, initial=np.inf)
         return bool((nearest < self._near).all())
