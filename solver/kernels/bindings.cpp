@@ -476,8 +476,8 @@ void bind_predictor(nb::module_& m) {
       .def(
           "predict_gaps",
           [](const Predictor& p, double at) { return pairs_of(p.predict_ends(at)); }, "at"_a)
-      .def("reach", &Predictor::reach, "most"_a, "finest"_a)
-      .def("across", &Predictor::across, "distance"_a, "finest"_a);
+      .def("reach", &Predictor::reach, "most"_a, "resolution"_a)
+      .def("across", &Predictor::across, "distance"_a, "resolution"_a);
 }
 
 void bind_grid(nb::module_& m) {

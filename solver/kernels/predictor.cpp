@@ -128,12 +128,12 @@ Vector Predictor::predict_ends(double at) const {
   return move_edges(ends, motion);
 }
 
-double Predictor::reach(double most, double finest) const {
+double Predictor::reach(double most, double resolution) const {
   const double straight = most / std::max(fastest, std::numeric_limits<double>::min());
   if (fold.distance == infinity) return straight;
   // next to a fold: the step before it would be shorter than what is left before it
-  if (fold.distance < 0.7 * finest) return across(fold.distance, finest);
-  const double left = std::max(LEFT_BEFORE_FOLD * fold.distance, BEYOND_FOLD * finest);
+  if (fold.distance < 0.7 * resolution) return across(fold.distance, resolution);
+  const double left = std::max(LEFT_BEFORE_FOLD * fold.distance, BEYOND_FOLD * resolution);
   const double near = fold.distance - left;
   const double lead = most / std::abs(leading_.gone);
   if (!(lead < leading_.fold)) return near;
@@ -141,8 +141,8 @@ double Predictor::reach(double most, double finest) const {
   return std::min(std::abs(way) * lead * mean_slope, near);
 }
 
-double Predictor::across(double distance, double finest) const {
-  return (1 + LEFT_BEFORE_FOLD) * distance + BEYOND_FOLD * finest;
+double Predictor::across(double distance, double resolution) const {
+  return (1 + LEFT_BEFORE_FOLD) * distance + BEYOND_FOLD * resolution;
 }
 
 }  // namespace adhesis

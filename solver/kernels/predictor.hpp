@@ -52,11 +52,11 @@ class Predictor {
   Vector predict_ends(double at) const;
 
   // Step along which the edge that leads is expected to move no further than `most`. Towards a fold
-  // it leads near to it, and from next to it (`finest`) across.
-  double reach(double most, double finest) const;
+  // it leads near to it, and from next to it (`resolution`) across.
+  double reach(double most, double resolution) const;
 
   // Step across a fold at this distance.
-  double across(double distance, double finest) const;
+  double across(double distance, double resolution) const;
 
  private:
   Vector ends_before_, rate_before_;

@@ -42,6 +42,14 @@ def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
         Jump("unloading", problem.separation(-0.1 * i), float(i % 5), kind, 2, 1, 0.2, 0.1, 1e-5)
         for i, kind in enumerate(kinds)
     )
+    at = n + 2  # where unloading begins: both states of every jump, which are none of load steps
+    separation, contact = problem.separation(0) * (1 - penetration), value
+    for jump in reversed(catalogue):
+        separation = np.insert(separation, at, [jump.separation] * 2)
+        contact = np.insert(contact, at, [jump.contact_before, jump.contact_after])
+    more = [at] * (2 * jumps)
+    branch, on_axis = np.insert(branch, more, "unloading"), np.insert(on_axis, more, False)
+    penetration, value = np.insert(penetration, more, 0.0), np.insert(value, more, 1.0)
     return LoopResult(
         problem=problem,
         turning_point=top,
@@ -50,10 +58,10 @@ def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
         branch=branch,
         load_step=on_axis,
         penetration=penetration,
-        separation=problem.separation(0) * (1 - penetration),
+        separation=separation,
         mean_stress=value,
         tangent=value,
-        contact_fraction=value,
+        contact_fraction=contact,
         patches=value.astype(int),
         elastic_energy=value,
         adhesion_energy=value,
@@ -99,9 +107,13 @@ def test_the_range_of_adhesion_is_in_the_row():
     assert row["interior_tension_penetration"] == -0.5
     assert row["edge_range"] > 0
     assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [np.inf, 0, 0.0]
-    opening = Jump("unloading", 1e-6, 1.0, "opening", 1, 2, 0.5, 0.4, 1e-5, barrier=0.5)
+    s, contact = loop.separation, loop.contact_fraction
+    openings = tuple(
+        Jump("unloading", s[k], 1.0, "opening", 1, 2, contact[k], contact[k + 1], 1e-5, barrier=0.5)
+        for k in (-3, -2)
+    )
     problem = replace(loop.problem, strength=1e12)
-    opened = replace(loop, jumps=(opening, opening), problem=problem, narrowest_length=1e-6)
+    opened = replace(loop, jumps=openings, problem=problem, narrowest_length=1e-6)
     row = loop_row(campaign, opened)
     assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [1e12, 2, 1.0]
     assert row["zone_error"] == opened.zone_error > 0
