@@ -109,7 +109,8 @@ def enough(values: Sequence[float] | Array, at: Sequence[int], wanted: float) ->
     for count in at:
         if count > len(values):
             return None
-        row = row + 1 if precision(values[:count], wanted).narrow else 0
+        # fewer than the least number are never narrow enough, and cost as much to look at
+        row = row + 1 if count >= LEAST and precision(values[:count], wanted).narrow else 0
         if row == LOOKS_IN_A_ROW or count == at[-1]:
             return count
     return None

@@ -201,7 +201,7 @@ def hung_launchers() -> list[int]:
     ]
 
 
-def wait_until(condition: Callable[[], bool], seconds: float = 150.0, every: float = 0.02) -> None:
+def wait_until(condition: Callable[[], bool], seconds: float = 150.0, every: float = 0.05) -> None:
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited too long"
