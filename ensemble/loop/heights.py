@@ -91,7 +91,7 @@ def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
         raise InputError(
             f"{source} has {codes.removesuffix(' taken as drop-outs')}, which instruments write "
             "for missing ones: --heights needs every height of the period (adhesis trace fills "
-            "gaps)"
+            "gaps; give them in another unit if they are heights)"
         )
     if unit is not None:
         return np.asarray(heights * LENGTH.units[unit])

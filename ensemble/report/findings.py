@@ -229,7 +229,8 @@ def quality(data: Aggregate) -> Iterator[str]:
         yield (
             f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
             "their estimated error exceeds the accuracy asked for, "
-            f"{percent(data.campaign.solver.accuracy)} of the loss: {_listed(rows)}."
+            f"{percent(data.campaign.solver.accuracy)} of the loss, or is no number: "
+            f"{_listed(rows)}."
         )
     yield from _limit(data)
     yield from _doubtful_companions(data)

@@ -100,6 +100,12 @@ def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
     return [sorted(line, key=lambda c: c.at[axis.name]) for line in lines.values()]
 
 
+def with_figure(data: Aggregate) -> list[Axis]:
+    """Further axes that have a figure: all but those that vary together with H or γ."""
+    axes = own_axes(data)
+    return [axis for axis in axes if any(len(line) > 1 for line in lines_along(data, axis))]
+
+
 def common(data: Aggregate) -> list[tuple[str, float]]:
     """Return the values on the further axes that all cells have in common.
 
@@ -136,7 +142,9 @@ def shown_cells(data: Aggregate) -> str:
     at = place(common(data.shown))
     if not data.further or not at:
         return ""
+    along = " and ".join(axis.name for axis in with_figure(data))
     return (
         f"Figures with curves for each H and γ show the cells at {at}, as stated below them; all "
-        "cells are in the tables and in `curves.nc`, and there are figures along each further axis."
+        "cells are in the tables and in `curves.nc`"
+        + (f", and there are figures along {along}." if along else ".")
     )

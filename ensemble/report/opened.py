@@ -94,7 +94,8 @@ class Plots:
         ValueError
             If the campaign has no such axis beside H and γ.
         """
-        from adhesis.ensemble.report.figures.along import along, with_figure
+        from adhesis.ensemble.report.figures.along import along
+        from adhesis.ensemble.report.further_axes import with_figure
 
         axes = {axis.name: axis for axis in with_figure(self._results.averages)}
         if name not in axes:
@@ -164,7 +165,7 @@ class CampaignResults:
     def _repr_html_(self) -> str:
         """Return counts, mean losses with the warnings of the report, and their figure."""
         from adhesis.ensemble.report import findings
-        from adhesis.ensemble.report.figures import along
+        from adhesis.ensemble.report.further_axes import with_figure
 
         rows = [("file", str(self.path)), *((k, str(n)) for k, n in self._counts.items())]
         rows.append(("axes", ", ".join(self.axes)))
@@ -177,7 +178,7 @@ class CampaignResults:
         places = [tuple(f"{value:g}" for value in place) for place in losses.index]
         losses.index = pd.MultiIndex.from_tuples(places, names=losses.index.names)
         table: str = losses.to_html(float_format="{:.4g}".format)
-        several = along.with_figure(self.averages) if len(self.averages.hursts) == 1 else []
+        several = with_figure(self.averages) if len(self.averages.hursts) == 1 else []
         draw = partial(self.plot.loss_along, several[0].name) if several else None
         figure: Any = (draw or self.plot.loss_against_hurst)()
         return table_of(rows) + table + picture_of(figure, "losses")

@@ -4,6 +4,7 @@ import csv
 import io
 import pickle
 import re
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -19,6 +20,7 @@ from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import sections
 from adhesis.ensemble.report.figures.style import style
+from adhesis.ensemble.report.further_axes import shown_cells
 from adhesis.ensemble.report.tables.loss_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
@@ -88,6 +90,12 @@ def test_figures_of_a_part_show_one_place_too(data, tmp_path):
     assert {cell.others for cell in found.shown.cells} == {
         (("ratio", 100), ("max_penetration", 0.9))
     }
+
+
+def test_figures_along_an_axis_are_said_where_there_are_some(data):
+    assert "there are figures along ratio and max_penetration." in shown_cells(data)
+    alone = replace(data, cells=data.shown.cells)
+    assert shown_cells(alone).endswith("all cells are in the tables and in `curves.nc`.")
 
 
 def test_the_papers_cells_alone_stand_beside_the_paper(data):

@@ -15,8 +15,6 @@ from adhesis.ensemble.report.further_axes import (
     common,
     from_to,
     gamma_label,
-    lines_along,
-    own_axes,
     symbols,
     together,
 )
@@ -30,12 +28,6 @@ _OF_TURNING_POINT = (
     ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0, False),
     ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0, True),
 )
-
-
-def with_figure(data: Aggregate) -> list[Axis]:
-    """Further axes that have a figure: all but those that vary together with H or γ."""
-    axes = own_axes(data)
-    return [axis for axis in axes if any(len(line) > 1 for line in lines_along(data, axis))]
 
 
 def along(axis: Axis, data: Aggregate) -> style.PublishedFigure:

@@ -11,7 +11,7 @@ from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
-from adhesis.ensemble.report.figures.along import along, with_figure
+from adhesis.ensemble.report.figures.along import along
 from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.shapes_and_spectra import (
     cells_with_shape,
@@ -19,7 +19,7 @@ from adhesis.ensemble.report.figures.shapes_and_spectra import (
     shown_penetrations,
 )
 from adhesis.ensemble.report.figures.style import PublishedFigure
-from adhesis.ensemble.report.further_axes import below, common, together
+from adhesis.ensemble.report.further_axes import below, common, together, with_figure
 from adhesis.ensemble.report.paper import PaperFigure
 
 

@@ -51,7 +51,7 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
     # Where hardly a height occurs twice, noughts and nines that do stand for no height even within
     # the range.
     are_single = float(np.median(times)) == 1.0
-    codes = likely & (away > _BEYOND_KNOWN * (high - low))
+    codes = (known if known_alone else likely) & (away > _BEYOND_KNOWN * (high - low))
     if not known_alone:
         codes |= far | ((nines | (values == 0)) & repeated & are_single)
         codes |= nines & np.isin(-values, values[codes])
