@@ -312,7 +312,8 @@ class Profile(ByValue):
     @cached_property
     def _harmonics(self) -> Integers:
         """Harmonics whose amplitude makes parts of the profile differ, rising."""
-        return np.flatnonzero(np.abs(self.coefficients) > EQUAL_CRESTS * self.h_max)
+        # a wave raises one crest over another by up to four times its coefficient
+        return np.flatnonzero(np.abs(self.coefficients) > EQUAL_CRESTS / 4 * self.h_max)
 
     def first_of_equal(self, position: Array, equal_parts: int) -> NDArray[np.intp]:
         """Choose, of places in m where contact may begin alike, those where it does begin.

@@ -46,10 +46,10 @@ there, too, so that no race was flagged. With half of them the loss is wrong as 
 
 # The way off a saddle.
 EQUAL = 1e-3
-"""Share by which stiffnesses, amplitudes, rates and gains of energy of edges that are mirror images
-may differ and count as equal: of equal edges the first one leads. So much of the largest stiffness
-a mode may have, too, that has softened at a fold: there the error of the field decides its sign,
-and with that losses of equal crests differed by up to 4 %."""
+"""Share by which stiffnesses, amplitudes, rates and gains of energy of edges that are copies of
+each other may differ and count as equal: of equal edges the first one leads. So much of the largest
+stiffness a mode may have, too, that has softened at a fold: there the error of the field decides
+its sign, and with that losses of equal crests differed by up to 4 %."""
 
 # ---------------------------------------------------------------- nucleation
 

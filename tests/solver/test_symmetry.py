@@ -134,6 +134,23 @@ def test_a_random_symmetric_profile_loses_what_one_hardly_asymmetric_does(seed, 
     assert one.method.newton_steps < 2 * other.method.newton_steps
 
 
+def test_parts_that_may_go_one_after_the_other_are_a_race_with_what_is_at_stake():
+    """Of six equal parts several modes soften at once: which lead depends on the accuracy."""
+    amplitudes = np.zeros(13, dtype=complex)
+    amplitudes[[6, 12]] = 1e-6 * np.array([0.648, 0.282]) * np.exp([-1.22j, 1.99j])
+    problem = Problem(Profile(2e-3, amplitudes), SOFT, 1.7e-4)
+    coarse, fine = (
+        run_loop(
+            make_method("sharp", problem, accuracy=accuracy), max_penetration=0.75, load_steps=10
+        )
+        for accuracy in (1e-3, 1e-4)
+    )
+    apart = abs(coarse.loss - fine.loss)
+    assert apart < max(coarse.loss_error, coarse.energy_at_stake)
+    # ends that differ by a turn are one
+    assert all(j.at_stake > 1e-3 * coarse.loss for j in coarse.jumps if j.raced)
+
+
 def test_grid_takes_mirror_images_one_after_the_other_too():
     """Two outer crests of one height, which touch at once; the trough between them stays open."""
     profile = Profile(2e-3, np.array([0, 1e-7, -4e-7, -1e-7], dtype=complex))

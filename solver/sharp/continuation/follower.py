@@ -292,15 +292,21 @@ class Follower:
     def _start_at_fold(self, fold: Fold) -> tuple[Array, EventOrders | None]:
         """Return the edges from which a descent at a fold starts, and other orders of events.
 
-        A symmetric state may go on as a saddle. That is left to either side; which of them counts
-        as an order, as these may differ where several modes soften at once. Else of edges that are
+        A symmetric state may go on as a saddle. That is left to either side. Else of edges that are
         alike one is moved on a little: the first to the right of the highest crest. If they hold
         each other back, it goes first, as one does in any other profile; if they help each other,
-        they go together all the same.
+        they go together all the same. At a saddle this and both sides count as orders, as their
+        ends may differ where several modes soften at once.
         """
         point = fold.point
         if not self.jumps.symmetry.is_symmetric(point.gaps):
             return point.gaps, self._orders_of_folds(fold)
+        rate = np.abs(point.rate)
+        fastest = np.flatnonzero(rate >= (1 - EQUAL) * rate.max())
+        away = positions(point.gaps, self.edges.source.highest)[fastest]
+        edge = int(fastest[np.argmin(away)])
+        way = np.sign(point.rate[edge] * (fold.d - point.d))
+        moved = self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
@@ -308,13 +314,7 @@ class Follower:
                 saddle.gaps, fold.d, self.edges.law_at(point.gaps), at_fold=True
             )
             if ways:
-                return ways[0], EventOrders(fold.d, tuple(ways))
-        rate = np.abs(point.rate)
-        fastest = np.flatnonzero(rate >= (1 - EQUAL) * rate.max())
-        away = positions(point.gaps, self.edges.source.highest)[fastest]
-        edge = int(fastest[np.argmin(away)])
-        way = np.sign(point.rate[edge] * (fold.d - point.d))
-        moved = self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
+                return ways[0], EventOrders(fold.d, (*ways, moved))
         return moved, self._orders_of_folds(fold)
 
     def _moved_on(self, gaps: Array, edge: int, length: float) -> Array:

@@ -193,8 +193,10 @@ class Jumps:
     def _at_stake(
         self, before: ContactState, point: Point | None, rival: Point | None, d: float
     ) -> float | None:
-        """Difference of the energies of two ends in J/m²; None if they are one."""
+        """Difference of the energies of two ends in J/m²; None if one, or one in another part."""
         if self.descents.is_same_minimum(rival, point):
+            return None
+        if point and rival and self.symmetry.are_copies(point.gaps, rival.gaps):
             return None
         if point and rival and self.symmetry.are_images(point.gaps, rival.gaps):
             return 0.0
@@ -277,12 +279,16 @@ class SymmetryCheck:
 
     def __init__(self, edges: EdgeMechanics, axes: Array, parts: int) -> None:
         self._near, self._axes = OTHER_MINIMUM * edges.wave, axes
-        self._turns = [2 * np.pi / n for n in range(2, parts + 1) if parts % n == 0]
+        self._turns = [2 * np.pi * n / parts for n in range(1, parts)]
 
     def is_symmetric(self, gaps: Array) -> bool:
         """Whether a state is its own mirror image, or consists of equal parts."""
-        return self.are_images(gaps, gaps) or any(
-            self._is_copy(gaps + turn, gaps) for turn in self._turns
+        return self.are_images(gaps, gaps) or self.are_copies(gaps, gaps)
+
+    def are_copies(self, one: Array, other: Array) -> bool:
+        """Whether two states differ by a turn of some parts."""
+        return one.shape == other.shape and any(
+            self._is_copy(one + turn, other) for turn in self._turns
         )
 
     def are_images(self, one: Array, other: Array) -> bool:
