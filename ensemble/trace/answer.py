@@ -530,8 +530,10 @@ def _neighbours(answer: Answer) -> list[str]:
 
 def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     """Return what is doubtful: what changes the answer most first, loops that failed last."""
-    found = [*answer.main["preload_warnings"], *_one_patch(answer), *_not_converged(answer)]
-    if loss.relative > 0.5:
+    adhesive = answer.main["work_of_adhesion"] > 0  # else the loss is nought, but for rounding
+    found = [*answer.main["preload_warnings"], *_one_patch(answer)]
+    found += _not_converged(answer) if adhesive else []
+    if adhesive and loss.relative > 0.5:
         largest = max(loss.doubts, key=lambda name: loss.doubts[name])
         words = DOUBTS | OF_MODEL | {"numerics": "error of the loop itself"}
         found.append(

@@ -127,6 +127,8 @@ def _scope(answer: Answer) -> str:
 
 def _range(answer: Answer) -> str:
     """Describe the range of adhesion that is given, or below which zero range holds."""
+    if answer.main["work_of_adhesion"] == 0:
+        return "without adhesion there is none, and nothing is lost"
     if answer.main["strength"] is not None:
         return str(answer.main["range_summary"])
     inside, ranges = "no tension inside patches", []

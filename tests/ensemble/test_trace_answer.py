@@ -257,6 +257,15 @@ def spoiled(plan: Plan, name: str) -> Plan:
     return dataclasses.replace(plan, jobs=jobs)
 
 
+def test_without_adhesion_nothing_is_lost_and_no_range_is_doubted() -> None:
+    trace, cycle = prepared(), make_cycle(HALF_SPACE, 0.0, 0.3, 4, "auto", 1e-3)
+    plan = make_plan(trace, cycle, quick=True, processes=0)
+    answer = run_plan(trace, cycle, only(plan, "answer", "blend 10 %", "noise 1"))
+    assert abs(answer.loss.value) <= answer.loss.uncertainty
+    assert not [text for text in answer.warnings if "known to" in text or "converged" in text]
+    assert "without adhesion there is none" in summary(answer)
+
+
 @pytest.fixture(scope="module")
 def spoiled_answer() -> Answer:
     trace, cycle, plan = small_plan()
