@@ -286,7 +286,8 @@ if ! has_mpi; then why_serial=${why_serial:-"no mpirun in PATH"}; fi
 # ------------------------------------------- side by side: h5py, and all other packages with adhesis
 
 build_h5py() {
-    # A compile job for each core and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
+    # A compile job for each core, and no optimisation: half the time to compile. Calls on tiny datasets take half
+    # as long again, but most of a campaign's time is in loops.
     # Without isolation, or the build would first compile an old mpi4py from source.
     local config=$root/.setup/build.cfg
     printf '[build_ext]\nparallel = %s\n' "$(env -u OMP_NUM_THREADS nproc 2>/dev/null || echo 2)" >"$config"
