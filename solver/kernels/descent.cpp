@@ -298,6 +298,8 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
                 int most_steps, bool equal_speeds, const EdgeLaw& law, const Model& model) {
   const Panels& panels = *model.panels;
   const Device& device = model.device;
+  EdgeLaw loose = law;  // what is nearer than a rest does not count here
+  loose.field_error = std::max(law.field_error, law.rest_step);
   Flags runs(ends.size());
   Descent out;
   double reach = FIRST_REACH;  // of the next long step, in longest steps
@@ -316,7 +318,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       // the field that it began with. Later forces are large, and what finer fields end is not.
       const bool raises = !(judges && is_first);
       const Integers orders = response.nodes.orders;
-      if (!move_references(response, ends, states, pressure, prescribed, law, model, raises)) {
+      if (!move_references(response, ends, states, pressure, prescribed, loose, model, raises)) {
         out.event = DescentEvent::no_field;
         break;
       }

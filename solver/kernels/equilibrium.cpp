@@ -123,12 +123,10 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
     hold_edges(response, ends, states);
     return true;
   }
-  if (std::find(far.begin(), far.end(), true) != far.end()) {
-    // their potentials are not those of the old edges: solved with these held
-    pressure = response.solve(prescribed, law, model.device).pressure;
+  response.displaced = indices(far);
+  if (both.held != states.held) {  // their potentials are needed before their edges can follow
+    response.solve(prescribed, law, model.device);
     hold_edges(response, ends, states);
-    for (int k = 0; k < count; ++k)
-      if (far[k]) response.linearise_in_current_potential(k, pressure, law);
   }
   return true;
 }

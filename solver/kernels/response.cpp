@@ -1,5 +1,7 @@
 #include "response.hpp"
 
+#include <utility>
+
 namespace adhesis {
 
 namespace {
@@ -255,6 +257,7 @@ ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
   add_scaled(out.pressure, motion[1].data(), out.motion.data(), 2 * count);
   out.rate.resize(2 * count);
   add_scaled(rate, motion[1].data(), out.rate.data(), 2 * count);
+  for (int k : std::exchange(displaced, {})) linearise_in_current_potential(k, out.pressure, law);
   return out;
 }
 
