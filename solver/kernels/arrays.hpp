@@ -60,6 +60,17 @@ inline double dot(const double* a, const double* b, int count) {
   return total;
 }
 
+// Add up the numbers of each of four, in pairs.
+[[gnu::always_inline]] inline Four sum_each(const Four (&x)[4]) {
+  const Four even = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
+  const Four odd = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
+  const Four even_below = __builtin_shufflevector(x[2], x[3], 0, 4, 2, 6);
+  const Four odd_below = __builtin_shufflevector(x[2], x[3], 1, 5, 3, 7);
+  const Four first = even + odd, last = even_below + odd_below;
+  return __builtin_shufflevector(first, last, 0, 1, 4, 5) +
+         __builtin_shufflevector(first, last, 2, 3, 6, 7);
+}
+
 // Compute out = base + a x, without a base a x, four rows at a time; `a` has at least four rows and
 // columns, or no columns.
 [[gnu::always_inline]] inline void apply(const double* a, int rows, int columns, const double* x,
@@ -75,10 +86,8 @@ inline double dot(const double* a, const double* b, int count) {
       const Four here = at == j ? load_four(x + j) : rest;
       for (int r = 0; r < 4; ++r) sum[r] += load_four(a + (row + r) * columns + at) * here;
     }
-    for (int r = 0; r < 4; ++r) {
-      const double product = (sum[r][0] + sum[r][1]) + (sum[r][2] + sum[r][3]);
-      out[row + r] = base ? base[row + r] + product : product;
-    }
+    const Four product = sum_each(sum);
+    store_four(base ? load_four(base + row) + product : product, out + row);
   }
 }
 

@@ -62,7 +62,7 @@ void push_edges(const LinearResponse& response, const Integers& edges, const Vec
     loaded[run] = loaded[one] || loaded[two];
     if (loaded[run]) tree.charge(run, charges);
   }
-  tree.pass_down(wanted, charges, out.potential);
+  tree.pass_down(wanted, {&charges, 1}, {&out.potential, 1});
   for (int e = 0; e < 2 * count; ++e)
     if (wanted[e / 2])
       out.motion[e] += dot(&response.motion_by_potential[e % 2][nodes.offset[e / 2]],

@@ -50,7 +50,7 @@ Vector solve_load(const Nodes& nodes, const FactoredGaps& gaps, const Vector& we
   Vector solved = apply_inverse(nodes, gaps.inverse, load);
   for (int i = 0; i < n; ++i) charges.isolated[i] = weights[i] * solved[i];
   for (int run = tree.count; run < tree.run_count(); ++run) tree.charge(run, charges);
-  tree.pass_down(charges, potential);
+  tree.pass_down(Flags(tree.run_count(), true), {&charges, 1}, {&potential, 1});
   Vector rest(n);
   for (int i = 0; i < n; ++i) rest[i] = load[i] - weights[i] * potential[i];
   return apply_inverse(nodes, gaps.inverse, rest);

@@ -16,10 +16,14 @@ struct Space {
   std::array<Vector, 2> singular;  // charges of both ends' openings
   Vector near, near_slope, smooth, density;
 
-  explicit Space(int m) : near(m), near_slope(m), smooth(m), density(m) {
+  // Begin anew, for as many nodes.
+  void begin(int m) {
     for (Vector& column : loads) column.resize(m);
     for (Vector& column : solved) column.resize(m);
     for (Vector& column : singular) column.resize(m);
+    for (Vector* column : {&smooth, &density}) column->resize(m);
+    near.assign(m, 0);
+    near_slope.assign(m, 0);
   }
 };
 
@@ -91,7 +95,8 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   const double* own = &inverse[nodes.square[k]];
-  Space space(m);
+  thread_local Space space;  // kept, as gaps of many sizes follow each other
+  space.begin(m);
   load_gap(*this, k, rule, space);
   for (int c = 0; c < columns; ++c)
     for (int i = 0; i < m; ++i) space.solved[c][i] = dot(own + i * m, space.loads[c].data(), m);
@@ -230,9 +235,9 @@ ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
   const int count = gap_count(), n = nodes.size();
   factor_runs();
   Pair motion = {Vector(2 * count), Vector(2 * count)};
+  tree.pass_down(Flags(tree.run_count(), true), charges, potential);
   for (int column = 0; column < 2; ++column) {
-    Vector& g = potential[column];
-    tree.pass_down(charges[column], g);
+    const Vector& g = potential[column];
     mean[column] = dot(tree.stretch.data(), charges[column].isolated.data(), n) -
                    dot(mean_by_potential.data(), g.data(), n);
     for (int e = 0; e < 2 * count; ++e)

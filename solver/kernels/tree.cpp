@@ -421,23 +421,21 @@ WIDE void Tree::charge(int index, Charges& charges) const {
                    &charges.isolated[run.node]);
 }
 
-WIDE void Tree::pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const {
+WIDE void Tree::pass_down(const Flags& wanted, std::span<const Charges> charges,
+                          std::span<Vector> potential) const {
   for (int index = run_count() - 1; index >= count; --index) {
     if (!wanted[index]) continue;
     const Run& run = runs[index];
     const double* inward = inner_potential.data() + run.interpolation;
     for (int half : run.half) {
       const Run& child = runs[half];
-      if (wanted[half])
-        apply(inward, child.rank, run.rank, potential.data() + run.node,
-              charges.potential_of_sibling.data() + child.node, potential.data() + child.node);
+      for (size_t load = 0; wanted[half] && load < charges.size(); ++load)
+        apply(inward, child.rank, run.rank, potential[load].data() + run.node,
+              charges[load].potential_of_sibling.data() + child.node,
+              potential[load].data() + child.node);
       inward += child.rank * run.rank;
     }
   }
-}
-
-void Tree::pass_down(const Charges& charges, Vector& potential) const {
-  pass_down(Flags(runs.size(), true), charges, potential);
 }
 
 }  // namespace adhesis

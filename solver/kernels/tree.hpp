@@ -85,9 +85,10 @@ struct Tree {
   // Compute the charges of a run from those of its halves, and the halves' potentials.
   void charge(int run, Charges& charges) const;
 
-  // Compute the potentials of wanted runs; those that hold a wanted one must be wanted, too.
-  void pass_down(const Flags& wanted, const Charges& charges, Vector& potential) const;
-  void pass_down(const Charges& charges, Vector& potential) const;
+  // Compute the potentials of wanted runs for some loads; those that hold a wanted one must be
+  // wanted, too.
+  void pass_down(const Flags& wanted, std::span<const Charges> charges,
+                 std::span<Vector> potential) const;
 };
 
 // Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.

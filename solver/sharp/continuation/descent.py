@@ -184,6 +184,8 @@ class Descents:
         near, free = edges.response_at(gaps, prescribed), law.free_edges(gaps)
         if near is None or edges.critical == 0 or len(free) == 0:
             return []
+        if not at_fold and near.solve(prescribed, law, edges.model).stable:
+            return []
         tangent = near.tangent_between(gaps, free, prescribed, law, edges.model)
         by_edge = near.opening[free, None] * tangent
         limit = step_limits(gaps, law.longest_step)[free]
