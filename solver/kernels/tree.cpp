@@ -123,30 +123,35 @@ template <int rows>
 }
 
 // Compute out = base + a b by tiles, of at least four rows and columns; the last tiles overlap
-// those before, where they compute the same again.
+// those before, where they compute the same again. Those above the diagonal of a symmetric product
+// are not computed, but reflected.
 [[gnu::always_inline]] inline void multiply_by_tiles(const double* a, int row_step, int inner_step,
                                                      const double* b, int rows, int inner,
-                                                     int columns, const double* base, double* out) {
+                                                     int columns, const double* base, double* out,
+                                                     bool is_symmetric) {
   for (int j = 0; j < columns; j += 4) {
     const int column = std::min(j, columns - 4);
-    for (int i = 0; i < rows; i += 4) {
+    for (int i = is_symmetric ? j : 0; i < rows; i += 4) {
       const int row = std::min(i, rows - 4), at = row * columns + column;
       multiply_tile<4>(a + row * row_step, row_step, inner_step, b + column, inner, columns,
                        base ? base + at : nullptr, out + at);
     }
   }
+  for (int i = 0; is_symmetric && i < rows; ++i)
+    for (int j = 0; j < i; ++j) out[j * columns + i] = out[i * columns + j];
 }
 
 // out = base + a b, a of (rows, inner), b of (inner, columns).
 WIDE void multiply(const double* a, const double* b, int rows, int inner, int columns, double* out,
-                   const double* base = nullptr) {
-  multiply_by_tiles(a, inner, 1, b, rows, inner, columns, base, out);
+                   const double* base = nullptr, bool is_symmetric = false) {
+  multiply_by_tiles(a, inner, 1, b, rows, inner, columns, base, out, is_symmetric);
 }
 
 // out = base + aᵀ b, a of (inner, rows), b of (inner, columns).
 WIDE void multiply_transposed(const double* a, const double* b, int inner, int rows, int columns,
-                              double* out, const double* base = nullptr) {
-  multiply_by_tiles(a, 1, rows, b, rows, inner, columns, base, out);
+                              double* out, const double* base = nullptr,
+                              bool is_symmetric = false) {
+  multiply_by_tiles(a, 1, rows, b, rows, inner, columns, base, out, is_symmetric);
 }
 
 // Compute out = aᵀ x, a of (rows, columns).
@@ -356,7 +361,7 @@ void Tree::factor(int index) {
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < m; ++j) k21[j * n + i] = k12[i * m + j];
   multiply(k12, second, n, m, m, half);
-  multiply(half, k21, n, m, n, reflected);
+  multiply(half, k21, n, m, n, reflected, nullptr, true);
   multiply(reflected, first, n, n, n, matrix);
   const double squares = trace_of_square(matrix, n);
   std::fill_n(eliminated, n * stride, 0.0);
@@ -390,10 +395,7 @@ void Tree::factor(int index) {
   multiply_transposed(k12, charges, n, m, r, d2, e2);
   multiply(second, d2, m, m, r, charges + n * r);
   double* own = &response[run.response];
-  multiply_transposed(e1, charges, n + m, r, r, own);
-  for (int i = 0; i < r; ++i)
-    for (int j = 0; j < i; ++j)
-      own[i * r + j] = own[j * r + i] = 0.5 * (own[i * r + j] + own[j * r + i]);
+  multiply_transposed(e1, charges, n + m, r, r, own, nullptr, true);
 }
 
 WIDE void Tree::charge(int index, Charges& charges) const {
