@@ -1,5 +1,6 @@
 """A law of edges that is written here alone: what the contract in ``edge_law.hpp`` promises."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,19 @@ def test_a_law_of_its_own_meets_its_closed_form(ratio: float) -> None:
     assert loop.loss_from_drops == pytest.approx(loss, rel=1e-5)
     assert loop.friction == pytest.approx(friction, rel=1e-5)
     assert abs(loop.audit_residual) < 1e-5
+
+
+def test_a_method_with_a_law_of_its_own_is_pickled_with_it() -> None:
+    own = TwoWorks(1.5)
+    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
+    method = SharpMethod(problem, adhesion=own.law)
+    copy = pickle.loads(pickle.dumps(method))
+    one, other = (run_loop(m, max_penetration=0.5, load_steps=5) for m in (method, copy))
+    assert other.loss == one.loss
+    assert copy.edges.adhesion.largest == 1.5
+    law = PythonAdhesion(False, 1.0, 1.0, lambda a, r: (1.0, 0.0), lambda a, r: a)
+    with pytest.raises((pickle.PicklingError, AttributeError), match="lambda"):
+        pickle.dumps(SharpMethod(problem, adhesion=law))
 
 
 def test_an_error_of_a_law_is_raised_where_the_path_is_followed() -> None:
