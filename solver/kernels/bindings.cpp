@@ -166,22 +166,26 @@ using IntegralFunction = nb::typed<nb::callable, double(double, bool)>;
 // A law of Python functions.
 class PythonAdhesion : public Adhesion {
  public:
+  const WorkFunction work_function;
+  const IntegralFunction integral_function;
+
   PythonAdhesion(bool pins, double least, double largest, WorkFunction work, IntegralFunction up_to)
-      : Adhesion(pins, least, largest), work_(std::move(work)), up_to_(std::move(up_to)) {}
+      : Adhesion(pins, least, largest),
+        work_function(std::move(work)),
+        integral_function(std::move(up_to)) {}
 
   std::pair<double, double> work(double theta, bool recedes) const override {
     nb::gil_scoped_acquire held;
-    return nb::cast<std::pair<double, double>>(work_(theta, recedes));
+    return nb::cast<std::pair<double, double>>(work_function(theta, recedes));
   }
 
   double work_up_to(double theta, bool recedes) const override {
     nb::gil_scoped_acquire held;
-    return nb::cast<double>(up_to_(theta, recedes));
+    return nb::cast<double>(integral_function(theta, recedes));
   }
-
- private:
-  nb::callable work_, up_to_;
 };
+
+using PythonAdhesionState = std::tuple<bool, double, double, WorkFunction, IntegralFunction>;
 
 void bind_model(nb::module_& m) {
   nb::class_<Panels>(m, "Panels")
@@ -226,7 +230,16 @@ void bind_model(nb::module_& m) {
            "ratio"_a = 1.0, "least"_a = 1.0, "largest"_a = 1.0);
   nb::class_<PythonAdhesion, Adhesion>(m, "PythonAdhesion", "A law of Python functions.")
       .def(nb::init<bool, double, double, WorkFunction, IntegralFunction>(), "pins"_a, "least"_a,
-           "largest"_a, "work"_a, "work_up_to"_a);
+           "largest"_a, "work"_a, "work_up_to"_a)
+      .def("__getstate__",
+           [](const PythonAdhesion& law) {
+             return PythonAdhesionState(law.pins, law.least, law.largest, law.work_function,
+                                        law.integral_function);
+           })
+      .def("__setstate__", [](PythonAdhesion& law, const PythonAdhesionState& state) {
+        const auto& [pins, least, largest, work, up_to] = state;
+        new (&law) PythonAdhesion(pins, least, largest, work, up_to);
+      });
   nb::class_<EdgeLaw>(m, "EdgeLaw")
       .def(nb::init<std::shared_ptr<const Adhesion>, double, double, double, double, double, double,
                     double, double>(),

@@ -317,12 +317,10 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       // Next to a fold the error of a finer field may show a minimum: the first step is judged by
       // the field that it began with. Later forces are large, and what finer fields end is not.
       const bool raises = !(judges && is_first);
-      const Integers orders = response.nodes.orders;
       if (!move_references(response, ends, states, pressure, prescribed, loose, model, raises)) {
         out.event = DescentEvent::no_field;
         break;
       }
-      judges = judges && response.nodes.orders == orders;
     }
     if (run_unbalanced(runs, response, law)) {
       states = held_edges(runs, ends, law);

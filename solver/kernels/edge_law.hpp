@@ -22,7 +22,7 @@
 // - energy: that of the contact is the integral of w of advancing edges over its patches. An edge
 //   that recedes dissipates the integral of the difference: friction, in a column of its own.
 //
-// What a law of adhesion has to keep. Points 1 to 3 of a law of one's own are checked at some
+// What a law of adhesion has to keep. Points 1, 2, 3 and 5 of a law of one's own are checked at some
 // places, before a path is followed (adhesion.py):
 //
 // 1. w is positive, of period 2π, and smooth over the shortest wave that `StressSource.top` states:
@@ -35,9 +35,10 @@
 //    speed, or of other edges, is none of this kind, and one that acts over a range has more
 //    unknowns than edges.
 // 5. `least` and `largest` bound w where the profile is flat: seeds and lengths that count as
-//    nothing are set by the least, bounds of how fast gaps close by the largest.
-// 6. Equal parts, mirror axes and λ_min are those of the problem, of its profile and pattern: a law
-//    that varies otherwise must share them, or edges that differ are taken to be alike.
+//    nothing are set by the least, bounds of how fast gaps close by the largest. Where they differ
+//    steps are those of a varying γ.
+// 6. λ_min is that of the problem, of its profile and pattern. Equal parts and mirror axes of the
+//    problem that a law of one's own does not share, at the same places, count as none.
 //
 // What remains of one γ are scales, not thresholds: `critical` in the tolerances below, the
 // accuracy of the field and the density of states by the strength of adhesion beside roughness.

@@ -2,15 +2,48 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from adhesis.solver._kernels import Adhesion, ProfileAdhesion
 from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import MIRRORED, Array
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 
-_PLACES = 97  # at which a law is looked at
+_PLACES = 2 * np.pi * (np.arange(97) + 0.37) / 97  # θ at which a law is looked at
 _STEP = 1e-4  # of the shortest wave: between values whose difference is compared with a slope
 _AGREE = 1e-3  # of the largest w, and per wave number of the largest slope that it may have
+
+
+class Symmetry(NamedTuple):
+    """Number of equal parts of a period, and the axes in θ about which it is its mirror image."""
+
+    parts: int
+    axes: Array
+
+
+ASYMMETRIC = Symmetry(1, np.empty(0))
+
+
+def symmetry_of(problem: Problem, own: Adhesion | None) -> Symmetry:
+    """Return the symmetry of a problem, as far as a law of one's own has it, too."""
+    parts, axes = problem.equal_parts, problem.profile.q0 * problem.mirror_axes
+    if own is None:
+        return Symmetry(parts, axes)
+
+    def works(theta: Array) -> Array:
+        return np.array([[own.work(at, recedes)[0] for at in theta] for recedes in (False, True)])
+
+    here = works(_PLACES)
+
+    def is_same_at(theta: Array) -> bool:
+        return bool(np.abs(works(theta) - here).max() < MIRRORED * here.max())
+
+    shared = [n for n in range(1, parts + 1) if parts % n == 0]
+    shared = [n for n in shared if is_same_at(_PLACES + 2 * np.pi / n)]
+    mirrored = np.array([is_same_at(2 * axis - _PLACES) for axis in axes], dtype=bool)
+    return Symmetry(max(shared, default=1), axes[mirrored])
 
 
 def adhesion_of(problem: Problem, source: StressSource) -> Adhesion:
@@ -27,14 +60,15 @@ def check_adhesion(adhesion: Adhesion, problem: Problem, source: StressSource) -
     Raises
     ------
     ValueError
-        If w is not positive or not of period 2π, a slope is not that of w, an integral not that of
-        w, w of a receding edge is smaller, or differs although the law does not pin; or if a law
-        that pins is to act over a range.
+        If w is not positive, not within its bounds, or not of period 2π, a slope is not that of w,
+        an integral not that of w, w of a receding edge is smaller, or differs although the law does
+        not pin; or if a law that pins is to act over a range.
     """
     if adhesion.pins and np.isfinite(problem.strength):
         raise ValueError("the law of adhesion pins edges: it cannot act over a range, too")
     step = _STEP * 2 * np.pi / source.top
-    theta = 2 * np.pi * np.arange(_PLACES) / _PLACES + 1.0 / source.top
+    theta = _PLACES
+    stretch = np.sqrt(1 + problem.profile.at(theta / problem.profile.q0, 1) ** 2)
     works = []
     for recedes in (False, True):
         how = "recedes" if recedes else "advances"
@@ -51,6 +85,11 @@ def check_adhesion(adhesion: Adhesion, problem: Problem, source: StressSource) -
         as_returned = np.abs((later - before) / (2 * step) - slope) < near * source.top
         for holds, rule in (
             (work > 0, "must be positive"),
+            (work > adhesion.least - near, f"must be at least {adhesion.least:g}, its least"),
+            (
+                work < adhesion.largest * stretch + near,
+                f"must be at most {adhesion.largest:g}, its largest, times sqrt(1 + h'²)",
+            ),
             (np.abs(next_period - work) < near, "must have the period 2π"),
             (as_returned, "must have the slope that work returns with it"),
             (

@@ -25,6 +25,7 @@ from adhesis.solver._kernels import (
     solve_field,
 )
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.adhesion import ASYMMETRIC, Symmetry
 from adhesis.solver.sharp.field.gap_field import GapField, check_definite
 from adhesis.solver.sharp.gap.ends import move_edges
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -149,8 +150,10 @@ class EdgeMechanics:
         tolerance: float,
         device: LoadingDevice = FIXED_SEPARATION,
         adhesion: Adhesion | None = None,
+        symmetry: Symmetry = ASYMMETRIC,
     ) -> None:
         self.source, self.critical, self.tolerance = source, critical, tolerance
+        self.symmetry = symmetry
         self.adhesion = adhesion or ProfileAdhesion(source.panels)
         self.wave = 2 * np.pi / source.top
         self.newton_tolerance = min(NEWTON_TOLERANCE, BY_FIELD * tolerance) * self.wave

@@ -29,7 +29,7 @@ from adhesis.solver.method import (
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
-from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion
+from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion, symmetry_of
 from adhesis.solver.sharp.continuation.branch import Resolution, Target
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import Event, History
@@ -146,11 +146,11 @@ class SharpMethod(Method):
             tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance, problem.measure, problem.pattern)
         device = loading_device(problem)
-        if adhesion is None:
-            adhesion = adhesion_of(problem, source)
-        else:
+        if adhesion is not None:
             check_adhesion(adhesion, problem, source)
-        self.edges = EdgeMechanics(source, critical, tolerance, device, adhesion)
+        symmetry = symmetry_of(problem, adhesion)
+        law = adhesion or adhesion_of(problem, source)
+        self.edges = EdgeMechanics(source, critical, tolerance, device, law, symmetry)
         self.states = States(problem, self.edges)
         limit = max(FIELD_RESOLVES * tolerance, ROUNDING)
         self.resolution = Resolution(

@@ -241,7 +241,8 @@ def test_a_mode_that_has_softened_is_left_like_one_that_is_unstable():
     assert step(1e-6, 0.0) is None
     assert step(1e-2, 1e-3) is None
     np.testing.assert_allclose(step(1e-6, 1e-3), step(-1e-6, 0.0), atol=1e-12)
-    np.testing.assert_allclose(step(-1e-6, 0.0), [0.1, -0.1], atol=1e-12)
+    # the leading edge is ahead
+    np.testing.assert_allclose(step(-1e-6, 0.0), [0.1, -0.1 / 1.001], atol=1e-12)
 
 
 def test_grid_leaves_equal_crests_as_sharp_does_and_a_coarse_one_tells_what_it_misses():

@@ -1,11 +1,12 @@
 """A law of edges that is written here alone: what the contract in ``edge_law.hpp`` promises."""
 
+import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, run_loop, single_wave
+from adhesis import HalfSpace, Problem, Profile, run_loop, single_wave, stripes
 from adhesis.solver._kernels import PythonAdhesion
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.method import SharpMethod
@@ -45,6 +46,19 @@ def test_a_law_of_its_own_meets_its_closed_form(ratio: float) -> None:
     assert abs(loop.audit_residual) < 1e-5
 
 
+def test_a_method_with_a_law_of_its_own_is_pickled_with_it() -> None:
+    own = TwoWorks(1.5)
+    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
+    method = SharpMethod(problem, adhesion=own.law)
+    copy = pickle.loads(pickle.dumps(method))
+    one, other = (run_loop(m, max_penetration=0.5, load_steps=5) for m in (method, copy))
+    assert other.loss == one.loss
+    assert copy.edges.adhesion.largest == 1.5
+    law = PythonAdhesion(False, 1.0, 1.0, lambda a, r: (1.0, 0.0), lambda a, r: a)
+    with pytest.raises((pickle.PicklingError, AttributeError), match="lambda"):
+        pickle.dumps(SharpMethod(problem, adhesion=law))
+
+
 def test_an_error_of_a_law_is_raised_where_the_path_is_followed() -> None:
     own = TwoWorks(1.0)
 
@@ -72,15 +86,50 @@ def wavy_up_to(theta: float, recedes: bool) -> float:
     return float(theta + 0.5 - 0.5 * np.cos(theta))
 
 
+def wavy_above(theta: float, recedes: bool) -> tuple[float, float]:
+    """Return w that varies about a larger mean, and its slope."""
+    work, slope = wavy(theta, recedes)
+    return work + 0.8, slope
+
+
+def wavy_above_up_to(theta: float, recedes: bool) -> float:
+    """Integrate w that varies about a larger mean."""
+    return wavy_up_to(theta, recedes) + 0.8 * theta
+
+
 def test_a_law_that_keeps_its_contract_is_taken() -> None:
     problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
     SharpMethod(problem, adhesion=PythonAdhesion(False, 0.5, 1.5, wavy, wavy_up_to))
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.5])
+def test_equal_parts_and_mirror_images_are_those_that_a_law_of_its_own_shares(phase: float) -> None:
+    """Both crests were taken to be alike, and to touch at once, although adhesion tells them."""
+
+    def work(theta: float, recedes: bool) -> tuple[float, float]:
+        return 1 + 0.3 * np.cos(theta + phase), -0.3 * np.sin(theta + phase)
+
+    def up_to(theta: float, recedes: bool) -> float:
+        return float(theta + 0.3 * (np.sin(theta + phase) - np.sin(phase)))
+
+    profile = Profile(PERIOD, np.array([0, 0, 0.5 * A]))
+    law = PythonAdhesion(False, 0.7, 1.3, work, up_to)
+    pattern = stripes(1, 0.3, phase)
+    own = SharpMethod(Problem(profile, SOLID, GAMMA, measure="flat"), adhesion=law)
+    usual = SharpMethod(Problem(profile, SOLID, GAMMA, measure="flat", pattern=pattern))
+    assert own.edges.symmetry.parts == usual.edges.symmetry.parts == 1
+    np.testing.assert_array_equal(own.edges.symmetry.axes, usual.edges.symmetry.axes)
+    one, other = (run_loop(m, max_penetration=0.5, load_steps=10) for m in (own, usual))
+    assert [jump.kind for jump in one.jumps] == [jump.kind for jump in other.jumps]
+    assert one.loss == pytest.approx(other.loss, rel=1e-9)
 
 
 @pytest.mark.parametrize(
     ("work", "up_to", "pins", "rule"),
     [
         (lambda a, r: (np.sin(a), np.cos(a)), lambda a, r: 1 - np.cos(a), False, "be positive"),
+        (wavy_above, wavy_above_up_to, False, "be at most 2, its largest"),
+        (lambda a, r: (wavy(a, r)[0] - 0.2, wavy(a, r)[1]), wavy_up_to, False, "be at least 0.5"),
         (lambda a, r: (1 + 0.01 * a, 0.01), lambda a, r: a + 5e-3 * a**2, False, "period 2π"),
         (lambda a, r: (wavy(a, r)[0], 0.0), wavy_up_to, False, "slope"),
         (wavy, lambda a, r: a, False, "derivative of work_up_to"),

@@ -110,6 +110,16 @@ def test_states_come_in_the_order_of_the_path_at_any_accuracy():
     assert audits[2] < audits[1] / 3
 
 
+def test_a_branch_that_is_steep_but_does_not_fold_has_no_jump():
+    """Where it lost 3e-4 of the contact over one smallest step a jump of 3e-9 J/m² was recorded."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=10, seed=3, h_rms=1e-6)
+    coarse, fine = (
+        loop(profile, 0.0025, max_penetration=0.9, load_steps=40, accuracy=accuracy)
+        for accuracy in (1e-2, 1e-3)
+    )
+    assert [jump.kind for jump in coarse.jumps] == [jump.kind for jump in fine.jumps]
+
+
 @pytest.mark.parametrize("alpha", [0.01, 0.03, 0.05, 0.1, 0.3, 0.6])
 def test_the_loss_is_as_accurate_as_asked_for_and_its_error_is_told(alpha):
     """Single wave, weak adhesion included: within the accuracy, and within the reported error."""

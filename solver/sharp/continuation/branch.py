@@ -316,7 +316,7 @@ class StableBranch:
         conjugate = here - h_max if load else here
         scale = max(abs(conjugate), QUIET_STRESS * h_max)
         change = abs(way) * abs(point.slope - output.slope)
-        if self._edges.source.is_patterned or self._edges.pins:
+        if self._edges.adhesion.least < self._edges.adhesion.largest:
             change = max(change, *(abs(here - before - way * p.slope) for p in (output, point)))
         return float(change / 12 / (self._resolution.bend * scale))
 

@@ -248,7 +248,8 @@ def leaving_step(hessian: Array, limit: Array, order: Array, balanced: float = 0
 
     One edge leads, outwards; it is the one that moves most freely in these modes, of equal ones the
     first in ``order`` (positions). Where symmetry makes several modes equally soft, the step is the
-    leading edge's projection on all of them: which of equivalent edges leads does not matter.
+    leading edge's projection on all of them: which of equivalent edges leads does not matter. It
+    goes ahead a little: a symmetry that is left is no ridge, on which rounding would decide.
     """
     with one_thread():
         values, vectors = np.linalg.eigh(hessian)
@@ -258,5 +259,7 @@ def leaving_step(hessian: Array, limit: Array, order: Array, balanced: float = 0
     soft = vectors[:, values <= min(values[0] + EQUAL * largest, balanced * largest)]
     freedom = (soft**2).sum(axis=1)
     equal = np.flatnonzero(freedom > (1 - EQUAL) * freedom.max())
-    step = soft @ soft[equal[np.argmin(order[equal])]]
+    leading = equal[np.argmin(order[equal])]
+    step = soft @ soft[leading]
+    step[leading] *= 1 + EQUAL
     return np.asarray(step / np.abs(step / limit).max())

@@ -267,7 +267,8 @@ class Follower:
         event = Event(before, fold.d, point.gaps, start, late=way, orders=orders)
         jump = self.jumps.compute(event, target.direction)
         after, drop = jump.states[-1], jump.jump.energy_drop
-        allowed = self.resolution.late * max(drop, self.resolution.least_drop)
+        # a branch that is steep, and does not fold, falls by half of the work that it is late by
+        allowed = min(self.resolution.late * max(drop, self.resolution.least_drop), drop)
         if jump.misplaced > allowed and located > self.resolution.field_limit:
             return None
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))

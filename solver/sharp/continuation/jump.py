@@ -106,9 +106,7 @@ class Jumps:
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
-        problem = states.problem
-        axes = problem.profile.q0 * problem.mirror_axes
-        self.symmetry = SymmetryCheck(edges, axes, problem.equal_parts)
+        self.symmetry = SymmetryCheck(edges)
         self.descents = Descents(edges, states)
         self._first: tuple[float, list[Touch]] | None = None
 
@@ -272,13 +270,11 @@ class SymmetryCheck:
 
     The mirror image of their end is another end with the same energy: which of the two is reached
     is a convention (docs/methods.md, rule 7).
-
-    ``axes`` are those about which the profile is its own mirror image, in θ; the period consists of
-    so many equal ``parts``.
     """
 
-    def __init__(self, edges: EdgeMechanics, axes: Array, parts: int) -> None:
-        self._near, self._axes = OTHER_MINIMUM * edges.wave, axes
+    def __init__(self, edges: EdgeMechanics) -> None:
+        parts, self._axes = edges.symmetry
+        self._near = OTHER_MINIMUM * edges.wave
         self._turns = [2 * np.pi * n / parts for n in range(1, parts)]
 
     def is_symmetric(self, gaps: Array) -> bool:

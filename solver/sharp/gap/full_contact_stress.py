@@ -43,8 +43,6 @@ class StressSource:
     ----------
     top : int
         Highest harmonic, of profile and pattern.
-    is_patterned : bool
-        Whether γ varies.
     m2 : float
         Mean square slope.
     sharpest : float
@@ -62,7 +60,6 @@ class StressSource:
     ) -> None:
         top = profile.highest_harmonic
         self.top = max(top, pattern.highest_harmonic) if pattern else top
-        self.is_patterned = pattern is not None
         p = next(nodes for limit, nodes in _NODES if tolerance >= limit)
         count = 1 << int(np.ceil(np.log2(max(2 * self.top + 1, 16))))
         width = 2 * np.pi / count

@@ -171,7 +171,7 @@ class Nucleation:
         equal = self.equal if self.edges.critical > 0 else np.inf
         deepest = np.flatnonzero(over <= min(least + equal, 0.0))
         deepest = deepest[self._first_of_equal(minima.theta[deepest] / self.problem.profile.q0)]
-        if self.edges.critical > 0 and self.problem.equal_parts > 1:
+        if self.edges.critical > 0 and self.edges.symmetry.parts > 1:
             deepest = self._copies_of(int(deepest[0]), minima)
         return [
             Touch(float(minima.theta[i]), float(minima.opening[i]), float(minima.width[i]))
@@ -184,7 +184,7 @@ class Nucleation:
         The error of the field may keep some of them from touching, by less than an overlap that is
         allowed.
         """
-        part = 2 * np.pi / self.problem.equal_parts
+        part = 2 * np.pi / self.edges.symmetry.parts
         near = np.flatnonzero(minima.clearance <= self.tolerance)
         apart = (minima.theta[near] - minima.theta[first] + 0.5 * part) % part - 0.5 * part
         return np.asarray(near[np.abs(apart) < self.edges.longest_step])
@@ -192,8 +192,7 @@ class Nucleation:
     def _first_of_equal(self, position: Array) -> Integers:
         """Choose those of equal touches at which contact begins; without adhesion all."""
         if self.edges.critical > 0:
-            parts = self.problem.equal_parts
-            return self.problem.profile.first_of_equal(position, parts)
+            return self.problem.profile.first_of_equal(position, self.edges.symmetry.parts)
         return np.arange(len(position))
 
     def minimum(self, field: GapField) -> tuple[float, Minima]:
