@@ -352,7 +352,7 @@ void bind_field(nb::module_& m) {
          const std::optional<Integers>& orders) {
         Integers own;
         for (const Gap& gap : map_gaps(gaps)) own.push_back(choose_order(gap, model.digits));
-        return solve_field(gaps, prescribed, orders.value_or(own), 1, model).field;
+        return solve_field(gaps, prescribed, orders.value_or(own), model);
       },
       "gaps"_a, "prescribed"_a, "model"_a, "orders"_a = nb::none(), Unlocked(),
       "Solve the field of gaps, shape (L, 2); `orders` are those of their rules.");

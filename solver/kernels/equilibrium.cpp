@@ -7,32 +7,37 @@ namespace adhesis {
 
 namespace {
 
-// Move the reference of a gap, filled in already, with the potential there; `old` is where it was,
-// with nodes of `old_rule`. Returns whether it has a field.
-bool renew_gap(LinearResponse& response, int k, const Gap& old, const GaussRule& old_rule,
-               double pressure, const EdgeLaw& law) {
+// Put a gap, filled in already, into the tree; returns whether it has a field.
+bool place_gap(LinearResponse& response, int k) {
   const Nodes& nodes = response.nodes;
   Tree& tree = response.tree;
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
-  const int first = nodes.offset[k], m = rule.count;
+  for (int i = 0; i < rule.count; ++i) {
+    const int node = nodes.offset[k] + i;
+    tree.theta[node] = nodes.theta[node];
+    tree.stretch[node] = nodes.weight[node] / rule.weights[i];
+  }
+  tree.runs[k].interval = nodes.gaps[k];
+  tree.runs[k].rank = rule.count;
+  const int square = nodes.square[k];
+  return invert_definite(&response.equations.blocks[square], rule.count,
+                         &response.inverse[square]);
+}
+
+// Move the reference of a gap, placed already, with the potential there; `old` is where it was,
+// with nodes of `old_rule`.
+void renew_gap(LinearResponse& response, int k, const Gap& old, const GaussRule& old_rule,
+               double pressure, const EdgeLaw& law) {
+  const Nodes& nodes = response.nodes;
+  const int first = nodes.offset[k];
   response.about_pressure[k] = pressure;
   Vector known(old_rule.count);
   for (int i = 0; i < old_rule.count; ++i)
     known[i] = response.potential[0][first + i] + pressure * response.potential[1][first + i];
-  for (int i = 0; i < m; ++i) {
-    const int node = first + i;
-    tree.theta[node] = nodes.theta[node];
-    tree.stretch[node] = nodes.weight[node] / rule.weights[i];
-    response.about[node] =
-        tree.stretch[node] * interpolate_potential(old, old_rule, known.data(), nodes.theta[node]);
-  }
-  tree.runs[k].interval = nodes.gaps[k];
-  tree.runs[k].rank = m;
-  const int square = nodes.square[k];
-  if (!invert_definite(&response.equations.blocks[square], m, &response.inverse[square]))
-    return false;
+  for (int node = first; node < first + nodes.size_of(k); ++node)
+    response.about[node] = response.tree.stretch[node] *
+                           interpolate_potential(old, old_rule, known.data(), nodes.theta[node]);
   response.linearise(k, law);
-  return true;
 }
 
 // Place the runs anew whose halves have moved; returns whether there is room for their charges.
@@ -111,9 +116,11 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
   for (int k = 0; k < count; ++k)
     if (changed[k] && has_room) fill_gap(k, 2, nodes, response.equations, model);
   bool renewed = has_room;
-  for (int k = 0; k < count; ++k)
-    if (changed[k] && renewed)
-      renewed = renew_gap(response, k, before[k], gauss_rules()[orders[k]], pressure, law);
+  for (int k = 0; k < count; ++k) {
+    if (!(changed[k] && renewed)) continue;
+    renewed = place_gap(response, k);
+    if (renewed) renew_gap(response, k, before[k], gauss_rules()[orders[k]], pressure, law);
+  }
   if (!(renewed && place_runs_anew(response, changed, model))) {
     // While edges move towards one state, a gap must not lose modes again, or the field's error
     // would drive them to and fro.
@@ -161,18 +168,22 @@ std::optional<LinearResponse> set_up_response(const Vector& ends, double prescri
   orders.resize(gaps.size());
   for (size_t k = 0; k < gaps.size(); ++k)
     orders[k] = std::max(orders[k], choose_order(gaps[k], model.digits));
-  auto [field, factored] = solve_field(ends, prescribed, orders, 2, model);
-  if (!std::isfinite(field.pressure)) return std::nullopt;
-  LinearResponse out(std::move(field.nodes), std::move(field.equations), std::move(factored.tree));
-  out.inverse = std::move(factored.inverse);
-  out.scaled_opening = field.scaled_opening;
-  for (int column = 0; column < 2; ++column)
-    add_scaled(-1, factored.potential[column].data(), out.potential[column].data(),
-               out.tree.size());
-  out.mean = {-factored.load_mean, -field.unit_mean};
-  for (Edge& edge : out.edges) edge.held = law.pins();  // which are pinned is not known yet
+  if (!in_order(gaps)) return std::nullopt;
+  LinearResponse out(Nodes(gaps, std::move(orders), ROOM), model.digits);
   const int count = out.gap_count();
-  for (int k = 0; k < count; ++k) out.linearise_in_current_potential(k, field.pressure, law);
+  for (int k = 0; k < count; ++k) {
+    fill_gap(k, 2, out.nodes, out.equations, model);
+    if (!place_gap(out, k)) return std::nullopt;
+  }
+  for (int run = count; run < out.tree.run_count(); ++run) out.tree.place_charges(run);
+  // solved with all edges held, and linearised there
+  for (Edge& edge : out.edges) edge.held = true;
+  for (int k = 0; k < count; ++k) {
+    out.linearise(k, law);
+    out.displaced.push_back(k);
+  }
+  if (!std::isfinite(out.solve(prescribed, law, model.device).pressure)) return std::nullopt;
+  for (Edge& edge : out.edges) edge.held = law.pins();  // which are pinned is not known yet
   return out;
 }
 

@@ -1,7 +1,6 @@
 #include "field.hpp"
 
 #include "cholesky.hpp"
-#include "tolerances.hpp"
 
 namespace adhesis {
 
@@ -15,8 +14,8 @@ void weigh_inverse(const double* inverse, const GaussRule& rule, double* respons
       response[i * m + j] = rule.weights[i] * inverse[i * m + j] * rule.weights[j];
 }
 
-Tree build_tree(const Nodes& nodes, double digits, double room) {
-  Tree tree(nodes, digits, room);
+Tree build_tree(const Nodes& nodes, double digits) {
+  Tree tree(nodes, digits);
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const Vector& w = gauss_rules()[nodes.orders[k]].weights;
     for (int i = 0; i < nodes.size_of(k); ++i) {
@@ -40,20 +39,19 @@ Vector apply_inverse(const Nodes& nodes, const Vector& inverse, const Vector& x)
   return out;
 }
 
-// Apply (B + G)⁻¹ to a load; `potential` receives what the gaps do to each other then.
-Vector solve_load(const Nodes& nodes, const FactoredGaps& gaps, const Vector& weights,
-                  const Vector& load, Vector& potential) {
-  const Tree& tree = gaps.tree;
+// Apply (B + G)⁻¹ to a load.
+Vector solve_load(const Nodes& nodes, const Vector& inverse, const Tree& tree,
+                  const Vector& weights, const Vector& load) {
   const int n = nodes.size();
   Charges charges(tree.size());
-  potential.resize(tree.size());
-  Vector solved = apply_inverse(nodes, gaps.inverse, load);
+  Vector potential(tree.size());
+  Vector solved = apply_inverse(nodes, inverse, load);
   for (int i = 0; i < n; ++i) charges.isolated[i] = weights[i] * solved[i];
   for (int run = tree.count; run < tree.run_count(); ++run) tree.charge(run, charges);
   tree.pass_down(Flags(tree.run_count(), true), {&charges, 1}, {&potential, 1});
   Vector rest(n);
   for (int i = 0; i < n; ++i) rest[i] = load[i] - weights[i] * potential[i];
-  return apply_inverse(nodes, gaps.inverse, rest);
+  return apply_inverse(nodes, inverse, rest);
 }
 
 }  // namespace
@@ -71,8 +69,8 @@ Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equat
   return out;
 }
 
-SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders,
-                        int load_count, const Model& model) {
+Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
+                  const Model& model) {
   const std::vector<GaussRule>& rules = gauss_rules();
   std::vector<Gap> gaps = map_gaps(ends);
   const int count = int(gaps.size());
@@ -82,35 +80,28 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
     for (int e = 0; e < 2 * count; ++e) any[e] = e * pi / count;
     gaps = map_gaps(any);
   }
-  SolvedField out{Field(model), {}};
-  Field& field = out.field;
-  const double room = load_count == 2 ? ROOM : 1;
-  field.nodes = Nodes(gaps, orders, room);
+  Field field(model);
+  field.nodes = Nodes(gaps, orders);
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
   const int n = nodes.size();
-  out.factored.inverse.resize(nodes.square.back());
+  Vector inverse(nodes.square.back());
   for (int k = 0; k < count; ++k) {
-    fill_gap(k, load_count, field.nodes, field.equations, model);
+    fill_gap(k, 1, field.nodes, field.equations, model);
     const int at = nodes.square[k];
-    solvable &=
-        invert_definite(&field.equations.blocks[at], nodes.size_of(k), &out.factored.inverse[at]);
+    solvable &= invert_definite(&field.equations.blocks[at], nodes.size_of(k), &inverse[at]);
   }
-  out.factored.tree = build_tree(nodes, model.digits, room);
-  Tree& tree = out.factored.tree;
+  Tree tree = build_tree(nodes, model.digits);
   Vector weights(n);
   for (int k = 0; k < count; ++k) {
     const GaussRule& rule = rules[nodes.orders[k]];
     std::copy(rule.weights.begin(), rule.weights.end(), weights.begin() + nodes.offset[k]);
-    weigh_inverse(&out.factored.inverse[nodes.square[k]], rule,
-                  &tree.response[tree.runs[k].response]);
+    weigh_inverse(&inverse[nodes.square[k]], rule, &tree.response[tree.runs[k].response]);
   }
   for (int run = count; run < tree.run_count(); ++run) tree.factor(run);
-  Pair& potential = out.factored.potential;
-  field.solved = {solve_load(nodes, out.factored, weights, field.equations.load, potential[0]),
-                  solve_load(nodes, out.factored, weights, nodes.weight, potential[1])};
-  const double load_mean = out.factored.load_mean =
-      dot(nodes.weight.data(), field.solved[0].data(), n);
+  field.solved = {solve_load(nodes, inverse, tree, weights, field.equations.load),
+                  solve_load(nodes, inverse, tree, weights, nodes.weight)};
+  const double load_mean = dot(nodes.weight.data(), field.solved[0].data(), n);
   field.unit_mean = dot(nodes.weight.data(), field.solved[1].data(), n);
   auto [weight, compliance] = model.device;
   field.resistance = weight * field.unit_mean + 2 * pi * compliance;
@@ -123,7 +114,7 @@ SolvedField solve_field(const Vector& ends, double prescribed, const Integers& o
   for (int i = 0; i < n; ++i)
     field.scaled_opening[i] = -field.solved[0][i] - field.pressure * field.solved[1][i];
   field.opening = edge_openings(field.scaled_opening, nodes, field.equations, true);
-  return out;
+  return field;
 }
 
 Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,

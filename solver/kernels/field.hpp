@@ -23,23 +23,9 @@ struct Field {
   explicit Field(const Model& model) : model(model) {}
 };
 
-// The tree of a field with its edges held, and what it was made of.
-struct FactoredGaps {
-  Vector inverse;  // of the diagonal blocks
-  Tree tree;
-  Pair potential;        // of the gaps on each other by the loads S~ and X
-  double load_mean = 0;  // Xᵀ (B + G)⁻¹ S~
-};
-
-struct SolvedField {
-  Field field;
-  FactoredGaps factored;
-};
-
-// Solve the field of gaps with these ends; with two loads those of S' are computed, too, and
-// there is room for more nodes.
-SolvedField solve_field(const Vector& ends, double prescribed, const Integers& orders,
-                        int load_count, const Model& model);
+// Solve the field of gaps with these ends.
+Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
+                  const Model& model);
 
 // Solve every gap by itself in the potential of the others, G = g dθ/dη at the nodes of nearby
 // gaps. The pressure is corrected, so that d has the prescribed value to rounding.

@@ -76,8 +76,8 @@ void load_gap(const LinearResponse& response, int k, const GaussRule& rule, Spac
 
 }  // namespace
 
-LinearResponse::LinearResponse(Nodes given, Equations given_equations, Tree given_tree)
-    : nodes(std::move(given)), equations(std::move(given_equations)), tree(std::move(given_tree)) {
+LinearResponse::LinearResponse(Nodes given, double digits)
+    : nodes(std::move(given)), equations(allocate_equations(nodes)), tree(nodes, digits, ROOM) {
   const int count = nodes.gap_count(), n = nodes.size();
   inverse.resize(nodes.square.back());
   charges.fill(Charges(tree.size()));

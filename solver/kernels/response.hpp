@@ -69,7 +69,8 @@ struct LinearResponse {
   Integers displaced;
   Flags is_stale;   // whether a gap's edges have to be eliminated anew, before the next solution
 
-  LinearResponse(Nodes nodes, Equations equations, Tree tree);
+  // Allocate the response of gaps with these nodes, which have room as its tree has.
+  LinearResponse(Nodes nodes, double digits);
 
   int gap_count() const { return nodes.gap_count(); }
 

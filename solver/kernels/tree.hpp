@@ -62,10 +62,8 @@ struct Tree {
   Vector inverse;          // (1 - K12 R2 K21 R1)⁻¹ of all pairs
   Vector inner_potential;  // D of both halves of all pairs
 
-  Tree() = default;
-
   // Allocate the tree of gaps, with room for so many times the charges.
-  Tree(const Nodes& nodes, double digits, double room);
+  explicit Tree(const Nodes& nodes, double digits, double room = 1);
 
   int size() const { return int(theta.size()); }
   int run_count() const { return int(runs.size()); }
