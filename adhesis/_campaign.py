@@ -173,8 +173,8 @@ class Campaign:
             If the file holds another campaign, is damaged, in use or not writable; or the ranks
             cannot be started.
         RuntimeError
-            If the run ended before its last task, by a signal or an error of a rank: what was done
-            is kept, and the same call goes on.
+            If the run ended before its last task, by a signal, an error of a rank or 20 failed
+            tasks: what was done is kept, and the same call goes on.
         ValueError
             If ``ranks`` is out of range.
         TypeError

@@ -133,6 +133,12 @@ def parameter(name: str) -> str:
     return f"--{name.replace('_', '-')}" if _of_a_command.get() else name
 
 
+def option_of_run(name: str) -> str:
+    """Return an option of ``adhesis run`` for which callers from Python have no parameter."""
+    option = f"--{name.replace('_', '-')}"
+    return option if _of_a_command.get() else f"adhesis run {option}"
+
+
 @contextmanager
 def refused_as_input(options: Container[str] = (), **names: str) -> Iterator[None]:
     """Raise what the solver refuses, or an overflow, as an InputError; other errors pass.

@@ -28,6 +28,7 @@ from adhesis.ensemble.report.further_axes import (
 from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached, why_beyond
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import ANY_RANGE
 from adhesis.solver.method import BRANCHES
 
@@ -202,14 +203,18 @@ def agreement(data: Aggregate) -> Iterator[str]:
 
 
 def readings(data: Aggregate) -> Iterator[str]:
-    """Report which campaign is nearest to the paper's table, of this one and those beside it."""
+    """Report which campaign is nearest to the paper's table, of this one and those beside it.
+
+    They are compared over the cells that all of them have.
+    """
     campaigns: tuple[Aggregate | Companion, ...] = (data, *data.companions)
-    found = ((_deviations(one.cells), one.path.name) for one in campaigns)
-    nearest = sorted((_rms(off), name, len(off)) for off, name in found if off)
-    if len(nearest) > 1:
-        listing = "; ".join(
-            f"{name} {100 * rms:.1f} % ({count} values)" for rms, name, count in nearest
-        )
+    found = [(off, one.path.name) for one in campaigns if (off := _deviations(one.cells))]
+    if len(found) < 2:
+        return
+    if shared := set.intersection(*(set(off) for off, _ in found)):
+        nearest = sorted((_rms([off[point] for point in shared]), file) for off, file in found)
+        count = counted(len(shared), "value")
+        listing = "; ".join(f"{file} {100 * rms:.1f} % ({count})" for rms, file in nearest)
         yield (
             f"Nearest to the paper's Table 1: {nearest[0][1]} (root mean square deviation: "
             f"{listing})."
@@ -314,7 +319,7 @@ def _limit(data: Aggregate) -> Iterator[str]:
 
 
 def _table_1(data: Aggregate) -> Iterator[str]:
-    found = _deviations(data.cells)
+    found = list(_deviations(data.cells).values())
     if not found:
         return
     known = [verdict for cell in data.cells if (verdict := inside_interval(cell)) is not None]
@@ -326,9 +331,10 @@ def _table_1(data: Aggregate) -> Iterator[str]:
     )
 
 
-def _deviations(cells: Sequence[Cell]) -> list[float]:
-    """Relative deviations of the mean W~ from the values that the paper gives."""
-    return [found for cell in cells if (found := off_the_paper(cell)) is not None]
+def _deviations(cells: Sequence[Cell]) -> dict[tuple[float, ...], float]:
+    """Relative deviations of the mean W~ from the values that the paper gives, by place of cell."""
+    known = ((tuple(cell.at.values()), off_the_paper(cell)) for cell in cells)
+    return {point: off for point, off in known if off is not None}
 
 
 def _slopes(data: Aggregate) -> Iterator[str]:

@@ -652,6 +652,10 @@ def test_the_reading_nearest_to_the_paper_is_named(file, data, tmp_path):
         if h < 0.9
     ]
     assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(found))):.1f} %" in sentence
+    with h5py.File(wider, "r+") as unfinished:  # both are compared over what both have
+        unfinished["status"][-5:] = 0
+    (sentence,) = findings.readings(aggregate(file, [wider, other]))
+    assert len(re.findall(r"\(4 values\)", sentence)) == 2
 
 
 def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):

@@ -378,10 +378,13 @@ def _from_table(
     names: Sequence[Sequence[str]]
     lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
+        _refuse_empty_rows(name, table.lines)
         columns, names, lines = _row_of_map(name, table, row, notes), (), None
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
         columns, lines = _scan_line(name, columns, lines, row, notes)
+        if len(columns) == 1:
+            _refuse_empty_rows(name, lines)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -432,8 +435,6 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
-    if len(columns) == 1 and table.left_out:
-        notes.append(f"{counted(table.left_out, 'empty row')} left out")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
@@ -499,6 +500,17 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     check_row(name, row, table.columns.shape[1])
     notes.append(f"row {row} of {table.columns.shape[1]}, of {len(table.filled)} heights each")
     return table.columns[list(table.filled), row].reshape(1, -1)
+
+
+def _refuse_empty_rows(name: str, lines: Array) -> None:
+    """Refuse rows that have their places by their order alone, and empty ones here and there."""
+    apart = np.diff(lines)
+    if apart.size and apart.min() < apart.max():
+        empty = lines[np.argmax(apart > apart.min())] + 1
+        raise InputError(
+            f"line {empty} of {name} has empty fields alone, and the rows have no positions: write "
+            "NaN into its fields if it is one of them, or else remove it"
+        )
 
 
 def _scan_line(

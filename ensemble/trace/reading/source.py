@@ -131,7 +131,7 @@ class Source:
         """
         with self._reading() as stream:
             begin = stream.read(_BEGIN)
-        if not begin.strip():
+        if not begin.strip() and not self.read().strip():
             raise InputError(f"{self} is empty")
         for magic, (what, program) in _NO_TRACES.items():
             if begin.startswith(magic):

@@ -74,7 +74,6 @@ class Table:
     decimal: str
     # Lines of a single column that are empty, each a missing height
     empty_lines: tuple[int, ...] = ()
-    left_out: int = 0  # rows of empty fields between the others, which are no rows
 
     @property
     def form(self) -> str:
@@ -225,7 +224,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     places = _block(reader, start)
     _refuse_numbers_outside(reader, start, places[-1])
     filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
-    block, places = places, _without_empty_rows(reader, places, len(filled))
+    places = _without_empty_rows(reader, places, len(filled))
     rows = [reader.rows[place] for place in places]
     columns = [[row.fields[k] for row in rows] for k in filled]
     if not is_given:
@@ -250,7 +249,6 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         delimiter=delimiter,
         decimal=decimal,
         empty_lines=tuple(place + 1 for place in places if not lines[place].strip()),
-        left_out=len(block) - len(places),
     )
 
 
