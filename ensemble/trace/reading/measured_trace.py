@@ -378,13 +378,13 @@ def _from_table(
     names: Sequence[Sequence[str]]
     lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
-        _refuse_empty_rows(name, table.lines)
+        _check_empty_rows(name, table.lines, notes)
         columns, names, lines = _row_of_map(name, table, row, notes), (), None
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
         columns, lines = _scan_line(name, columns, lines, row, notes)
         if len(columns) == 1:
-            _refuse_empty_rows(name, lines)
+            _check_empty_rows(name, lines, notes)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -502,13 +502,17 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     return table.columns[list(table.filled), row].reshape(1, -1)
 
 
-def _refuse_empty_rows(name: str, lines: Array) -> None:
-    """Refuse rows that have their places by their order alone, and empty ones here and there."""
-    apart = np.diff(lines)
-    if apart.size and apart.min() < apart.max():
-        empty = lines[np.argmax(apart > apart.min())] + 1
+def _check_empty_rows(name: str, lines: Array, notes: list[str]) -> None:
+    """Refuse empty rows here and there between rows whose places are known by their order alone."""
+    empty = np.diff(lines) - 1
+    if not empty.any():
+        return
+    if empty.min() == empty.max():
+        notes.append(f"{counted(int(empty.sum()), 'empty row')} left out")
+    else:
+        line = lines[np.argmax(empty > empty.min())] + 1
         raise InputError(
-            f"line {empty} of {name} has empty fields alone, and the rows have no positions: write "
+            f"line {line} of {name} has empty fields alone, and the rows have no positions: write "
             "NaN into its fields if it is one of them, or else remove it"
         )
 
