@@ -247,7 +247,8 @@ def _key(name: object) -> str:
 
 
 def _value(where: str, value: Any, depth: int = 0) -> str:
-    if hasattr(value, "tolist"):  # numbers and arrays of NumPy
+    # Numbers and arrays of NumPy, but not those that carry a unit, which would be lost.
+    if hasattr(value, "tolist") and not checks.carries_unit(value):
         value = value.tolist()
     if isinstance(value, bool):
         return str(value).lower()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -296,8 +297,7 @@ def load_array(source: Source) -> Array:
 
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
-    if checks.carries_unit(values):
-        raise TypeError(f"{name} carries a unit, which would be lost: give plain numbers")
+    _refuse_units(name, values)
     try:
         array = np.ma.asarray(values)
     except ValueError as error:
@@ -309,6 +309,16 @@ def _numbers(name: str, values: Any) -> Array:
         )
     with np.errstate(over="ignore"):  # a longer float that overflows is refused as not finite
         return np.asarray(np.ma.filled(array.astype(float), np.nan))
+
+
+def _refuse_units(name: str, values: Any) -> None:
+    """Refuse an array that carries a unit, and lists, or lists of lists, of these (TypeError)."""
+    entries = [values]
+    for _ in range(3):
+        if any(map(checks.carries_unit, {type(entry): entry for entry in entries}.values())):
+            raise TypeError(f"{name} carries a unit, which would be lost: give plain numbers")
+        lists = (entry for entry in entries if isinstance(entry, list | tuple))
+        entries = list(itertools.chain.from_iterable(lists))
 
 
 def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Table] | None:
@@ -340,6 +350,7 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
     for n, kind in source.dtypes.items():
         if kind.kind in "bcmM":  # which would become numbers of another meaning
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
+    _refuse_units("the table", source.select_dtypes("object").to_numpy().tolist())
     try:
         values = source.to_numpy(dtype=float, na_value=np.nan)
     except (TypeError, ValueError) as error:
