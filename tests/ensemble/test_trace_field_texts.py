@@ -334,6 +334,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
+    "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "delimiter are both"),
+    "decimal commas between commas": (
+        [f"{x},{z}".replace(".", ",") for x, z in PAIRS],
+        {"decimal": ",", "unit": "um"},
+        "line 1 .* '0,000,0,.*', which is no number with a decimal comma",
+    ),
     "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
     "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "'x': it must be one of '.', ','"),
     "a column of words": ([f"{row},yes" for row in TWO], {}, "line 1 .* 'yes', which is no number"),

@@ -342,7 +342,10 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
                 after = (k for k in range(last + 1, place + 1) if k not in reader.rows)
                 end = next(after, last + 1)
                 if end != place:  # removing it would join two blocks
-                    mend = f"numbers follow on line {place + 1}, so keep one trace in a file"
+                    mend = (
+                        f"numbers follow on line {place + 1}, so keep one trace in a file, and "
+                        "write NaN where a height is missing"
+                    )
                 reader.refuse(
                     end, f": it ends the rows of {held} on lines {start + 1} to {last + 1}; {mend}"
                 )
