@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from typing import NoReturn
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.quantities import in_plain_signs
 from adhesis.ensemble.trace.reading.missing_heights import may_be_code
 from adhesis.ensemble.trace.reading.printed_numbers import (
     COMMENT,
@@ -119,11 +119,7 @@ def _lines(source: Source) -> list[str]:
             text = known.decode("cp1252", errors="replace")
     text = text.replace(_MARK, "")  # one of a second file that was appended is no sign of a row
     if not text.isascii():
-        # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
-        # A raised digit or a fraction becomes no digit of the number that it follows.
-        raised = {ord(s): f"^{s}" for s in set(text) if unicodedata.category(s) == "No"}
-        text = text.translate(raised)
-        text = unicodedata.normalize("NFKC", text).translate(_MINUS)
+        text = in_plain_signs(text).translate(_MINUS)
     # A page break is no end of a line: an empty one may be a missing height.
     text = _PAGE_BREAK.sub("", text)
     return re.split(r"\r*\n|\r", text.removesuffix("\n"))
