@@ -162,11 +162,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         ]
         lines += [_group_line(group, further) for group in groups]
     else:
-        lines += [
-            "",
-            f"{len(groups)} cells are too many for a table here: --json lists them, and adhesis "
-            "report writes losses.csv",
-        ]
+        many = f"{len(groups)} cells are too many for a table here"
+        lines += ["", f"{many}: --json lists them, and adhesis report writes losses.csv"]
     if status["under_load"]:
         lines += ["", "losses under a weight: closed at the separation of its fall"]
     if status["preload_not_reached"]:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.by_blocks import fitted_slope
 from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
-from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
@@ -28,7 +27,6 @@ from adhesis.ensemble.report.further_axes import (
 from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached, why_beyond
-from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import ANY_RANGE
 from adhesis.solver.method import BRANCHES
 
@@ -202,25 +200,6 @@ def agreement(data: Aggregate) -> Iterator[str]:
     yield from _spectrum(shown)
 
 
-def readings(data: Aggregate) -> Iterator[str]:
-    """Report which campaign is nearest to the paper's table, of this one and those beside it.
-
-    They are compared over the cells that all of them have.
-    """
-    campaigns: tuple[Aggregate | Companion, ...] = (data, *data.companions)
-    found = [(off, one.path.name) for one in campaigns if (off := _deviations(one.cells))]
-    if len(found) < 2:
-        return
-    if shared := set.intersection(*(set(off) for off, _ in found)):
-        nearest = sorted((_rms([off[point] for point in shared]), file) for off, file in found)
-        count = counted(len(shared), "value")
-        listing = "; ".join(f"{file} {100 * rms:.1f} % ({count})" for rms, file in nearest)
-        yield (
-            f"Nearest to the paper's Table 1: {nearest[0][1]} (root mean square deviation: "
-            f"{listing})."
-        )
-
-
 def quality(data: Aggregate) -> Iterator[str]:
     """Sentences on the error of the losses, and on what the file's shape cut off."""
     audit = _all(data, "audit_residual")
@@ -319,7 +298,7 @@ def _limit(data: Aggregate) -> Iterator[str]:
 
 
 def _table_1(data: Aggregate) -> Iterator[str]:
-    found = list(_deviations(data.cells).values())
+    found = [off for cell in data.cells if (off := off_the_paper(cell)) is not None]
     if not found:
         return
     known = [verdict for cell in data.cells if (verdict := inside_interval(cell)) is not None]
@@ -329,12 +308,6 @@ def _table_1(data: Aggregate) -> Iterator[str]:
         f"here: W~ is off by {100 * min(found):+.1f} % to {100 * max(found):+.1f} %, root mean "
         f"square {100 * _rms(found):.1f} %{here if known else ''}."
     )
-
-
-def _deviations(cells: Sequence[Cell]) -> dict[tuple[float, ...], float]:
-    """Relative deviations of the mean W~ from the values that the paper gives, by place of cell."""
-    known = ((tuple(cell.at.values()), off_the_paper(cell)) for cell in cells)
-    return {point: off for point, off in known if off is not None}
 
 
 def _slopes(data: Aggregate) -> Iterator[str]:

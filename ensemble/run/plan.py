@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
-from adhesis.ensemble.errors import InputError, option_of_run, parameter
+from adhesis.ensemble.errors import InputError, parameter
 from adhesis.ensemble.results.layout import Source, check_space, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
@@ -185,14 +185,11 @@ def prepare(
     if is_new:
         say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
         return plan
+    again_by = parameter("redo", "adhesis run")
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
         f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
-        + (
-            f", {plan.failed} failed before (see {option_of_run('redo')} failed)"
-            if plan.failed
-            else ""
-        )
+        + (f", {plan.failed} failed before (see {again_by} failed)" if plan.failed else "")
     )
     return plan
 

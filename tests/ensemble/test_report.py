@@ -636,28 +636,6 @@ def test_another_largest_penetration_is_compared_with(file, tmp_path):
     assert not (tmp_path / "out" / "beside.csv").exists()
 
 
-def test_the_reading_nearest_to_the_paper_is_named(file, data, tmp_path):
-    factor = 19 / data.finished([0.8], [0.04])[0].estimates["loss_dimensionless"].mean
-    wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 100", "ratio = 200"))
-    other = companion(tmp_path, "other.h5", factor, a=("ratio = 100", "ratio = 30"))
-    data = aggregate(file, [wider, other])
-    (sentence,) = findings.readings(data)
-    names = re.findall(r"(\w+\.h5) [\d.]+ % \(5 values\)", sentence)
-    assert sorted(names) == ["r.h5", "wider.h5"]  # other.h5 is no reading of the paper's
-    found = [
-        data.companions[0].like(data.finished([h], [g])[0]).estimates["loss_dimensionless"].mean
-        / paper.TABLE_1[h, g]
-        - 1
-        for h, g in paper.TABLE_1
-        if h < 0.9
-    ]
-    assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(found))):.1f} %" in sentence
-    with h5py.File(wider, "r+") as unfinished:  # both are compared over what both have
-        unfinished["status"][-5:] = 0
-    (sentence,) = findings.readings(aggregate(file, [wider, other]))
-    assert len(re.findall(r"\(4 values\)", sentence)) == 2
-
-
 def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):
     outcome, statistical, numerical = findings.verdict(data)
     means = [1e3 * cell.estimates["loss"].mean for cell in data.cells]

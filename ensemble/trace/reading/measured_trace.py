@@ -350,7 +350,8 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
     for n, kind in source.dtypes.items():
         if kind.kind in "bcmM":  # which would become numbers of another meaning
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
-    _refuse_units("the table", source.select_dtypes("object").to_numpy().tolist())
+    objects = (k for k, kind in enumerate(source.dtypes) if kind.kind == "O")
+    _refuse_units("the table", [source.iloc[:, k].tolist() for k in objects])
     try:
         values = source.to_numpy(dtype=float, na_value=np.nan)
     except (TypeError, ValueError) as error:
@@ -389,13 +390,12 @@ def _from_table(
     names: Sequence[Sequence[str]]
     lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
-        _check_empty_rows(name, table.lines, notes)
         columns, names, lines = _row_of_map(name, table, row, notes), (), None
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
         columns, lines = _scan_line(name, columns, lines, row, notes)
-        if len(columns) == 1:
-            _check_empty_rows(name, lines, notes)
+    if len(columns) == 1:
+        _check_empty_rows(name, table.lines if lines is None else lines, notes)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
