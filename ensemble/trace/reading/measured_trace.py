@@ -335,6 +335,12 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         source = source[list(names)]
+    apart = np.diff(source.index) if source.index.dtype.kind in "iuf" else np.zeros(0)
+    if len(source.columns) == 1 and not np.allclose(apart, apart[:1], atol=0):
+        raise InputError(
+            "the index of the table leaves rows out, or has another order, and the heights have no "
+            "positions: put the rows in with NaN (reindex), or number them anew (reset_index)"
+        )
     units = source.attrs.get("units", {})
     if not isinstance(units, Mapping):
         raise InputError(
