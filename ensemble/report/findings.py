@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -37,8 +38,14 @@ _STRESS_AND_AREA = ("mean_stress_dimensionless", "contact_fraction")
 
 
 def verdict(data: Aggregate) -> list[str]:
-    """Three sentences: what came out, how well the mean is known, how well each loop is."""
-    return [_outcome(data), _statistical(data), _numerical(data)]
+    """Three sentences: what came out, how well the mean is known, how well each loop is.
+
+    They are on the cells with adhesion; that nothing is lost in others is a sentence of its own.
+    """
+    of_loss = replace(data, cells=tuple(cell for cell in data.cells if cell.work_of_adhesion > 0))
+    found = [of(of_loss) for of in (_outcome, _statistical, _numerical) if of_loss.done]
+    rest = len(of_loss.cells) < len(data.cells)
+    return [*found, "Without adhesion (γ = 0) nothing is lost."] if rest else found
 
 
 def _outcome(data: Aggregate) -> str:
@@ -278,7 +285,8 @@ def _preload(data: Aggregate) -> str:
 
 def _limit(data: Aggregate) -> Iterator[str]:
     """Sentences on the ranges of adhesion below which the zero-range limit holds."""
-    ranges = [(extreme(np.min, cell.least_range), cell.name) for cell in data.cells]
+    adhesive = [cell for cell in data.cells if cell.work_of_adhesion > 0]
+    ranges = [(extreme(np.min, cell.least_range), cell.name) for cell in adhesive]
     found = [(value, name) for value, name in ranges if value is not None]
     if not found:
         return
@@ -355,7 +363,7 @@ def _along(data: Aggregate, axis: Axis) -> Iterator[str]:
 
     Lines with loops short of their preload are left out: their cells are not alike in it.
     """
-    lines = [line for line in lines_along(data, axis) if len(line) > 1]
+    lines = [li for li in lines_along(data, axis) if len(li) > 1 and li[0].work_of_adhesion]
     if not lines:
         return
     moving = together(data, axis)
@@ -397,7 +405,7 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
     if of_paper:
         quantity, what = "loss_dimensionless", "mean W~"
     found: dict[str, list[str]] = {}
-    for gamma in data.works_of_adhesion:
+    for gamma in filter(None, data.works_of_adhesion):
         cells = [c for c in data.cells if c.work_of_adhesion == gamma and c.done > 1]
         if len(cells) > 2:
             cells.sort(key=lambda c: c.estimates["m2"].mean)
@@ -412,7 +420,8 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
 
 
 def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> Iterator[str]:
-    done = [(cell.name, area_ratio(cell)) for cell in data.cells if cell.done]
+    adhesive = (cell for cell in data.cells if cell.done and cell.work_of_adhesion)
+    done = [(cell.name, area_ratio(cell)) for cell in adhesive]
     ratios = [ratio for _, ratio in done if ratio is not None]
     where = "At equal load, on unloading up to the largest tension, the contact is"
     if below := [name for name, ratio in done if ratio is not None and ratio < 1]:

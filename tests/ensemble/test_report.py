@@ -678,6 +678,25 @@ def test_doubtful_losses_and_steep_profiles_are_said(tmp_path):
     assert "γ = 0.01" not in steep
 
 
+def test_a_report_compares_and_doubts_no_loss_without_adhesion(tmp_path):
+    plan = campaign(hurst=(0.7,), gamma=(0.0, 0.02), realisations=4)
+    values = rows(plan)
+    values["audit_residual"][:] = 1e-5
+    none = values["work_of_adhesion"] == 0
+    values["loss"][none] = values["loss_error"][none] = 1e-13
+    values["edge_range"][none] = 0.0
+    values["largest_contact_fraction"][:] = 0.5
+    data = aggregate(write(tmp_path / "r.h5", plan, values))
+    *sentences, last = findings.verdict(data)
+    assert last == "Without adhesion (γ = 0) nothing is lost."
+    assert not any("γ = 0 " in text for text in sentences)
+    assert "at most 0.01 % of it" in sentences[2]
+    assert not any("WARNING" in text or "below 0 nm" in text for text in findings.quality(data))
+    values["status"][~none] = 0
+    data = aggregate(write(tmp_path / "none.h5", plan, values))
+    assert findings.verdict(data) == [last]
+
+
 def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     plan = campaign(hurst=(0.7,), gamma=(0.01, 0.02), realisations=4)
     values = rows(plan)
