@@ -113,10 +113,9 @@ def turning_point(data: Aggregate) -> str:
 
 
 def _loss(cell: Cell) -> str:
-    loss, gamma = cell.estimates["loss"].mean, cell.work_of_adhesion
-    beside = [f"{loss / gamma:.3g} γ"] if gamma > 0 else []
-    beside.append(f"W~ = {cell.estimates['loss_dimensionless'].mean:.3g}")
-    return f"{1e3 * loss:.3g} mJ/m² ({', '.join(beside)}) at {cell.name}"
+    loss, scaled = (cell.estimates[name].mean for name in ("loss", "loss_dimensionless"))
+    over_gamma = f"{loss / cell.work_of_adhesion:.3g} γ"  # of a cell with adhesion
+    return f"{1e3 * loss:.3g} mJ/m² ({over_gamma}, W~ = {scaled:.3g}) at {cell.name}"
 
 
 def _statistical(data: Aggregate) -> str:
