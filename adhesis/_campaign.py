@@ -173,8 +173,8 @@ class Campaign:
             If the file holds another campaign, is damaged, in use or not writable; or the ranks
             cannot be started.
         RuntimeError
-            If the run ended before its last task, by a signal or an error of a rank: what was done
-            is kept, and the same call goes on.
+            If the run ended before its last task, by a signal, an error of a rank or 20 failed
+            tasks: what was done is kept, and the same call goes on.
         ValueError
             If ``ranks`` is out of range.
         TypeError
@@ -247,7 +247,8 @@ def _key(name: object) -> str:
 
 
 def _value(where: str, value: Any, depth: int = 0) -> str:
-    if hasattr(value, "tolist"):  # numbers and arrays of NumPy
+    # Numbers and arrays of NumPy, but not those that carry a unit, which would be lost.
+    if hasattr(value, "tolist") and not checks.carries_unit(value):
         value = value.tolist()
     if isinstance(value, bool):
         return str(value).lower()

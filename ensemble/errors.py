@@ -128,9 +128,15 @@ def naming_options() -> Iterator[None]:
         _of_a_command.reset(before)
 
 
-def parameter(name: str) -> str:
-    """Return the name by which a caller gave a parameter: longest_gap, or --longest-gap."""
-    return f"--{name.replace('_', '-')}" if _of_a_command.get() else name
+def parameter(name: str, command: str = "") -> str:
+    """Return the name by which a caller gave a parameter: longest_gap, or --longest-gap.
+
+    Of an option that callers from Python do not have, they get the ``command``, too.
+    """
+    option = f"--{name.replace('_', '-')}"
+    if _of_a_command.get():
+        return option
+    return f"{command} {option}" if command else name
 
 
 @contextmanager

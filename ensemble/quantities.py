@@ -24,6 +24,15 @@ _WORD = r"[^\W\d_]+"
 _QUOTIENT = rf"{_WORD}\s*/\s*{_WORD}(?:\^?2)?"
 
 
+def in_plain_signs(text: str) -> str:
+    """Return a text with plain digits, blanks and units: "㎛" is "μm".
+
+    A raised digit or a fraction ("2² mm") becomes no digit of the number that it follows.
+    """
+    raised = {ord(sign): f"^{sign}" for sign in set(text) if unicodedata.category(sign) == "No"}
+    return unicodedata.normalize("NFKC", text.translate(raised))
+
+
 class Written(float):
     """A number in its SI unit, with the unit in which it was written, for labels."""
 
@@ -67,8 +76,8 @@ class Quantity:
         return {self._compared(name): unit for name, unit in named.items()}
 
     def _compared(self, name: str) -> str:
-        """Return a name in the form in which names are compared; ㎛ is one sign for µm."""
-        name = unicodedata.normalize("NFKC", name).strip().replace("^2", "2")
+        """Return a name in the form in which names are compared."""
+        name = in_plain_signs(name).strip().replace("^2", "2")
         name = re.sub(r"\s*/\s*", "/", name)
         return name.lower() if self.others else name
 
@@ -102,9 +111,7 @@ class Quantity:
     def read_with_unit(self, text: str) -> Written:
         """Read a number with a unit, "2 mm" (InputError; UnitError for another unit)."""
         named = _QUOTIENT if "/" in self.unit else _WORD
-        found = re.fullmatch(
-            rf"{_NUMBER}({named})\s*", unicodedata.normalize("NFKC", text), re.IGNORECASE
-        )
+        found = re.fullmatch(rf"{_NUMBER}({named})\s*", in_plain_signs(text), re.IGNORECASE)
         if not found:
             raise InputError(f"is {quoted(text)}: it must be {self.rule}")
         unit = self.spellings.get(self._compared(found[2]))

@@ -9,7 +9,7 @@ what tests, linters and the optional formats of instruments need besides.
 import re
 import tomllib
 from collections.abc import Iterable
-from importlib.metadata import distribution
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from packaging.requirements import Requirement
@@ -18,8 +18,10 @@ ROOT = Path(__file__).resolve().parent.parent
 # What h5py and the kernels are built with, without isolation.
 BUILD = (
     *("setuptools", "Cython", "pkgconfig", "packaging"),
-    *("scikit_build_core", "nanobind", "cmake", "ninja", "ziglang"),
+    *("scikit_build_core", "nanobind", "cmake", "ninja"),
 )
+# The compiler, which set-up installs only where the system has none: else its version stays.
+COMPILER = "ziglang"
 TEST_EXTRAS = ("dev", "instruments")
 
 
@@ -44,6 +46,15 @@ def closure(names: Iterable[str]) -> dict[str, str]:
     return found
 
 
+def compiler() -> dict[str, str]:
+    """Version of the compiler: the installed one, or that of the list."""
+    try:
+        return closure([COMPILER])
+    except PackageNotFoundError:
+        listed = (ROOT / "requirements.lock").read_text().splitlines()
+        return {COMPILER: next(line for line in listed if line.startswith(f"{COMPILER}=="))}
+
+
 def write(path: Path, versions: dict[str, str]) -> None:
     """Replace the lines of a list, keeping what its head says."""
     head = [line for line in path.read_text().splitlines() if line.startswith("#")]
@@ -54,7 +65,7 @@ def main() -> None:
     """Write both."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    runs = closure([*project["dependencies"], *extras["mpi"], *BUILD])
+    runs = closure([*project["dependencies"], *extras["mpi"], *BUILD]) | compiler()
     tests = closure([text for name in TEST_EXTRAS for text in extras[name]])
     write(ROOT / "requirements.lock", runs)
     write(ROOT / "requirements-test.lock", {k: v for k, v in tests.items() if k not in runs})

@@ -102,7 +102,8 @@ class Cell:
     @property
     def doubtful(self) -> NDArray[np.bool_]:
         """Which done tasks have a doubtful loss by their own account, shape (done,)."""
-        return doubtful(self.values, self.campaign.solver.accuracy)
+        judged = {**self.values, "work_of_adhesion": self.work_of_adhesion}
+        return doubtful(judged, self.campaign.solver.accuracy)
 
     @property
     def doubt(self) -> Array:

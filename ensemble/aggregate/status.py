@@ -23,7 +23,7 @@ from adhesis.ensemble.aggregate.cells import (
     loops_beyond_zero_range,
     read_cells,
 )
-from adhesis.ensemble.campaign.tasks import Tasks
+from adhesis.ensemble.campaign.tasks import WHOLE, Tasks
 from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
@@ -44,6 +44,7 @@ _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 def read_status(path: Path | str) -> dict[str, Any]:
     """Return counts, times and failures of a results file (InputError), the entries of ``--json``.
 
+    ``part`` is the share of the campaign that the file holds ("1/3"), None if it is the whole.
     ``damaged`` rows count as nothing else; ``computed_by`` has the number of done rows by versions
     and processor; ``seconds`` are of a done task. ``groups`` has an entry for each cell (a value of
     each of the ``axes``, in the ``axis_units``) with its counts, its mean time, its mean loss with
@@ -62,7 +63,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         failed = np.flatnonzero(state == FAILED)
         seconds = results.column("wall_time", failed).tolist()
         errors = map(one_line, results.errors(failed))
-        damaged = results.damaged()
+        damaged, part = results.damaged(), results.part
         origins = results.origins()
     times = np.concatenate([cell.values["wall_time"] for cell in cells])
     failures = [
@@ -81,6 +82,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
 
     return {
         "file": str(path),
+        "part": None if part == WHOLE else str(part),
         "tasks": len(state),
         **{name: int(np.sum(state == code)) for name, code in COUNTS.items()},
         "damaged": [_named(tasks, row) for row in damaged.tolist()],
@@ -161,6 +163,9 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
             "    done  pending  failed    mean s  loss in mJ/m² ± standard error of the mean",
         ]
         lines += [_group_line(group, further) for group in groups]
+    else:
+        many = f"{len(groups)} cells are too many for a table here"
+        lines += ["", f"{many}: --json lists them, and adhesis report writes losses.csv"]
     if status["under_load"]:
         lines += ["", "losses under a weight: closed at the separation of its fall"]
     if status["preload_not_reached"]:
@@ -176,7 +181,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
             lines += ["", f"{len(rows)} losses are doubtful: {why}"]
             lines += _listed(rows, about, ": ")
     if status["failures"]:
-        lines += ["", *_failure_lines(status["failures"], status["file"])]
+        lines += ["", *_failure_lines(status["failures"], status["file"], status["part"])]
     return printable("\n".join(lines))
 
 
@@ -230,7 +235,7 @@ def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def _failure_lines(failures: Sequence[Mapping[str, Any]], path: str) -> list[str]:
+def _failure_lines(failures: Sequence[Mapping[str, Any]], path: str, part: str | None) -> list[str]:
     """Return the failures as lines for people, and what is to be done."""
     errors = [f["error"] for f in failures]
     lines = [f"failed {count}×: {error}" for error, count in Counter(errors).most_common(5)]
@@ -239,7 +244,8 @@ def _failure_lines(failures: Sequence[Mapping[str, Any]], path: str) -> list[str
     )
     refused = sum(error.startswith("PathError") for error in errors)  # by the solver: fail again
     if not refused:
-        return [*lines, f"again: adhesis run CAMPAIGN.toml --out {shlex.quote(path)} --redo failed"]
+        options = f"--out {shlex.quote(path)}{f' --part {part}' if part else ''} --redo failed"
+        return [*lines, f"again: adhesis run CAMPAIGN.toml {options}"]
     which = "they fail" if refused == len(errors) else f"{refused} of them fail"
     again = "again if they are computed again: follow the reason given, in a campaign with other"
     return [*lines, f"{which} {again} values"]

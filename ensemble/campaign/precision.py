@@ -128,5 +128,5 @@ def precision_lines(cells: Sequence[tuple[str, Precision]]) -> list[str]:
     listed = [entry for entry in cells if not entry[1].met] if len(cells) > MOST_LISTED else cells
     lines += [f"  {name}: {known}" for name, known in listed[:MOST_LISTED]]
     if len(listed) > MOST_LISTED:
-        lines.append(f"  … and {len(listed) - MOST_LISTED} more (adhesis status lists all)")
+        lines.append(f"  … and {len(listed) - MOST_LISTED} more (adhesis status --json lists all)")
     return lines

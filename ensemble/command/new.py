@@ -6,6 +6,7 @@ It lists every key with its meaning, its rule and its default. An existing file 
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
@@ -33,5 +34,6 @@ def execute(args: argparse.Namespace) -> int:
         return campaign_template().encode()
 
     write_new("FILE.toml", args.file, content)
-    print(f"next        adhesis run {args.file} --dry-run   (its cost; without --dry-run: the run)")
+    file = shlex.quote(f"{args.file}")
+    print(f"next        adhesis run {file} --dry-run   (its cost; without --dry-run: the run)")
     return 0

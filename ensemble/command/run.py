@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -209,20 +210,20 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) ->
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.task.doubt import why_beyond
 
+    status = f"adhesis status {shlex.quote(f'{path}')}"
     log(f"{path}: {summary}")
     if summary.failed:
-        log(f"why they failed, and what to do: adhesis status {path}")
+        log(f"why they failed, and what to do: {status}")
     for line in precision_lines(summary.precisions):
         log(line)
     if summary.doubtful:
         log(
             f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
-            f"more than {100 * campaign.solver.accuracy:g} %, the accuracy asked for "
-            f"(adhesis status {path})"
+            f"more than {100 * campaign.solver.accuracy:g} %, the accuracy asked for ({status})"
         )
     if summary.beyond_limit:
         why = why_beyond(campaign.material.opens)
-        log(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
+        log(f"{summary.beyond_limit} losses are doubtful: {why} ({status})")
     if summary.stopped:
         log(f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {again}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.by_blocks import fitted_slope
 from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
-from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
@@ -38,8 +38,14 @@ _STRESS_AND_AREA = ("mean_stress_dimensionless", "contact_fraction")
 
 
 def verdict(data: Aggregate) -> list[str]:
-    """Three sentences: what came out, how well the mean is known, how well each loop is."""
-    return [_outcome(data), _statistical(data), _numerical(data)]
+    """Three sentences: what came out, how well the mean is known, how well each loop is.
+
+    They are on the cells with adhesion; that nothing is lost in others is a sentence of its own.
+    """
+    of_loss = replace(data, cells=tuple(cell for cell in data.cells if cell.work_of_adhesion > 0))
+    found = [of(of_loss) for of in (_outcome, _statistical, _numerical) if of_loss.done]
+    rest = len(of_loss.cells) < len(data.cells)
+    return [*found, "Without adhesion (γ = 0) nothing is lost."] if rest else found
 
 
 def _outcome(data: Aggregate) -> str:
@@ -107,10 +113,9 @@ def turning_point(data: Aggregate) -> str:
 
 
 def _loss(cell: Cell) -> str:
-    loss, gamma = cell.estimates["loss"].mean, cell.work_of_adhesion
-    beside = [f"{loss / gamma:.3g} γ"] if gamma > 0 else []
-    beside.append(f"W~ = {cell.estimates['loss_dimensionless'].mean:.3g}")
-    return f"{1e3 * loss:.3g} mJ/m² ({', '.join(beside)}) at {cell.name}"
+    loss, scaled = (cell.estimates[name].mean for name in ("loss", "loss_dimensionless"))
+    over_gamma = f"{loss / cell.work_of_adhesion:.3g} γ"  # of a cell with adhesion
+    return f"{1e3 * loss:.3g} mJ/m² ({over_gamma}, W~ = {scaled:.3g}) at {cell.name}"
 
 
 def _statistical(data: Aggregate) -> str:
@@ -201,21 +206,6 @@ def agreement(data: Aggregate) -> Iterator[str]:
     yield from _spectrum(shown)
 
 
-def readings(data: Aggregate) -> Iterator[str]:
-    """Report which campaign is nearest to the paper's table, of this one and those beside it."""
-    campaigns: tuple[Aggregate | Companion, ...] = (data, *data.companions)
-    found = ((_deviations(one.cells), one.path.name) for one in campaigns)
-    nearest = sorted((_rms(off), name, len(off)) for off, name in found if off)
-    if len(nearest) > 1:
-        listing = "; ".join(
-            f"{name} {100 * rms:.1f} % ({count} values)" for rms, name, count in nearest
-        )
-        yield (
-            f"Nearest to the paper's Table 1: {nearest[0][1]} (root mean square deviation: "
-            f"{listing})."
-        )
-
-
 def quality(data: Aggregate) -> Iterator[str]:
     """Sentences on the error of the losses, and on what the file's shape cut off."""
     audit = _all(data, "audit_residual")
@@ -294,7 +284,8 @@ def _preload(data: Aggregate) -> str:
 
 def _limit(data: Aggregate) -> Iterator[str]:
     """Sentences on the ranges of adhesion below which the zero-range limit holds."""
-    ranges = [(extreme(np.min, cell.least_range), cell.name) for cell in data.cells]
+    adhesive = [cell for cell in data.cells if cell.work_of_adhesion > 0]
+    ranges = [(extreme(np.min, cell.least_range), cell.name) for cell in adhesive]
     found = [(value, name) for value, name in ranges if value is not None]
     if not found:
         return
@@ -314,7 +305,7 @@ def _limit(data: Aggregate) -> Iterator[str]:
 
 
 def _table_1(data: Aggregate) -> Iterator[str]:
-    found = _deviations(data.cells)
+    found = [off for cell in data.cells if (off := off_the_paper(cell)) is not None]
     if not found:
         return
     known = [verdict for cell in data.cells if (verdict := inside_interval(cell)) is not None]
@@ -324,11 +315,6 @@ def _table_1(data: Aggregate) -> Iterator[str]:
         f"here: W~ is off by {100 * min(found):+.1f} % to {100 * max(found):+.1f} %, root mean "
         f"square {100 * _rms(found):.1f} %{here if known else ''}."
     )
-
-
-def _deviations(cells: Sequence[Cell]) -> list[float]:
-    """Relative deviations of the mean W~ from the values that the paper gives."""
-    return [found for cell in cells if (found := off_the_paper(cell)) is not None]
 
 
 def _slopes(data: Aggregate) -> Iterator[str]:
@@ -376,7 +362,7 @@ def _along(data: Aggregate, axis: Axis) -> Iterator[str]:
 
     Lines with loops short of their preload are left out: their cells are not alike in it.
     """
-    lines = [line for line in lines_along(data, axis) if len(line) > 1]
+    lines = [li for li in lines_along(data, axis) if len(li) > 1 and li[0].work_of_adhesion]
     if not lines:
         return
     moving = together(data, axis)
@@ -418,7 +404,7 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
     if of_paper:
         quantity, what = "loss_dimensionless", "mean W~"
     found: dict[str, list[str]] = {}
-    for gamma in data.works_of_adhesion:
+    for gamma in filter(None, data.works_of_adhesion):
         cells = [c for c in data.cells if c.work_of_adhesion == gamma and c.done > 1]
         if len(cells) > 2:
             cells.sort(key=lambda c: c.estimates["m2"].mean)
@@ -433,7 +419,8 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
 
 
 def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> Iterator[str]:
-    done = [(cell.name, area_ratio(cell)) for cell in data.cells if cell.done]
+    adhesive = (cell for cell in data.cells if cell.done and cell.work_of_adhesion)
+    done = [(cell.name, area_ratio(cell)) for cell in adhesive]
     ratios = [ratio for _, ratio in done if ratio is not None]
     where = "At equal load, on unloading up to the largest tension, the contact is"
     if below := [name for name, ratio in done if ratio is not None and ratio < 1]:

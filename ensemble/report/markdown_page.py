@@ -63,7 +63,6 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
             "## Beside other campaigns",
             "The same realisations of both campaigns, profile by profile.",
             loss_tables.companions(data).markdown(),
-            _bullets(*findings.readings(data)),
         ]
     out += ["## Loops", *show("loops")]
     if figures.get("fields"):

@@ -68,8 +68,9 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
             _check_campaign(part, campaign, of)
         if there is not None and len(there) != campaign.task_count:
             raise InputError(f"{out} is part {there.part} of its campaign itself")
-        doubts = [doubt for file in opened for doubt in file.doubts()]
-        sources, status = _assign(opened, campaign, there)
+        files = opened if there is None else [there, *opened]
+        doubts = [doubt for file in files for doubt in file.doubts()]
+        sources, status = _assign(files, campaign, there)
         of_file = {*schema.fixed_attributes(campaign), "part", "laid_out"}
         if there is None:
             of_file.add("created")
@@ -100,7 +101,7 @@ def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
 
 
 def _assign(
-    opened: Sequence[Results], campaign: Campaign, there: Results | None
+    files: Sequence[Results], campaign: Campaign, there: Results | None
 ) -> tuple[list[Source], NDArray[np.uint8]]:
     """Decide which file gives which row; return also the status of each row of the merged file.
 
@@ -109,7 +110,7 @@ def _assign(
     status = np.zeros(campaign.task_count, np.uint8)
     giver = np.full(status.size, -1)  # source of each row that is not pending
     sources: list[Source] = []
-    for number, file in enumerate(opened if there is None else (there, *opened)):
+    for number, file in enumerate(files):
         own = file.status()
         if file is not there:  # how many realisations are needed is decided by a run
             own[own == schema.NOT_NEEDED] = schema.PENDING

@@ -185,10 +185,11 @@ def prepare(
     if is_new:
         say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
         return plan
+    again_by = parameter("redo", "adhesis run")
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
         f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
-        + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
+        + (f", {plan.failed} failed before (see {again_by} failed)" if plan.failed else "")
     )
     return plan
 

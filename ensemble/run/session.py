@@ -15,7 +15,7 @@ import h5py
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
-from adhesis.ensemble.errors import WriteError
+from adhesis.ensemble.errors import WriteError, parameter
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
@@ -249,7 +249,8 @@ class _Session:
             return "the walltime ends"
         most = self.options.max_failures
         if most is not None and self._counts.failed_now >= most:
-            return f"{self._counts.failed_now} tasks failed (the limit is --max-failures {most})"
+            limit = f"{parameter('max_failures', 'adhesis run')} {most}"
+            return f"{self._counts.failed_now} tasks failed (the limit is {limit})"
         return None
 
     def _time_left(self) -> float | None:

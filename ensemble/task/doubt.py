@@ -66,10 +66,13 @@ def errors_text(row: Mapping[str, Any]) -> str:
 def doubtful(values: Mapping[str, Any], accuracy: float) -> NDArray[np.bool_]:
     """Return which losses are less accurate than asked for, by their own account, or no numbers.
 
-    ``values`` are numbers or columns of rows, by the names of the results file.
+    ``values`` are numbers or columns of rows, by the names of the results file. Without adhesion
+    nothing is lost, and no accuracy of it is doubted.
     """
     is_known = np.asarray(values["loss_error"]) <= accuracy * np.abs(values["loss"])
-    return np.asarray(~(is_known & (np.abs(values["audit_residual"]) <= accuracy)))
+    is_known &= np.abs(values["audit_residual"]) <= accuracy
+    is_nothing = np.isfinite(values["loss"]) & (np.asarray(values["work_of_adhesion"]) == 0)
+    return np.asarray(~(is_known | is_nothing))
 
 
 def beyond_zero_range(values: Mapping[str, Any]) -> NDArray[np.bool_]:

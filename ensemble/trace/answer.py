@@ -443,6 +443,8 @@ def make_cycle(
     for name, values in (("work_of_adhesion", gammas), (turning, turns)):
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
+        if len(set(values)) < len(values):
+            raise ValueError(f"{name} is {list(values)}: its values must differ")
     for point in turns:
         if cycle.at_preload:
             check_preload(point, control)

@@ -29,7 +29,7 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
             columns = [int(word) for word in args.columns.split(",")]
         except ValueError:
             raise InputError(
-                f"--columns is {args.columns!r}: it must be two whole numbers, as in 1,3"
+                f"--columns is {args.columns!r}: it must be one or two whole numbers, as in 1,3"
             ) from None
     same = {name: getattr(args, name) for name in _OF_READING}
     return read_trace(path, columns=columns, delimiter=delimiter_of(args), **same)

@@ -61,7 +61,7 @@ def _findings(answer: Answer) -> list[tuple[str, str]]:
         text = friction_text(opened, loop["loss"], loop["friction"], varies=varies)
         friction = [("friction", text)]
     doubts = (f"{name} {rounded_percent(share)}" for name, share in answer.loss.doubts.items())
-    return [
+    found = [
         (
             "loss",
             f"{_value(answer.loss, 1e3, 'mJ/m²')}"
@@ -91,6 +91,9 @@ def _findings(answer: Answer) -> list[tuple[str, str]]:
             f"{100 * LEAST:g} %)",
         ),
     ]
+    # Without adhesion the loss is rounding, and so is what changes it.
+    left_out = () if cycle.works_of_adhesion[0] > 0 else ("changes", "doubts")
+    return [entry for entry in found if entry[0] not in left_out]
 
 
 def _largest_changes(answer: Answer) -> str:

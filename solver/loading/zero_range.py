@@ -298,7 +298,8 @@ def beyond_limit(
     exceeds the strength :data:`DOUBTFUL_EXCESS` times. None is where the strength is unknown (NaN).
     """
     loss, gamma = np.asarray(loss), np.asarray(work_of_adhesion)
-    valid_range, strength = np.asarray(valid_range), np.asarray(strength)
+    valid_range, is_limit = np.asarray(valid_range), np.isposinf(strength)
+    strength = np.where(is_limit, np.nan, strength)  # unknown to what follows of a finite one
     spent = np.fmax(gamma, work_of_adhesion_open)
     most = DOUBTFUL_LOSS * spent * np.asarray(largest_contact_fraction)
     short = least_range(valid_range, edge_range, touch_range, turn_range) < DOUBTFUL_RANGE
@@ -307,7 +308,7 @@ def beyond_limit(
     edges = EDGE_SHARE * np.asarray(edge_range)
     long = gamma > strength * least_range(math.inf, edges, touch_range, turn_range)
     opened = exceeded | long | (np.asarray(barrier) > 0)
-    return np.asarray(np.where(np.isposinf(strength), closed, np.isfinite(strength) & opened))
+    return np.asarray(np.where(is_limit, closed, np.isfinite(strength) & opened))
 
 
 _WHAT_A_LONGER_RANGE_DOES = {

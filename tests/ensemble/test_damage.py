@@ -309,7 +309,9 @@ def test_a_merge_takes_a_damaged_row_from_another_file(damage, path, tmp_path):
     assert len(merged.doubts) == 2
     assert "damaged in row 3" in merged.doubts[0]
     assert differences(tmp_path / "all.h5", damage.sound) == []
-    assert merge([other], path).taken == 1  # into the damaged file itself
+    merged = merge([other], path)  # into the damaged file itself
+    assert merged.taken == 1
+    assert [doubt.partition(" is ")[0] for doubt in merged.doubts] == [str(path), str(other)]
     assert differences(path, damage.sound) == []
 
 
@@ -338,7 +340,10 @@ def test_a_row_that_a_run_empties_while_it_is_read_is_not_called_damaged(path, m
 def test_rows_of_several_versions_are_told_apart(tmp_path, monkeypatch):
     toml, path = write_campaign(tmp_path), tmp_path / "r.h5"
     campaign, options = load_campaign(toml), Options(patience=0.0, max_failures=2)
-    run_campaign(campaign, path, options=options, engine=fake_engine("fail=0.8:*:*"))
+    stopped = run_campaign(
+        campaign, path, options=options, engine=fake_engine("fail=0.8:*:*")
+    ).stopped
+    assert stopped == "2 tasks failed (the limit is adhesis run --max-failures 2)"
     assert "versions or processors" not in as_text(read_status(path))
     monkeypatch.setattr("adhesis.ensemble.run.session.processor", lambda: "another")
     summary = run_campaign(campaign, path, options=options, engine=fake_engine(""))

@@ -3,6 +3,7 @@
 import dataclasses
 import hashlib
 import re
+import shlex
 import subprocess
 from pathlib import Path
 
@@ -84,15 +85,15 @@ SAMPLE = "ee3eef042a9a60b37058b75ada90394d5b83ad112bde53187398f61592cdd5e7"
 
 def test_the_sample_is_a_trace_and_the_same_everywhere(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["sample", "t.csv"]) == 0
+    assert main(["sample", "my trace.csv"]) == 0
     shown = capsys.readouterr().out
-    assert hashlib.sha256(Path("t.csv").read_bytes()).hexdigest() == SAMPLE
-    trace = read_trace("t.csv")
+    assert hashlib.sha256(Path("my trace.csv").read_bytes()).hexdigest() == SAMPLE
+    trace = read_trace("my trace.csv")
     assert (trace.points, trace.drop_outs) == (1001, 4)
     assert trace.length == pytest.approx(1e-3)
     following = re.search(r"^next        adhesis (.*)$", shown, re.MULTILINE)
     assert following is not None
-    assert main([*following[1].split(), "--plan"]) == 0
+    assert main([*shlex.split(following[1]), "--plan"]) == 0
     assert "form        tilt and bow subtracted" in capsys.readouterr().out
 
 

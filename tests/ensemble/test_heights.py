@@ -217,6 +217,12 @@ def test_ends_that_do_not_meet_are_warned_of(kind: str) -> None:
     assert "adhesis trace" in sentence
 
 
+def test_the_end_point_of_a_period_is_warned_of() -> None:
+    sentence = heights_warning(np.sin(2 * np.pi * np.arange(201) / 200), "it.csv")
+    assert sentence is not None
+    assert sentence.startswith("the last height of it.csv equals its first: remove it if it is the")
+
+
 def test_no_shift_of_a_periodic_profile_is_warned_of() -> None:
     """The warning compares steps, so that it must not depend on where a period begins."""
     for seed in range(20):

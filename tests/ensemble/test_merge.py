@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.command.main import main
@@ -104,6 +105,12 @@ def test_what_failed_in_one_part_gives_way_to_what_was_done_in_another(tmp_path)
             task = results.tasks()[3]
             loss = fake_result(results.campaign, task)["loss"]
             assert results.column("loss")[3] == loss
+
+
+def test_what_failed_in_a_part_is_computed_again_in_that_part(tmp_path):
+    path = computed(tmp_path / "a b.h5", "2/3", fail=(1,))
+    again = f"again: adhesis run CAMPAIGN.toml --out '{path}' --part 2/3 --redo failed"
+    assert again in as_text(read_status(path)).splitlines()
 
 
 def refused(sources, out) -> str:

@@ -82,10 +82,11 @@ def test_a_quantity_is_read_in_each_of_its_units(quantity: Quantity) -> None:
     assert quantity.read_with_unit(quantity.example) > 0
 
 
-def test_blanks_within_a_unit_make_no_unit_of_it() -> None:
-    for text in ("5 m m", "5 k Pa"):
+def test_blanks_within_a_unit_and_raised_digits_make_no_quantity() -> None:
+    assert LENGTH.read("２．５ ㎛") == 2.5e-6
+    for text in ("5 m m", "5 k Pa", "2² mm", "²2 mm", "2½ mm"):
         with pytest.raises(InputError, match="it must be a"):
-            (LENGTH if "m m" in text else STRESS).read(text)
+            (STRESS if "Pa" in text else LENGTH).read(text)
     with pytest.raises(InputError, match=r"'m m' is no unit of length: it must be one of m, cm"):
         LENGTH.unit_named("m m")
 

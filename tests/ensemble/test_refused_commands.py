@@ -144,7 +144,7 @@ TRACE -> --to is missing: give the directory for the page, or --plan
 TRACE --plan -> states no unit
 TRACE --plan --unit um --columns 3 -> --columns is 3: it must name two of the 2
 TRACE --plan --unit um --columns 2 -> no step with its unit is found in its header: give
-TRACE --plan --unit um --columns x -> --columns is 'x': it must be two whole
+TRACE --plan --unit um --columns x -> --columns is 'x': it must be one or two
 TRACE --plan --unit um --tip-radius 5m -> trusted from 50 µm on (what a tip of
 TRACE --plan --unit um --max-stress 5 -> a weight or a machine?
 TRACE --plan --unit um --stiffness 0 -> (--stiffness 0) needs --max-stress

@@ -636,24 +636,6 @@ def test_another_largest_penetration_is_compared_with(file, tmp_path):
     assert not (tmp_path / "out" / "beside.csv").exists()
 
 
-def test_the_reading_nearest_to_the_paper_is_named(file, data, tmp_path):
-    factor = 19 / data.finished([0.8], [0.04])[0].estimates["loss_dimensionless"].mean
-    wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 100", "ratio = 200"))
-    other = companion(tmp_path, "other.h5", factor, a=("ratio = 100", "ratio = 30"))
-    data = aggregate(file, [wider, other])
-    (sentence,) = findings.readings(data)
-    names = re.findall(r"(\w+\.h5) [\d.]+ % \(5 values\)", sentence)
-    assert sorted(names) == ["r.h5", "wider.h5"]  # other.h5 is no reading of the paper's
-    found = [
-        data.companions[0].like(data.finished([h], [g])[0]).estimates["loss_dimensionless"].mean
-        / paper.TABLE_1[h, g]
-        - 1
-        for h, g in paper.TABLE_1
-        if h < 0.9
-    ]
-    assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(found))):.1f} %" in sentence
-
-
 def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):
     outcome, statistical, numerical = findings.verdict(data)
     means = [1e3 * cell.estimates["loss"].mean for cell in data.cells]
@@ -694,6 +676,25 @@ def test_doubtful_losses_and_steep_profiles_are_said(tmp_path):
     assert "slope exceeds" in steep
     assert "γ = 0.02" in steep
     assert "γ = 0.01" not in steep
+
+
+def test_a_report_compares_and_doubts_no_loss_without_adhesion(tmp_path):
+    plan = campaign(hurst=(0.7,), gamma=(0.0, 0.02), realisations=4)
+    values = rows(plan)
+    values["audit_residual"][:] = 1e-5
+    none = values["work_of_adhesion"] == 0
+    values["loss"][none] = values["loss_error"][none] = 1e-13
+    values["edge_range"][none] = 0.0
+    values["largest_contact_fraction"][:] = 0.5
+    data = aggregate(write(tmp_path / "r.h5", plan, values))
+    *sentences, last = findings.verdict(data)
+    assert last == "Without adhesion (γ = 0) nothing is lost."
+    assert not any("γ = 0 " in text for text in sentences)
+    assert "at most 0.01 % of it" in sentences[2]
+    assert not any("WARNING" in text or "below 0 nm" in text for text in findings.quality(data))
+    values["status"][~none] = 0
+    data = aggregate(write(tmp_path / "none.h5", plan, values))
+    assert findings.verdict(data) == [last]
 
 
 def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):

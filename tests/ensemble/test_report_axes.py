@@ -168,6 +168,8 @@ def test_the_status_has_the_units_of_the_axes(tmp_path):
     heading = next(line for line in as_text(status).splitlines() if "γ in J/m²" in line)
     assert "young in Pa  max_stress in Pa  " in heading
     assert "loss in mJ/m² ± standard error of the mean" in heading
+    many = as_text({**status, "groups": 61 * status["groups"][:1]})
+    assert "61 cells are too many for a table here: --json lists them, and adhesis report" in many
 
 
 def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):

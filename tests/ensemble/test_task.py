@@ -310,8 +310,10 @@ def test_a_loss_is_doubtful_where_it_misses_the_accuracy_asked_for():
         "audit_residual": [0, 0, 2e-3, -2e-3, 0, np.nan, 0],
         "loss_error": [9e-4, 1.1e-3, 0, 0, 0, 0, np.nan],
     }
-    flags = doubtful(values, 1e-3)
+    flags = doubtful(values | {"work_of_adhesion": 0.01}, 1e-3)
     assert flags.tolist() == [False, *6 * [True]]
+    without = doubtful(values | {"work_of_adhesion": 0.0}, 1e-3)  # nothing is lost
+    assert without.tolist() == [bool(np.isnan(loss)) for loss in values["loss"]]
 
 
 @pytest.mark.parametrize(

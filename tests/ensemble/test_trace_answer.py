@@ -264,6 +264,7 @@ def test_without_adhesion_nothing_is_lost_and_no_range_is_doubted() -> None:
     assert abs(answer.loss.value) <= answer.loss.uncertainty
     assert not [text for text in answer.warnings if "known to" in text or "converged" in text]
     assert "without adhesion there is none" in summary(answer)
+    assert not re.search("^(doubts|changes)", summary(answer), re.MULTILINE)
 
 
 @pytest.fixture(scope="module")

@@ -96,6 +96,7 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         for words in ("Messschrittweite", "Pas d'échantillonnage :", "測定ピッチ,", "측정 간격:")
     },
     "ruled comments": (["####", "# x", "####", UM, *TWO], {}),
+    "blank lines before": ([*(5000 * [""]), UM, *TWO], {}),
     "a delimiter before": (["\tx (um)\tz (um)", *(f"\t{x}\t{z}" for x, z in PAIRS)], {}),
     "page breaks": ([f"\f{z}" if k % 60 == 59 else z for k, z in enumerate(ZS)], Z_UM),
 }  # fmt: skip
@@ -168,13 +169,16 @@ def test_a_row_of_words_for_missing_numbers_keeps_its_place(tmp_path: Path) -> N
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [50]
     assert np.array_equal(np.delete(trace.heights, 50), np.delete(Z, 50))
     rows[51] = ";;"
-    trace = read_trace(put(tmp_path / "t.csv", rows), columns=[3], step=STEP)
-    assert trace.points == N - 1
-    assert "1 empty row left out" in trace.notes
+    assert read_trace(put(tmp_path / "t.csv", rows), columns=[2, 3]).points == N
+    with pytest.raises(InputError, match=r"line 52 .* empty fields alone, .* write NaN"):
+        read_trace(tmp_path / "t.csv", columns=[3], step=STEP)
     of_map = [" ".join(ZS[k : k + 40]) for k in range(0, 400, 40)]
     of_map[2] = " ".join(["nan"] * 40)
     trace = read_trace(put(tmp_path / "t.txt", of_map), row=3, unit="um", step=STEP)
     assert np.array_equal(trace.heights, Z[120:160])
+    of_map[2] = ""
+    with pytest.raises(InputError, match=r"line 3 .* empty fields alone, .* write NaN"):
+        read_trace(put(tmp_path / "t.txt", of_map), row=3, unit="um", step=STEP)
     flagged = ["x (um),z (um),valid", *(f"{row},{int(k != 40)}" for k, row in enumerate(TWO))]
     flagged[11] = flagged[11][:-1]  # one row has no flag
     trace = read_trace(put(tmp_path / "t.csv", flagged), columns=[1, 2])
@@ -330,6 +334,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
+    "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "delimiter are both"),
+    "decimal commas between commas": (
+        [f"{x},{z}".replace(".", ",") for x, z in PAIRS],
+        {"decimal": ",", "unit": "um"},
+        "line 1 .* '0,000,0,.*', which is no number with a decimal comma",
+    ),
     "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
     "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "'x': it must be one of '.', ','"),
     "a column of words": ([f"{row},yes" for row in TWO], {}, "line 1 .* 'yes', which is no number"),

@@ -206,6 +206,8 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "words": (WORDS, {"columns": [1, 2]}, InputError, "the table holds more than numbers"),
     "complex": (1j * Z, {"step": STEP}, InputError, "array holds complex128"),
     "a unit of its own": (BOTH.view(WithUnit), {"unit": "mm"}, TypeError, "array carries a unit"),
+    "rows left out": (FRAME["z (um)"].drop(9), {"step": STEP}, InputError, "index .* leaves rows"),
+    "units in a list": (list(BOTH.T.view(WithUnit)), {"unit": "mm"}, TypeError, "array carries a"),
     "a map": (np.zeros((99, 98)), {}, InputError, "array holds 99 × 98 numbers"),
     "a row": (BOTH, {"row": 1}, InputError, "row belongs to files"),
     "a decimal sign": (BOTH, {"decimal": ","}, InputError, "decimal belongs to files"),

@@ -98,6 +98,13 @@ def copied(folder: Path) -> Path:
     return folder / "tools" / "setup.sh"
 
 
+def test_the_list_of_versions_keeps_a_compiler_that_is_not_installed(tmp_path: Path) -> None:
+    lock = copied(tmp_path).with_name("lock.py")
+    subprocess.run([sys.executable, lock], check=True)
+    listed = (tmp_path / "requirements.lock").read_text().splitlines()
+    assert f"ziglang=={locked()['ziglang']}" in listed
+
+
 def test_an_older_python_is_named_before_anything_is_installed(tmp_path: Path) -> None:
     """By set-up; pip refuses it by requires-python."""
     old = tmp_path / "python3.10"

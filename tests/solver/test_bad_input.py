@@ -393,6 +393,7 @@ answer(half_space=1000000.0) -> TypeError: half_space is 1000000.0: it must be a
 answer(work_of_adhesion=-1) -> ValueError: work_of_adhesion is -1.0: it must be 0 or
 answer(work_of_adhesion='0.04') ->
     TypeError: work_of_adhesion is '0.04': it must be a row of numbers
+answer(work_of_adhesion=[0.04, 0.04]) -> ValueError: work_of_adhesion is [0.04, 0.04]: its values
 answer(work_of_adhesion=[]) -> ValueError: work_of_adhesion is empty: it must hold one number
 answer(max_penetration=[0.5, 1.0]) -> ValueError: max_penetration is 1.0: it must be
 answer(processes=-1) -> ValueError: processes is -1: it must be a whole number from 0 to 4096

@@ -109,7 +109,7 @@ def losses(data: Aggregate) -> Table:
         *estimated("energy_at_stake_dimensionless"),
         TableColumn(
             "range_least [m]",
-            lambda cell: extreme(np.min, cell.least_range),
+            lambda cell: extreme(np.min, cell.least_range) if cell.work_of_adhesion else None,
             *("range (nm)", number(unit=1e-9)),
             only_if_any=True,
             note="range: range of adhesion below which the zero-range limit holds (the least of "

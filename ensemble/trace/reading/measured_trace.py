@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -296,8 +297,7 @@ def load_array(source: Source) -> Array:
 
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
-    if checks.carries_unit(values):
-        raise TypeError(f"{name} carries a unit, which would be lost: give plain numbers")
+    _refuse_units(name, values)
     try:
         array = np.ma.asarray(values)
     except ValueError as error:
@@ -309,6 +309,16 @@ def _numbers(name: str, values: Any) -> Array:
         )
     with np.errstate(over="ignore"):  # a longer float that overflows is refused as not finite
         return np.asarray(np.ma.filled(array.astype(float), np.nan))
+
+
+def _refuse_units(name: str, values: Any) -> None:
+    """Refuse an array that carries a unit, and lists, or lists of lists, of these (TypeError)."""
+    entries = [values]
+    for _ in range(3):
+        if any(map(checks.carries_unit, {type(entry): entry for entry in entries}.values())):
+            raise TypeError(f"{name} carries a unit, which would be lost: give plain numbers")
+        lists = (entry for entry in entries if isinstance(entry, list | tuple))
+        entries = list(itertools.chain.from_iterable(lists))
 
 
 def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Table] | None:
@@ -325,6 +335,12 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         source = source[list(names)]
+    apart = np.diff(source.index) if source.index.dtype.kind in "iuf" else np.zeros(0)
+    if len(source.columns) == 1 and not np.allclose(apart, apart[:1], atol=0):
+        raise InputError(
+            "the index of the table leaves rows out, or has another order, and the heights have no "
+            "positions: put the rows in with NaN (reindex), or number them anew (reset_index)"
+        )
     units = source.attrs.get("units", {})
     if not isinstance(units, Mapping):
         raise InputError(
@@ -340,6 +356,8 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
     for n, kind in source.dtypes.items():
         if kind.kind in "bcmM":  # which would become numbers of another meaning
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
+    objects = (k for k, kind in enumerate(source.dtypes) if kind.kind == "O")
+    _refuse_units("the table", [source.iloc[:, k].tolist() for k in objects])
     try:
         values = source.to_numpy(dtype=float, na_value=np.nan)
     except (TypeError, ValueError) as error:
@@ -382,6 +400,8 @@ def _from_table(
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
         columns, lines = _scan_line(name, columns, lines, row, notes)
+    if len(columns) == 1:
+        _check_empty_rows(name, table.lines if lines is None else lines, notes)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -432,8 +452,6 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
-    if len(columns) == 1 and table.left_out:
-        notes.append(f"{counted(table.left_out, 'empty row')} left out")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
@@ -499,6 +517,21 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     check_row(name, row, table.columns.shape[1])
     notes.append(f"row {row} of {table.columns.shape[1]}, of {len(table.filled)} heights each")
     return table.columns[list(table.filled), row].reshape(1, -1)
+
+
+def _check_empty_rows(name: str, lines: Array, notes: list[str]) -> None:
+    """Refuse empty rows here and there between rows whose places are known by their order alone."""
+    empty = np.diff(lines) - 1
+    if not empty.any():
+        return
+    if empty.min() == empty.max():
+        notes.append(f"{counted(int(empty.sum()), 'empty row')} left out")
+    else:
+        line = lines[np.argmax(empty > empty.min())] + 1
+        raise InputError(
+            f"line {line} of {name} has empty fields alone, and the rows have no positions: write "
+            "NaN into its fields if it is one of them, or else remove it"
+        )
 
 
 def _scan_line(

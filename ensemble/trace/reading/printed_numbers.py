@@ -124,7 +124,12 @@ def find_form(
     some = [sign for sign in ";\t|," if any(sign in line for line in sample)]
     signs = [delimiter] if delimiter else sure or [*some, " "]
     read = {}
-    for form in product(signs, [decimal] if decimal else ".,"):
+    # Without quotes a comma is one of both.
+    is_quoted = any('"' in line for line in sample)
+    forms = [form for form in product(signs, decimal or ".,") if is_quoted or form[0] != form[1]]
+    if not forms:
+        raise InputError(f"{parameter('decimal')} and {parameter('delimiter')} are both ','")
+    for form in forms:
         rows = [[value(field, form[1]) for field in split(line, form[0])] for line in sample]
         whole = [tuple(map(repr, row)) for row in rows if None not in row]
         read[form] = (len(whole), sum(v is not None for row in rows for v in row), whole)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import shlex
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -131,12 +132,12 @@ class Source:
         """
         with self._reading() as stream:
             begin = stream.read(_BEGIN)
-        if not begin.strip():
+        if not begin.strip() and not self.read().strip():
             raise InputError(f"{self} is empty")
         for magic, (what, program) in _NO_TRACES.items():
             if begin.startswith(magic):
                 mend = "export the heights as text"
-                mend = f"unpack it first ({program} {self})" if program else mend
+                mend = f"unpack it first ({program} {shlex.quote(str(self))})" if program else mend
                 raise InputError(f"{self} is {what}: {mend}")
         return begin
 
@@ -158,7 +159,7 @@ class Source:
             return f"{self} is an archive of arrays: save the one of the heights as .npy"
         # Instruments write archives, too.
         if self.suffix == ".zip" or (names and all(n.endswith((".csv", ".txt")) for n in names)):
-            return f"{self} is an archive (zip): unpack it first (unzip {self})"
+            return f"{self} is an archive (zip): unpack it first (unzip {shlex.quote(str(self))})"
         return None
 
 

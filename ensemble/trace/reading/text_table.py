@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from typing import NoReturn
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.quantities import in_plain_signs
 from adhesis.ensemble.trace.reading.missing_heights import may_be_code
 from adhesis.ensemble.trace.reading.printed_numbers import (
     COMMENT,
@@ -74,7 +74,6 @@ class Table:
     decimal: str
     # Lines of a single column that are empty, each a missing height
     empty_lines: tuple[int, ...] = ()
-    left_out: int = 0  # rows of empty fields between the others, which are no rows
 
     @property
     def form(self) -> str:
@@ -120,11 +119,7 @@ def _lines(source: Source) -> list[str]:
             text = known.decode("cp1252", errors="replace")
     text = text.replace(_MARK, "")  # one of a second file that was appended is no sign of a row
     if not text.isascii():
-        # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
-        # A raised digit or a fraction becomes no digit of the number that it follows.
-        raised = {ord(s): f"^{s}" for s in set(text) if unicodedata.category(s) == "No"}
-        text = text.translate(raised)
-        text = unicodedata.normalize("NFKC", text).translate(_MINUS)
+        text = in_plain_signs(text).translate(_MINUS)
     # A page break is no end of a line: an empty one may be a missing height.
     text = _PAGE_BREAK.sub("", text)
     return re.split(r"\r*\n|\r", text.removesuffix("\n"))
@@ -225,7 +220,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     places = _block(reader, start)
     _refuse_numbers_outside(reader, start, places[-1])
     filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
-    block, places = places, _without_empty_rows(reader, places, len(filled))
+    places = _without_empty_rows(reader, places, len(filled))
     rows = [reader.rows[place] for place in places]
     columns = [[row.fields[k] for row in rows] for k in filled]
     if not is_given:
@@ -250,7 +245,6 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         delimiter=delimiter,
         decimal=decimal,
         empty_lines=tuple(place + 1 for place in places if not lines[place].strip()),
-        left_out=len(block) - len(places),
     )
 
 
@@ -344,7 +338,10 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
                 after = (k for k in range(last + 1, place + 1) if k not in reader.rows)
                 end = next(after, last + 1)
                 if end != place:  # removing it would join two blocks
-                    mend = f"numbers follow on line {place + 1}, so keep one trace in a file"
+                    mend = (
+                        f"numbers follow on line {place + 1}, so keep one trace in a file, and "
+                        "write NaN where a height is missing"
+                    )
                 reader.refuse(
                     end, f": it ends the rows of {held} on lines {start + 1} to {last + 1}; {mend}"
                 )
