@@ -22,8 +22,8 @@
 // - energy: that of the contact is the integral of w of advancing edges over its patches. An edge
 //   that recedes dissipates the integral of the difference: friction, in a column of its own.
 //
-// What a law of adhesion has to keep. Points 1, 2, 3 and 5 of a law of one's own are checked at some
-// places, before a path is followed (adhesion.py):
+// What a law of adhesion has to keep. Points 1, 2, 3 and 5 of a law of one's own are checked at
+// some places, before a path is followed (adhesion.py):
 //
 // 1. w is positive, of period 2π, and smooth over the shortest wave that `StressSource.top` states:
 //    steps of a descent are a twentieth of that wave, and predictors are of third order.

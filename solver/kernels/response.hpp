@@ -64,8 +64,8 @@ struct LinearResponse {
   Pair potential;                   // of the last solution, without p and by a unit of p
   std::array<double, 2> mean = {};  // its mean opening, times 2π, likewise
   Vector softness;  // compliance of each gap's edges, over that from which on gaps are soft
-  // Gaps moved so far, between held edges, that their tangents do not follow from the old potential:
-  // the next solution ends with linearising them in its own.
+  // Gaps moved so far, between held edges, that the old potential is not theirs: the next solution
+  // ends with linearising them in its own.
   Integers displaced;
   Flags is_stale;   // whether a gap's edges have to be eliminated anew, before the next solution
 
