@@ -365,20 +365,7 @@ def test_a_task_in_a_kernel_meets_its_time_limit():
     assert [o.error for o in outcomes] == ["longer than the time limit of 0.05 s"] * 3
 
 
-@pytest.fixture
-def handler():
-    """A handler of SIGALRM that raises what may be taken for a task's failure."""
-
-    def raise_interrupt(number, frame):
-        raise Interrupt
-
-    before = signal.signal(signal.SIGALRM, raise_interrupt)
-    yield
-    signal.setitimer(signal.ITIMER_REAL, 0)
-    signal.signal(signal.SIGALRM, before)
-
-
-def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_task(handler):
+def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_task(alarm):
     before = signal.signal(signal.SIGUSR2, signal.getsignal(signal.SIGALRM))
     try:
         with pytest.raises(Interrupt):
@@ -387,7 +374,7 @@ def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_task(handler):
         signal.signal(signal.SIGUSR2, before)
 
 
-def test_the_callers_own_timer_goes_on_while_tasks_are_tried(handler):
+def test_the_callers_own_timer_goes_on_while_tasks_are_tried(alarm):
     """It goes off in a task, as it would have without; and when it has not, it is still set."""
     signal.setitimer(signal.ITIMER_REAL, 500, 7)
     assert len(alone(lambda task, check: task)[0]) == 3

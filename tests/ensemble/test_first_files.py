@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
+from tests.support.processes import ran
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 KEYS = [(name, entry.name) for name, table in TABLES.items() for entry in dataclasses.fields(table)]
@@ -102,9 +102,7 @@ def completed(script: str, *words: str) -> set[str]:
         f"{script}\nCOMP_WORDS=({' '.join(map(repr, words))})\n"
         f"COMP_CWORD={len(words) - 1}\n_adhesis\nprintf '%s\\n' \"${{COMPREPLY[@]}}\""
     )
-    done = subprocess.run(
-        ["bash", "--norc", "-c", code], capture_output=True, text=True, check=True
-    )
+    done = ran("bash", "--norc", "-c", code, check=True)
     assert done.stderr == ""
     return set(done.stdout.split())
 

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import resource
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
+from tests.support.processes import ran
 from tests.support.synthetic_results import campaign, rows, write
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9
@@ -193,9 +193,7 @@ def test_a_report_on_a_full_disk_ends_in_one_sentence_and_leaves_the_old_one(ask
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY)); "
         "sys.exit(main(['report', 'r.h5', '--to', 'out']))"
     )
-    done = subprocess.run(
-        python("-c", code), env=python_environment(), capture_output=True, text=True, check=False
-    )
+    done = ran(*python("-c", code), env=python_environment())
     assert done.returncode == 74, done.stderr
     lines = done.stderr.splitlines()
     progress = re.compile(r"adhesis report: .+  [\d.]+ s")  # on a busy machine

@@ -475,25 +475,19 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     assert "ended with code -9" in str(done[killed[0]])
 
 
+@pytest.mark.usefixtures("alarm")
 @pytest.mark.parametrize("processes", [0, 2])
 def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
     """In what was raised, though it is of a class that loops fail with; and no process is left."""
     _, _, plan = small_plan()
     loops = Loops(plan.jobs, processes=processes)
 
-    def handler(number: int, frame: object) -> None:
-        raise Interrupt
-
     def watch(loops: Loops) -> None:
         if processes == 0 or len(loops.running) == processes:
             os.kill(os.getpid(), signal.SIGALRM)
 
-    before = signal.signal(signal.SIGALRM, handler)
-    try:
-        with pytest.raises(Interrupt):
-            loops.run(watch, every=0.05)
-    finally:
-        signal.signal(signal.SIGALRM, before)
+    with pytest.raises(Interrupt):
+        loops.run(watch, every=0.05)
     assert len(loops.pids) == processes
     for pid in loops.pids:
         with pytest.raises(ProcessLookupError):

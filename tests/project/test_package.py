@@ -5,7 +5,6 @@ import builtins
 import inspect
 import pkgutil
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -15,6 +14,7 @@ import pytest
 
 import adhesis
 from tests.support.campaign_support import run_python
+from tests.support.processes import ran
 from tests.support.synthetic_results import campaign, rows, text_of, write
 from tools.readme_without_links import readme
 from tools.stub import stub
@@ -43,13 +43,8 @@ def test_the_readme_of_the_package_has_no_link_into_the_checkout() -> None:
 
 @pytest.mark.slow(reason="installs everything anew and compiles once more")
 def test_the_wheel_works_in_a_bare_environment() -> None:
-    done = subprocess.run(
-        [ROOT / "tools" / "check_package.sh"],
-        env={"PATH": "/usr/bin:/bin", "PYTHON": sys.executable},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    env = {"PATH": "/usr/bin:/bin", "PYTHON": sys.executable}
+    done = ran(ROOT / "tools" / "check_package.sh", env=env, timeout=None)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "package: good" in done.stdout
 

@@ -30,6 +30,7 @@ from tests.support.campaign_support import (
     environment,
     wait_until,
 )
+from tests.support.processes import ran
 
 JOBS = Path(__file__).parent.parent.parent / "jobs"
 ROWS = 30
@@ -252,20 +253,18 @@ SHORT_COPY = 'cp() { head -c 3 "$2" >"$3"; }'
 def test_results_that_are_not_copied_back_whole_stay(before, within, words, tmp_path):
     """``written`` makes the stand-in of status report a run."""
     (tmp_path / "s.h5").write_text("earlier\n")
-    done = subprocess.run(
-        ["bash", "-c", f"""
-            status() {{ if [ -e written ]; then echo ' "run": {{'; fi; }}
-            . {JOBS}/common.sh
-            STAGING=disk ADHESIS=status file=s.h5 code=0
-            {before}
-            stage_in
-            echo mine >>"$results"
-            {within}
-            stage_out
-            exit "$code"
-        """],
-        cwd=tmp_path, capture_output=True, text=True,
-    )  # fmt: skip
+    script = f"""
+        status() {{ if [ -e written ]; then echo ' "run": {{'; fi; }}
+        . {JOBS}/common.sh
+        STAGING=disk ADHESIS=status file=s.h5 code=0
+        {before}
+        stage_in
+        echo mine >>"$results"
+        {within}
+        stage_out
+        exit "$code"
+    """
+    done = ran("bash", "-c", script, cwd=tmp_path)
     assert done.returncode == 74, done
     assert words in done.stdout + done.stderr
     assert (tmp_path / "s.h5").read_text().startswith("earlier\n")
@@ -375,24 +374,17 @@ def shared() -> Iterator[Path]:
 def shell(shared: Path, script: str, account: int = VICTIM) -> subprocess.CompletedProcess[str]:
     """Run a script as an account where the tests may, in the folder of the results."""
     other = {"user": account, "group": account, "extra_groups": []} if os.geteuid() == 0 else {}
-    return subprocess.run(
-        ["bash", "-c", f". ../common.sh\nSTAGING=../disk file=s.h5 options=()\n{script}"],
-        cwd=shared / "work",
-        env={"PATH": f"{shared}:/usr/bin:/bin", "stage": str(stage_of(shared))},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        **other,  # type: ignore[arg-type]
-    )
+    env = {"PATH": f"{shared}:/usr/bin:/bin", "stage": str(stage_of(shared))}
+    script = f". ../common.sh\nSTAGING=../disk file=s.h5 options=()\n{script}"
+    return ran("bash", "-c", script, cwd=shared / "work", env=env, **other)
 
 
 def stage_of(shared: Path) -> Path:
     """The folder that anybody can foretell."""
     target = os.path.realpath(shared / "work" / "s.h5")
-    sum_of = subprocess.run(["cksum"], input=target.encode(), capture_output=True, check=True)
+    sum_of = ran("cksum", input=target, check=True).stdout.split()[0]
     user = VICTIM if os.geteuid() == 0 else os.getuid()
-    return shared / "disk" / f"adhesis-{user}-{sum_of.stdout.split()[0].decode()}"
+    return shared / "disk" / f"adhesis-{user}-{sum_of}"
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from adhesis import (
     run_loop,
     run_loops,
     run_path,
-    self_affine_profile,
     single_wave,
 )
 from adhesis.solver.loading.zero_range import (
@@ -31,6 +30,7 @@ from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support import scenes
 from tests.support.dugdale_wave import DugdaleWave
 from tests.support.exact_wave import ExactWave
 from tests.support.explicit_solution import explicit_openings, explicit_solution
@@ -39,7 +39,7 @@ PERIOD = 2e-3
 
 
 def rough(ratio: int = 8, seed: int = 0) -> Profile:
-    return self_affine_profile(0.8, period=PERIOD, n0=2, ratio=ratio, seed=seed, h_rms=1e-6)
+    return scenes.rough(2, ratio, seed)
 
 
 def method_of(profile: Profile, young: float, gamma: float = 0.04, name="sharp") -> Method:
@@ -108,14 +108,9 @@ def test_valid_range_of_two_scenes_measured_apart(young, valid_range):
 
 @pytest.mark.parametrize(("young", "seed"), [(1e6, 1), (1e9, 2)])
 def test_no_state_that_is_left_out_has_more_tension(young, seed):
-    method, states = method_of(rough(seed=seed), young), []
-    loop = run_loop(
-        method,
-        max_penetration=0.9,
-        load_steps=20,
-        on_state=lambda branch, state: states.append(state),
-    )
-    everywhere = method.largest_tension([state for state in states if state.patches])
+    loop = loop_of(young, seed=seed)
+    states = [state for state in loop.contact_states if state.patches]
+    everywhere = loop.new_method().largest_tension(states)
     assert everywhere is not None
     assert loop.largest_interior_tension == pytest.approx(everywhere.tension, rel=0.02)
 

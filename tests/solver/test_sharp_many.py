@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, self_affine_profile
+from adhesis import Problem
 from adhesis.solver._kernels import (
     FieldModel,
     LoadingDevice,
@@ -17,12 +17,12 @@ from adhesis.solver.sharp.mechanics import FIXED_SEPARATION, EdgeMechanics, Poin
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support import next_to_a_fold
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
-from tests.support.scenes import loops_at
+from tests.support.scenes import HALF_SPACE, loops_at, of_paper, rough
 
 
 @pytest.fixture(scope="module")
 def profile():
-    return self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=10, h_rms=1e-6, seed=1)
+    return of_paper(1, ratio=10)
 
 
 def random_gaps(count, contact, spread, seed=0):
@@ -114,7 +114,7 @@ def test_the_tangent_of_some_edges_is_the_dense_one_of_all_condensed(profile, de
 @pytest.fixture(scope="module")
 def loaded(profile):
     """Many patches in equilibrium, under weak adhesion: method and state."""
-    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 1e-3), accuracy=1e-4)
+    method = SharpMethod(Problem(profile, HALF_SPACE, 1e-3), accuracy=1e-4)
     state = method.detached(profile.h_max)
     for depth in (0.0, 0.3, 0.5):
         state = method.follow(state, profile.h_max * (1 - depth)).states[-1]
@@ -182,29 +182,18 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
 
 def test_no_step_leads_to_another_branch():
     """After a jump one edge was predicted to move by 3 λ_min, and a state found there was taken."""
-    profile = self_affine_profile(
-        0.772, period=2e-3, n0=14, ratio=39, seed=779993, h_rms=1e-6, amplitudes="rayleigh"
-    )
-    half_space = HalfSpace(young=1e6, poisson=0.5)
-    gamma = 0.5935246633443851 * half_space.modulus * 1e-12 * profile.q0 * 14
+    profile = rough(14, 39, 779993, hurst=0.772, amplitudes="rayleigh")
+    gamma = 0.5935246633443851 * HALF_SPACE.modulus * 1e-12 * profile.q0 * 14
     path = {"max_penetration": 0.6572167384925119, "load_steps": 28}
-    coarse, fine = loops_at(Problem(profile, half_space, gamma), 1e-3, 3e-4, **path)
+    coarse, fine = loops_at(Problem(profile, HALF_SPACE, gamma), 1e-3, 3e-4, **path)
     assert abs(coarse.loss - fine.loss) < coarse.loss_error
     assert abs(coarse.audit_residual) < 1e-4
 
 
 def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
     """Balanced to the field's error, and Newton's iteration finds nothing: it goes on."""
-    profile = self_affine_profile(
-        next_to_a_fold.HURST,
-        period=2e-3 * np.pi,
-        n0=10,
-        ratio=100,
-        seed=next_to_a_fold.SEED,
-        h_rms=1e-6,
-    )
-    problem = Problem(profile, HalfSpace(1e6, 0.5), next_to_a_fold.WORK_OF_ADHESION)
-    method = SharpMethod(problem)
+    profile = of_paper(next_to_a_fold.SEED, next_to_a_fold.HURST)
+    method = SharpMethod(Problem(profile, HALF_SPACE, next_to_a_fold.WORK_OF_ADHESION))
     found, _ = method.jumps.descents.relax(next_to_a_fold.GAPS, next_to_a_fold.SEPARATION)
     assert isinstance(found, Point)
     assert method.edges.count.fields < 2000
@@ -212,8 +201,8 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
 
 def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
     """Newton's steps led 0.002 λ_min on, a window as far back, 100,000 times: an error."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=300, h_rms=1e-6, seed=1)
-    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.005))
+    profile = of_paper(1, ratio=300)
+    method = SharpMethod(Problem(profile, HALF_SPACE, 0.005))
     state = method.detached(profile.h_max)
     for step in range(39):
         state = method.follow(state, profile.h_max * (1 - 0.0225 * step)).states[-1]

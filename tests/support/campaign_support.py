@@ -24,6 +24,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.run import launch
 from tests.support.fake_run import fake_engine
 from tests.support.launchers import MPIRUN
+from tests.support.processes import ran
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TESTS = Path(__file__).resolve().parent
@@ -159,14 +160,7 @@ def started(line: Sequence[str | Path], cwd: Path | None = None) -> subprocess.P
 
 
 def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *map(str, words)],
-        env=environment(**extra),
-        capture_output=True,
-        text=True,
-        timeout=150,
-        check=False,
-    )
+    return ran(sys.executable, *words, env=environment(**extra))
 
 
 def ranks_of(launcher: int) -> list[int]:
