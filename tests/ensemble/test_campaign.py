@@ -50,6 +50,11 @@ def test_values_units_and_defaults():
     assert campaign.solver.time_limit is None
     assert campaign.profile.normalisation == {"h_rms": 1e-6}
     assert campaign.task_count == 8
+    np.testing.assert_array_equal(campaign.loading_penetration, 0.6 * np.arange(5) / 4)
+    axis = campaign.unloading_penetration
+    assert axis[0] == 0.6
+    assert axis[-1] == pytest.approx(-3)
+    np.testing.assert_allclose(np.diff(axis), -0.15)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.toml")), ids=lambda p: p.name)
@@ -226,11 +231,8 @@ def test_bad_files_are_refused_in_one_sentence(text, words):
 
 def test_growth_and_other_changes_are_told_apart():
     old = parse_campaign(campaign_text())
-    grown = parse_campaign(
-        campaign_text(
-            hurst="[0.9, 0.7, 0.8]", work_of_adhesion="[0.01, 0.04, 0.07]", realisations="3"
-        )
-    )
+    more = {"hurst": "[0.9, 0.7, 0.8]", "work_of_adhesion": "[0.01, 0.04, 0.07]"}
+    grown = parse_campaign(campaign_text(**more, realisations="3"))
     difference = compare(old, grown)
     assert set(difference.grown) == {"sweep.hurst", "sweep.work_of_adhesion", "sweep.realisations"}
     assert not difference.other
@@ -268,15 +270,6 @@ def test_too_many_tasks_are_counted_and_not_made():
     )]  # fmt: skip
     text = campaign_text(hurst=many[0], work_of_adhesion=many[1], young=many[2])
     assert "makes 16000000000 tasks: it must make at most 10000000" in complaint(text)
-
-
-def test_penetration_axes():
-    campaign = parse_campaign(campaign_text())
-    np.testing.assert_array_equal(campaign.loading_penetration, 0.6 * np.arange(5) / 4)
-    axis = campaign.unloading_penetration
-    assert axis[0] == 0.6
-    assert axis[-1] == pytest.approx(-3)
-    np.testing.assert_allclose(np.diff(axis), -0.15)
 
 
 PLAIN = st.one_of(
@@ -337,11 +330,8 @@ def test_every_list_is_an_axis():
 
 
 def test_lists_vary_together_where_that_is_asked_for():
-    campaign = parse_campaign(
-        campaign_text(
-            hurst="[0.8, 0.7]", h_rms="[2e-6, 1e-6]", seed='5\nzip = [["h_rms", "hurst"]]'
-        )
-    )
+    lists = {"hurst": "[0.8, 0.7]", "h_rms": "[2e-6, 1e-6]"}
+    campaign = parse_campaign(campaign_text(**lists, seed='5\nzip = [["h_rms", "hurst"]]'))
     cells = {(h, dict(o)["h_rms"]) for h, o in ((t.hurst, t.others) for t in campaign.tasks())}
     assert cells == {(0.8, 2e-6), (0.7, 1e-6)}
     assert campaign.task_count == 2 * 2 * 2

@@ -108,16 +108,15 @@ def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **
     schedule = schedule_of(tasks, group_of)
     channel = kind(workers, seconds, **ranks)
     collected: list[Outcome] = []
-    master = Master(
-        channel,
-        schedule,
-        collected.append,
-        limits(channel) if limits else Limits(),
-        clock=channel.clock,
-        sleep=channel.sleep,
-    )
+    master = master_of(channel, schedule, collected, limits(channel) if limits else Limits())
     reason = master.run()
     return channel, collected, reason, schedule
+
+
+def master_of(channel, schedule, collected, limits):
+    """Make a master that goes by the clock of its channel."""
+    clock = {"clock": channel.clock, "sleep": channel.sleep}
+    return Master(channel, schedule, collected.append, limits, **clock)
 
 
 def test_a_thousand_workers_are_kept_busy():
@@ -223,15 +222,9 @@ class Scripted:
 
 
 def scripted_master(channel, tasks, collected=None):
-    group_of = dict.fromkeys(tasks, 0)
-    schedule = schedule_of(tasks, group_of)
+    schedule = schedule_of(tasks, dict.fromkeys(tasks, 0))
     collected = [] if collected is None else collected
-    limits = Limits(silence=120)
-    return Master(
-        *(channel, schedule, collected.append, limits),
-        clock=channel.clock,
-        sleep=channel.sleep,
-    )
+    return master_of(channel, schedule, collected, Limits(silence=120))
 
 
 def done(task, rank):
@@ -404,13 +397,8 @@ def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
     group_of = dict.fromkeys(range(30), 0)
     together = {task: task // 3 for task in range(30)}
     schedule = schedule_of([t for t in range(30) if t != 4], group_of, together)
-    channel = SimulatedRanks(4, seconds)
     collected: list[Outcome] = []
-    master = Master(
-        *(channel, schedule, collected.append, Limits()),
-        clock=channel.clock,
-        sleep=channel.sleep,
-    )
+    master = master_of(SimulatedRanks(4, seconds), schedule, collected, Limits())
     assert master.run() is None
     done = sorted(outcome.task for outcome in collected)
     assert done == [task for task in range(30) if task != 4]

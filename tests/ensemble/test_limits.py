@@ -17,6 +17,7 @@ from tests.support.campaign_support import (
     run_python,
     write_campaign,
 )
+from tests.support.processes import ran
 
 ANOTHER_USER = 23456
 MATERIAL = ("--work-of-adhesion", "0.01", "--young", "1e6", "--poisson", "0.5")
@@ -62,17 +63,8 @@ def limited(
         capability = "=-all,+dac_override"  # to read what root alone may
         other = ["setpriv", f"--reuid={ANOTHER_USER}", f"--regid={ANOTHER_USER}", "--clear-groups"]
         other += [f"--inh-caps{capability}", f"--ambient-caps{capability}"]
-    script = f'ulimit {limit}; exec "$@"'
-    process = subprocess.Popen(
-        [*other, "bash", "-c", script, "bash", *command(words, fake=fake)],
-        cwd=folder,
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    out, errors = process.communicate(timeout=120)
-    return subprocess.CompletedProcess(words, process.returncode, out, errors)
+    line = ("bash", "-c", f'ulimit {limit}; exec "$@"', "bash", *command(words, fake=fake))
+    return ran(*other, *line, cwd=folder, env=environment())
 
 
 @pytest.mark.parametrize(("limit", "value", "name"), CASES)

@@ -197,10 +197,9 @@ def test_curves_open_in_xarray_with_units(report, data):
         assert curves["loading_mean_stress_mean"].attrs["units"] == "Pa"
         one = curves["unloading_mean_stress_dimensionless_mean"]
         one = one.sel(hurst=0.8, work_of_adhesion=0.07)
-        expected = (
-            data.finished([0.8], [0.07])[0].curves["unloading_mean_stress_dimensionless"].mean
-        )
-        np.testing.assert_array_equal(one, expected)
+        (cell,) = data.finished([0.8], [0.07])
+        mean = cell.curves["unloading_mean_stress_dimensionless"].mean
+        np.testing.assert_array_equal(one, mean)
         assert curves["realisations"].values.tolist() == [[5] * 3] * 2
         quantiles = curves["loading_contact_fraction_quantiles"]
         assert (quantiles.diff("quantile") >= 0).all()
@@ -213,12 +212,9 @@ def test_contact_is_drawn_against_stress_over_slope(data, drawn):
     assert len(lines) == 6
     cell = data.finished([0.8], [0.04])[0]
     line = lines[r"$\gamma$ = 0.04 J/m², unloading"]
-    sigma = (
-        2
-        * h5_values(data, cell, "unloading_mean_stress")
-        / (1e6 / 0.75 * 1000 * cell.values["h_max"][:, None])
-    )
-    expected = (sigma / np.sqrt(cell.values["m2"])[:, None]).mean(axis=0)
+    unit = 0.5 * 1e6 / 0.75 * 1000 * cell.values["h_max"] * np.sqrt(cell.values["m2"])
+    stress = h5_values(data, cell, "unloading_mean_stress")
+    expected = (stress / unit[:, None]).mean(axis=0)
     np.testing.assert_allclose(line[:, 0], expected, rtol=1e-10)
     area = h5_values(data, cell, "unloading_contact_fraction").mean(axis=0)
     np.testing.assert_allclose(line[:, 1], area, rtol=1e-10)
@@ -575,24 +571,20 @@ def test_contact_is_compared_at_equal_load():
     assert findings.area_ratio(fake) is None
 
 
-def companion(tmp_path, name: str, factor: float, **replaced: str) -> Path:
-    """The campaign of ``file`` with some lines replaced, its losses multiplied by a factor."""
-    text = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5, ratio=100).text
-    for old, new in replaced.values():
-        assert old in text
-        text = text.replace(old, new)
-    plan = parse_campaign(text)
-    values = rows(campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5, ratio=100))
+def companion(tmp_path, name: str, factor: float, old: str, new: str) -> Path:
+    """The campaign of ``file`` with a line replaced, its losses multiplied by a factor."""
+    alike = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5, ratio=100)
+    assert old in alike.text
+    plan, values = parse_campaign(alike.text.replace(old, new)), rows(alike)
     values |= {n: values[n] * factor for n in ("loss", "loss_dimensionless")}
     short = {n for n, v in values.items() if "loading_" in n or n.startswith(("psd", "gap_d"))}
     return write(tmp_path / name, plan, {n: v for n, v in values.items() if n not in short})
 
 
 def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_path):
-    finer = companion(
-        tmp_path, "finer.h5", 1.02, a=("[output]", "[solver]\naccuracy = 1e-4\n[output]")
-    )
-    steps = companion(tmp_path, "steps.h5", 0.99, a=("load_steps = 20", "load_steps = 40"))
+    solver = "[solver]\naccuracy = 1e-4\n[output]"
+    finer = companion(tmp_path, "finer.h5", 1.02, "[output]", solver)
+    steps = companion(tmp_path, "steps.h5", 0.99, "load_steps = 20", "load_steps = 40")
     alone = {row[:2]: row for row in loss_tables.losses(data).rows}
     both = aggregate(file, [finer, steps])
     doubts = [text for text in findings.quality(both) if "beside this campaign" in text]
@@ -626,9 +618,8 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
 
 @pytest.mark.usefixtures("undrawn", "quick_figures")
 def test_another_largest_penetration_is_compared_with(file, tmp_path):
-    lower = companion(
-        tmp_path, "lower.h5", 0.5, a=("max_penetration = 0.9", "max_penetration = 0.6")
-    )
+    depths = "max_penetration = 0.9", "max_penetration = 0.6"
+    lower = companion(tmp_path, "lower.h5", 0.5, *depths)
     data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
     assert "cycle.max_penetration = 0.6" in write_page(data, {})
     assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
@@ -638,20 +629,18 @@ def test_another_largest_penetration_is_compared_with(file, tmp_path):
 
 def test_the_reading_nearest_to_the_paper_is_named(file, data, tmp_path):
     factor = 19 / data.finished([0.8], [0.04])[0].estimates["loss_dimensionless"].mean
-    wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 100", "ratio = 200"))
-    other = companion(tmp_path, "other.h5", factor, a=("ratio = 100", "ratio = 30"))
+    wider = companion(tmp_path, "wider.h5", factor, "ratio = 100", "ratio = 200")
+    other = companion(tmp_path, "other.h5", factor, "ratio = 100", "ratio = 30")
     data = aggregate(file, [wider, other])
     (sentence,) = findings.readings(data)
     names = re.findall(r"(\w+\.h5) [\d.]+ % \(5 values\)", sentence)
     assert sorted(names) == ["r.h5", "wider.h5"]  # other.h5 is no reading of the paper's
-    found = [
-        data.companions[0].like(data.finished([h], [g])[0]).estimates["loss_dimensionless"].mean
-        / paper.TABLE_1[h, g]
-        - 1
-        for h, g in paper.TABLE_1
-        if h < 0.9
-    ]
-    assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(found))):.1f} %" in sentence
+    off = []
+    for (h, g), value in paper.TABLE_1.items():
+        if h < 0.9:
+            cell = data.companions[0].like(*data.finished([h], [g]))
+            off.append(cell.estimates["loss_dimensionless"].mean / value - 1)
+    assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(off))):.1f} %" in sentence
 
 
 def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):
@@ -790,14 +779,10 @@ def test_the_html_page_needs_no_other_file(report):
 @needs_browser
 def test_a_browser_shows_every_figure_of_the_report_and_no_error(report, tmp_path):
     page = (report / "report.html").read_text(encoding="utf-8")
-    found = seen_by_browser(
-        page.replace(
-            "<head>", "<head><script>errors = []; onerror = e => errors.push(e);</script>"
-        ),
-        """onload = () => reportSeen({errors, widths: [...document.images].map(i => i.naturalWidth),
-            });""",
-        tmp_path,
-    )
+    watch = "<head><script>errors = []; onerror = e => errors.push(e);</script>"
+    report_seen = "onload = () => reportSeen({errors, widths: [...document.images].map(width)});"
+    script = f"const width = image => image.naturalWidth; {report_seen}"
+    found = seen_by_browser(page.replace("<head>", watch), script, tmp_path)
     assert found["errors"] == []
     assert len(found["widths"]) == 13
     assert min(found["widths"]) > 0
@@ -850,11 +835,8 @@ def test_campaigns_that_come_along_are_comparable_with_the_paper_campaign():
 
 
 def test_loops_of_a_machine_are_drawn_against_its_own_penetration(tmp_path):
-    plan = parse_campaign(
-        campaign(hurst=(0.7,), gamma=(0.04,), realisations=2).text.replace(
-            "max_penetration = 0.9", "max_penetration = 0.9\nstiffness = 1e9"
-        )
-    )
+    text = text_of(hurst=(0.7,), gamma=(0.04,), realisations=2)
+    plan = parse_campaign(text.replace("[cycle]", "[cycle]\nstiffness = 1e9"))
     data = aggregate(write(tmp_path / "r.h5", plan, rows(plan)))
     with style():
         figure = loops.loop_against_penetration(data)

@@ -77,14 +77,10 @@ def test_figures_show_one_place_on_the_further_axes_that_has_results(file, data,
     values["status"][values["max_penetration"] > 0.8] = 0
     early = aggregate(write(tmp_path / "r.h5", data.campaign, values))
     assert {c.others[1] for c in early.shown.cells} == {("max_penetration", 0.7)}
-
-
-def test_figures_of_a_part_show_one_place_too(data, tmp_path):
-    """Of few realisations a part has not every cell; those shown have the same further values."""
-    plan, part = data.campaign, Part(3, 7)
-    create(tmp_path / "part.h5", plan, part=part)
-    with h5py.File(tmp_path / "part.h5", "r+") as file:
-        file["status"][:] = 1
+    # of few realisations a part has not every cell; those shown have the same further values
+    create(tmp_path / "part.h5", data.campaign, part=Part(3, 7))
+    with h5py.File(tmp_path / "part.h5", "r+") as part:
+        part["status"][:] = 1
     found = aggregate(sign(tmp_path / "part.h5"))
     assert len(found.cells) < len(data.cells)
     assert {cell.others for cell in found.shown.cells} == {

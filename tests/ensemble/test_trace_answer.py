@@ -431,12 +431,16 @@ def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_pat
     assert document["single_features"][0]["position"] == pytest.approx(640e-6, abs=2e-6)
 
 
-def test_the_command_excludes_ranges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_plans_with_ranges_left_out_and_writes_nothing(tmp_path, capsys):
     path = tmp_path / "t.txt"
-    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
-    words = ["trace", str(path), *CONTACT, "--unit", "um", "--plan"]
+    rows = [f"{1e6 * a:.3f};{1e6 * z:.6f}" for a, z in zip(X, PROFILE.at(X), strict=True)]
+    path.write_text("\n".join(["x (µm);z (µm)", *rows]).replace(".", ","))
+    words = ["trace", str(path), *CONTACT, "--tip-radius", "2um", "--plan"]
     assert main([*words, "--exclude", "0.2mm:230um", "--exclude", "900um:2mm"]) == 0
     said = capsys.readouterr().out
+    for text in ("400 points, step 2.5 µm", "decimal commas", "positions in µm", "plan ", "waves"):
+        assert text in said
+    assert sorted(tmp_path.iterdir()) == [path]
     assert "excluded    200 µm to 230 µm, as given: 13 heights treated as drop-outs" in said
     assert "excluded    900 µm to 2 mm, as given: 40 heights" in said
     assert "ends        cut off where heights are missing: 40" in said

@@ -14,43 +14,21 @@ from adhesis.ensemble.results.schema import axis_datasets, kept_rows
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import GAP_EDGES, field_plan
 from adhesis.solver.model.jump import JUMP_KINDS
+from tests.support.campaign_support import campaign_text
 
-CAMPAIGN = """
-[profile]
-period = 6.283185307179586e-3
-n0 = 10
-ratio = {ratio}
-h_rms = 1e-6
-[material]
-young = 1e6
-poisson = 0.5
-[sweep]
-hurst = {hurst}
-work_of_adhesion = {gamma}
-realisations = {realisations}
-seed = 1
-[cycle]
-max_penetration = {max_penetration}
-load_steps = 20
-unloading_until = -2.0
-[output]
-jumps = {jumps}
-field_nodes = 256
-"""
+OF_PAPER = {"period": 6.283185307179586e-3, "n0": 10, "seed": 1}
+PATH = {"load_steps": 20, "unloading_until": -2.0}
 
 
 def text_of(
     hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32, ratio=10, max_penetration=0.9
 ) -> str:
     """The paper's profile, material and path if ``ratio`` is 100; lists are further axes."""
-    return CAMPAIGN.format(
-        hurst=list(hurst),
-        gamma=list(gamma),
-        realisations=realisations,
-        jumps=jumps,
-        ratio=ratio,
-        max_penetration=max_penetration,
-    )
+    values = OF_PAPER | PATH | {"realisations": realisations, "ratio": ratio}
+    values |= {"hurst": list(hurst), "work_of_adhesion": list(gamma)}
+    values |= {"max_penetration": max_penetration, "jumps": f"{jumps}\nfield_nodes = 256"}
+    text = campaign_text(**{key: str(value) for key, value in values.items()})
+    return text.replace('[solver]\nmethod = "grid"\nnodes_per_wave = 16\n\n', "")
 
 
 def campaign(*args, **changes) -> Campaign:
