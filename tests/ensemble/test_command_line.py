@@ -289,15 +289,6 @@ def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
     assert capsys.readouterr().err == "adhesis status: interrupted\n"
 
 
-def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatch):
-    def fail(args):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr("adhesis.ensemble.command.status.execute", fail)
-    assert main(["status", "r.h5"]) == 70
-    assert "ZeroDivisionError" in capsys.readouterr().err
-
-
 def process(*words, package="adhesis", before="", **options) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, by a shell where something stands before it."""
     command = [sys.executable, "-m", package, *words]

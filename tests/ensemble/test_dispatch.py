@@ -25,17 +25,37 @@ from adhesis.solver._kernels import sum_pull
 from tools.interrupted import Interrupt
 
 
-class SimulatedRanks:
+class Scripted:
+    """A channel whose messages come at given times of a clock that sleep moves on."""
+
+    def __init__(self, workers, messages=()):
+        self.rank, self.workers, self.now = 0, range(1, workers + 1), 0.0
+        self.messages = sorted(messages, key=lambda m: m[0])
+        self.sent = []
+
+    def clock(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
+
+    def send(self, to, message, *, urgent=False):
+        self.sent.append((to, message))
+
+    def poll(self, *, urgent=False):
+        if self.messages and self.messages[0][0] <= self.now:
+            return self.messages.pop(0)[1:]
+        return None
+
+
+class SimulatedRanks(Scripted):
     """A channel whose workers take simulated time; also the clock and the sleep of the master."""
 
-    rank = 0
-
     def __init__(self, workers, seconds, *, halts=True, signal_at=None, message_time=20e-6):
-        self.workers = range(1, workers + 1)
+        super().__init__(workers)
         self._seconds = seconds
         self._halts = halts
         self._message_time = message_time
-        self.now = 0.0
         self.busy = 0.0
         self._queue = {rank: [] for rank in range(1, workers + 1)}
         self._ends: list[tuple[float, int, tuple]] = []
@@ -48,12 +68,6 @@ class SimulatedRanks:
     def _report_later(self, rank):
         at = self.now + REPORT_INTERVAL
         heapq.heappush(self._ends, (at, rank, ("alive", None, None)))
-
-    def clock(self):
-        return self.now
-
-    def sleep(self, seconds):
-        self.now += seconds
 
     def send(self, to, message, *, urgent=False):
         self.now += self._message_time
@@ -196,29 +210,6 @@ def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
             halts=False,
             limits=lambda c: Limits(stop=lambda: "walltime" if c.now > 3 else None, grace=30.0),
         )
-
-
-class Scripted:
-    """A channel whose messages come at given times of a clock that sleep moves on."""
-
-    def __init__(self, workers, messages=()):
-        self.rank, self.workers, self.now = 0, range(1, workers + 1), 0.0
-        self.messages = sorted(messages, key=lambda m: m[0])
-        self.sent = []
-
-    def clock(self):
-        return self.now
-
-    def sleep(self, seconds):
-        self.now += seconds
-
-    def send(self, to, message, *, urgent=False):
-        self.sent.append((to, message))
-
-    def poll(self, *, urgent=False):
-        if self.messages and self.messages[0][0] <= self.now:
-            return self.messages.pop(0)[1:]
-        return None
 
 
 def scripted_master(channel, tasks, collected=None):

@@ -12,9 +12,9 @@ from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
+from tests.support.campaign_support import ROOT
 from tests.support.processes import ran
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 KEYS = [(name, entry.name) for name, table in TABLES.items() for entry in dataclasses.fields(table)]
 
 

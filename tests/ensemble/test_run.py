@@ -18,7 +18,6 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
@@ -35,7 +34,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.fake_run import fake_engine, fake_result
+from tests.support.fake_run import fake_engine, write_results
 
 
 def run(folder, *words, fake="", **changes):
@@ -406,13 +405,11 @@ def test_watching_a_run_until_it_is_done(tmp_path, monkeypatch, capsys):
     """A run that writes two rows between two looks; status of a real one: above."""
     campaign, out = load_campaign(write_campaign(tmp_path)), tmp_path / "r.h5"
     create(out, campaign)
-    rows, waited = iter(enumerate(campaign.tasks())), []
+    rows, waited = iter(range(8)), []
 
     def written_meanwhile(seconds):
         waited.append(seconds)
-        with Writer(out) as writer:
-            for row, task in itertools.islice(rows, 2):
-                writer.write_result(row, fake_result(campaign, task))
+        write_results(out, campaign, itertools.islice(rows, 2))
 
     monkeypatch.setattr("adhesis.ensemble.command.status.time.sleep", written_meanwhile)
     assert main(["status", str(out), "--watch", "--interval", "200"]) == 0

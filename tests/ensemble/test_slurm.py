@@ -22,11 +22,10 @@ from pathlib import Path
 import pytest
 
 from adhesis.ensemble.run import launch
-from tests.support.campaign_support import campaign_text, done_rows, wait_until
+from tests.support.campaign_support import ROOT, campaign_text, done_rows, wait_until
 from tests.support.launchers import PATH
 from tests.support.processes import ran
 
-ROOT = Path(__file__).parent.parent.parent
 SCRIPT = ROOT / "jobs" / "slurm.sh"
 pytestmark = pytest.mark.slurm
 
@@ -243,13 +242,7 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Callab
     if mpirun is None:
         pytest.skip("no mpirun here")
 
-    def submit(
-        *words: str,
-        realisations: int = 3,
-        launcher: str = "",
-        silence: int = 120,
-        staging: str = "",
-    ) -> Job:
+    def submit(*words, realisations=3, launcher="", silence=120, staging="") -> Job:
         folder = tmp_path_factory.mktemp("a study, ")
         text = campaign_text(realisations=str(realisations))
         (folder / "study.toml").write_text(text)

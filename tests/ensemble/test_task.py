@@ -24,7 +24,7 @@ from adhesis.solver.method import PathError
 from adhesis.solver.model.jump import JUMP_KINDS, Jump
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
-from tests.support.fake_run import fake_result
+from tests.support.fake_run import fake_result, write_results
 
 
 def loop_of(campaign) -> LoopResult:
@@ -300,10 +300,8 @@ def test_a_number_that_is_not_finite_makes_a_loss_doubtful_and_the_status_lists_
 ):
     campaign, path = parse_campaign(campaign_text()), tmp_path / "r.h5"
     create(path, campaign)
-    with Writer(path) as writer:
-        for row, task in enumerate(campaign.tasks()):
-            wrong = {name: value} if row == 2 else {}
-            writer.write_result(row, fake_result(campaign, task) | wrong)
+    write_results(path, campaign, [0, 1, *range(3, 8)])
+    write_results(path, campaign, [2], **{name: value})
     status = read_status(path)
     assert [loop["row"] for loop in status["doubtful"]] == [2]
     assert "1 losses are doubtful: by their own account" in as_text(status)
@@ -351,20 +349,13 @@ def test_reductions_agree_with_the_states_of_the_loop():
     campaign = campaign_with("field_nodes = 16\n", nodes_per_wave="64")
     plan, task = field_plan(campaign), campaign.tasks()[0]
     method = make_method("grid", make_problem(campaign, task), nodes_per_wave=64)
+    cycle = campaign.cycle
+    loop = run_loop(method, max_penetration=cycle.max_penetration, load_steps=cycle.load_steps)
     wanted = {}
-
-    def on_state(branch, state):
-        for k, penetration in enumerate(plan.penetration):
-            s = method.problem.separation(penetration)
+    for branch, state in zip(loop.branch, loop.contact_states, strict=True):
+        for k, s in enumerate(map(method.problem.separation, plan.penetration)):
             if abs(state.separation - s) < 1e-12 * s:
                 wanted[int(branch == "unloading"), k] = state
-
-    loop = run_loop(
-        method,
-        max_penetration=campaign.cycle.max_penetration,
-        load_steps=campaign.cycle.load_steps,
-        on_state=on_state,
-    )
     assert len(wanted) == 6
     row = field_row(plan, method, loop, keep=True)
     profile = method.problem.profile

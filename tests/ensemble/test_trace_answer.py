@@ -125,6 +125,8 @@ def test_the_document_says_what_was_read_done_and_found(document: dict[str, Any]
     assert document["read"]["step"] == pytest.approx(LENGTH / N, rel=1e-4)
     assert [step["name"] for step in document["preparation"]] == ["drop-outs", "form", "cut-off"]
     assert document["degree"] == 2
+    noisy = [r["name"] for r in document["runs"] if r["group"] == "noise"]
+    assert noisy == ["noise 1", "noise 2"]
     tables = {
         r["name"]: r
         for r in document["runs"]
@@ -182,20 +184,15 @@ def test_the_document_carries_its_provenance(folder: Path, document: dict[str, A
 
 
 @pytest.mark.parametrize(
-    ("words", "control", "turns"),
+    ("words", "control", "turns", "pattern"),
     [
-        (["--stiffness", "0", "--max-stress", "300.0,100.0"], Control(0.0), (300.0, 100.0)),
-        (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3)),
-        (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4)),
+        (["--stiffness", "0", "--max-stress", "300.0,100.0"], Control(0.0), (300.0, 100.0), None),
+        (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3), None),
+        (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4), None),
+        (["--stripes", "8", "--stripe-amplitude", "0.3"], Control(), None, stripes(8, 0.3)),
     ],
 )
-def test_the_command_passes_control_and_turning_points(
-    words: list[str],
-    control: Control,
-    turns: tuple[float, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_command_passes_what_is_given(words, control, turns, pattern, tmp_path, monkeypatch):
     path = tmp_path / "t.txt"
     np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
     given: list[Any] = []
@@ -207,7 +204,8 @@ def test_the_command_passes_control_and_turning_points(
     monkeypatch.setattr("adhesis.ensemble.command.trace.run_plan", stop)
     rest = ["--unit", "um", "--to", str(tmp_path / "out"), "--quiet"]
     assert main(["trace", str(path), *CONTACT, *rest, *words]) == 1
-    assert (given[0].control, given[0].turning_points) == (control, turns)
+    assert (given[0].control, given[0].pattern) == (control, pattern)
+    assert turns is None or given[0].turning_points == turns
 
 
 def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
@@ -579,20 +577,6 @@ def test_stripes_reach_every_loop_of_a_trace_with_their_width() -> None:
     assert found["stripes"] == found["loop"]["stripes"] == 20
     assert found["stripe_amplitude"] == pytest.approx(0.3)
     assert found["least_work_of_adhesion"] == pytest.approx(0.7 * 0.04)
-
-
-def test_the_command_takes_stripes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, out = tmp_path / "t.txt", tmp_path / "out"
-    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
-    given: list[Any] = []
-    monkeypatch.setattr(
-        "adhesis.ensemble.command.trace.make_plan",
-        lambda _, cycle, **__: given.append(cycle) or small_plan()[2],
-    )
-    words = ["trace", str(path), *CONTACT, "--unit", "um", "--to", str(out), "--plan"]
-    assert main([*words, "--stripes", "8", "--stripe-amplitude", "0.3"]) == 0
-    assert given[0].pattern == stripes(8, 0.3)
-    assert main([*words, "--stripes", "8"]) == 2
 
 
 def test_a_range_of_a_trace_is_said_with_what_zones_at_edges_change() -> None:

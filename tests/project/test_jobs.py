@@ -13,7 +13,7 @@ import pytest
 
 from tests.support.processes import ran
 
-JOBS = Path(__file__).parent.parent.parent / "jobs"
+JOBS = Path(__file__).parents[2] / "jobs"
 
 # Each writes its arguments to the file `calls`. `adhesis run` ends with $CODE, after it has sent
 # the signal $SIGNAL to the script, if any, and has received what the script passes on.

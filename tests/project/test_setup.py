@@ -15,10 +15,9 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from tests.support.campaign_support import started, wait_until
+from tests.support.campaign_support import ROOT, started, wait_until
 from tests.support.processes import ran
 
-ROOT = Path(__file__).parent.parent.parent
 # Distribution names that differ from what is imported, and what other packages need to find.
 IMPORTED_AS = {"markdown-it-py": "markdown_it", "surfacetopography": "SurfaceTopography"}
 LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine

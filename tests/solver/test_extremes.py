@@ -4,28 +4,19 @@ import copy
 import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from threading import Barrier
 
 import numpy as np
 import pytest
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    Problem,
-    make_method,
-    run_loop,
-    run_loops,
-    run_path,
-    single_wave,
-)
+from adhesis import Control, Problem, make_method, run_loop, run_loops, run_path, single_wave
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.sharp.continuation.descent import Descents
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.exact_wave import ExactWave
-from tests.support.grids import grid_of
-from tests.support.scenes import HALF_SPACE, loop_of, rough
+from tests.support.scenes import HALF_SPACE, grid_of, loop_of, rough
 
 WAVE = single_wave(1e-6, 1e-3)
 FULL = Problem(WAVE, HALF_SPACE, 0.0).full_contact_energy
@@ -34,7 +25,8 @@ FULL = Problem(WAVE, HALF_SPACE, 0.0).full_contact_energy
 def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) -> Problem:
     """γ is ``share`` of the energy of full contact, at 1 MPa; the stiffness is in p*/A."""
     unit = np.pi * HALF_SPACE.modulus / WAVE.period
-    return Problem(WAVE, HalfSpace(young, 0.5), share * FULL, Control(stiffness * unit))
+    half_space = replace(HALF_SPACE, young=young)
+    return Problem(WAVE, half_space, share * FULL, Control(stiffness * unit))
 
 
 @pytest.mark.parametrize("name", ["sharp", "grid"])

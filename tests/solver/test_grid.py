@@ -7,8 +7,7 @@ from adhesis import HalfSpace, LoopResult, Problem, Profile, make_method, run_lo
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
-from tests.support.grids import grid_of
-from tests.support.scenes import HALF_SPACE, loop_of, rough
+from tests.support.scenes import HALF_SPACE, grid_of, loop_of, rough
 
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5
 
@@ -122,10 +121,8 @@ def test_two_equal_maxima_touch_together_and_leave_as_in_sharp():
     """Apart they are unstable before both could leave together: one of them leads."""
     two = Profile(PERIOD, np.array([0, 0, AMPLITUDE / 2], dtype=complex))
     problem = Problem(two, HALF_SPACE, 0.1 * wave(0.2).work_of_adhesion)
-    grid, sharp = (
-        run_loop(method, max_penetration=0.5, load_steps=10)
-        for method in (grid_of(problem, nodes=2048), make_method("sharp", problem))
-    )
+    grid = run_loop(grid_of(problem, nodes=2048), max_penetration=0.5, load_steps=10)
+    sharp = loop_of(problem, max_penetration=0.5, load_steps=10)
     steps = [(0, 2), (2, 1), (1, 0)]
     for result in (grid, sharp):
         assert [(j.patches_before, j.patches_after) for j in result.jumps] == steps

@@ -13,8 +13,7 @@ from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.grid.moves import Move
 from adhesis.solver.model.control import Control
-from tests.support.grids import grid_of
-from tests.support.scenes import HALF_SPACE
+from tests.support.scenes import HALF_SPACE, grid_of
 
 PERIOD = 2e-3 * np.pi
 

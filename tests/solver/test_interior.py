@@ -153,13 +153,6 @@ def test_either_reason_makes_a_loss_doubtful():
     assert not beyond_limit(math.inf, 1.0, 0.0, 0.5)  # nothing adheres
 
 
-def test_without_adhesion_nothing_bounds_the_range():
-    loop = run_loop(method_of(rough(), 1e7, 0.0), max_penetration=0.5, load_steps=4)
-    assert loop.interior is None
-    assert loop.valid_range == loop.turn_range == math.inf
-    assert loop.warnings == ()
-
-
 def test_where_and_when_are_those_of_a_state_also_of_a_path_and_of_one_loading_branch():
     method, loop = method_of(rough(), 1e8), loop_of(1e8)
     path = run_path(method, [0.9], load_steps=20)

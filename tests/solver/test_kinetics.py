@@ -10,9 +10,8 @@ from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.continuation.descent import leaving_step
 from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.method import SharpMethod
-from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE as SOLID
-from tests.support.scenes import loop_of, loops_at, of_paper, rough
+from tests.support.scenes import grid_of, loop_of, loops_at, of_paper, rough
 
 PHASES = [
     0.07427745862364432, 2.8303468781729233, -2.2358110930610913, 2.8189476143269747,

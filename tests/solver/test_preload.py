@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from adhesis import (
-    Control,
-    PathError,
-    Problem,
-    make_method,
-    run_loop,
-    run_loops,
-    single_wave,
-)
+from adhesis import Control, PathError, Problem, make_method, run_loop, run_loops, single_wave
 from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.mean_stress_event import up_to
 from adhesis.solver.method import ContactState, Method, Path

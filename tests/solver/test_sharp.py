@@ -58,6 +58,9 @@ def test_no_loss_without_adhesion():
     assert abs(result.loss_dimensionless) < 1e-12
     assert result.pull_off_penetration == pytest.approx(0.0, abs=1e-12)
     assert result.mean_stress.min() > -1e-3 * result.mean_stress.max()
+    assert result.interior is None
+    assert result.valid_range == result.turn_range == np.inf
+    assert result.warnings == ()
 
 
 def test_first_touch_may_run_to_almost_full_contact():
@@ -150,12 +153,8 @@ def test_fields_obey_the_boundary_conditions():
     ],
 )
 def test_loops_that_once_did_not_end(hurst, n0, ratio, gamma, seed, accuracy, max_penetration):
-    result = loop(
-        rough(seed, n0=n0, ratio=ratio, hurst=hurst),
-        gamma,
-        accuracy=accuracy,
-        max_penetration=max_penetration,
-    )
+    profile = rough(seed, n0=n0, ratio=ratio, hurst=hurst)
+    result = loop(profile, gamma, accuracy=accuracy, max_penetration=max_penetration)
     assert result.patches[-1] == 0
     assert abs(result.audit_residual) < 1e-4
 

@@ -5,15 +5,13 @@ import pytest
 
 from adhesis import Problem, single_wave
 from adhesis.solver._kernels import FieldModel, LoadingDevice, solve_field
-from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import FIXED_SEPARATION
 from tests.support import scenes
 from tests.support.dense import solve_densely
 from tests.support.explicit_solution import explicit_openings, explicit_solution
-from tests.support.grids import grid_of
-from tests.support.scenes import HALF_SPACE
+from tests.support.scenes import HALF_SPACE, grid_of
 
 PERIOD = 2e-3 * np.pi
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
@@ -38,13 +36,7 @@ def separation(rough):
     return 0.5 * rough.h_max * rough.q0
 
 
-def solved_field(
-    source: StressSource,
-    gaps: Array,
-    prescribed: float,
-    tolerance: float,
-    device: LoadingDevice = FIXED_SEPARATION,
-) -> GapField:
+def solved_field(source, gaps, prescribed, tolerance, device=FIXED_SEPARATION) -> GapField:
     model = FieldModel(device, float(-np.log(tolerance)), source.panels)
     return GapField(source, gaps, prescribed, lambda: solve_field(gaps, prescribed, model))
 

@@ -101,26 +101,24 @@ def test_the_loss_is_as_accurate_as_asked_for_and_its_error_is_told(alpha):
     assert error < result.loss_error < 1e-3 * wave.loop.loss
 
 
-def test_vanishing_adhesion_ends_and_tells_what_it_misses():
+def test_vanishing_adhesion_ends_and_is_known_as_well():
     """γ = 1e-7 and 1e-8 on the same crests, each a parabola of its own.
 
     A single parabola's loss falls with γ^(4/3) but for a logarithm that weakens it. At 1e-8 the
-    loss is a small difference of works: what the accuracy misses, the loop says.
+    loss is a small difference of works, and as accurate.
     """
     profile = profile_of(0.8, 2, 12, 3)
     fair, faint = (
         loop(profile, gamma, max_penetration=0.25, load_steps=5) for gamma in (1e-7, 1e-8)
     )
     assert abs(fair.audit_residual) < 1e-3
-    assert fair.loss_error < 1e-3 * fair.loss
-    assert all("nm" in text for text in fair.warnings)  # only so short a range of adhesion
     for result in (fair, faint):
+        (text,) = result.warnings  # only of so short a range of adhesion
+        assert "nm" in text
+        assert result.loss_error < 1e-3 * result.loss
         assert min(jump.energy_drop for jump in result.jumps) > 0
         assert abs(result.loss - result.loss_from_drops) < result.loss_error
     assert 10 ** (4 / 3 - 0.1) < fair.loss / faint.loss < 10 ** (4 / 3)
-    assert faint.loss_error < 0.02 * faint.loss
-    if faint.loss_error > 1e-3 * faint.loss:
-        assert any("numerical error of the loss" in text for text in faint.warnings)
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,8 @@ from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, run_loop
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import MethodName
-from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE as SOFT
-from tests.support.scenes import UNEVEN, loop_of, loops_at, rough
+from tests.support.scenes import UNEVEN, grid_of, loop_of, loops_at, rough
 
 SHIFT = np.exp(1e-7j)
 DEEP = {"max_penetration": 0.7}

@@ -15,19 +15,15 @@ from tests.support.scenes import loop_of, loops_at, rough
 from tools.hostile import draw
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
+WAVE = single_wave(A, PERIOD)
 # A few waves with three patches at most, six jumps and minor crests that are pinned.
 ROUGH = np.zeros(7, complex)
 ROUGH[2:] = 1e-7 * np.array([0.51 - 0.35j, -0.64 + 0.66j, 0.10 - 0.09j, -0.13 - 0.29j, 0.02 - 0.4j])
 
 
 def wave(ratio: float, control: Control | None = None) -> Problem:
-    return Problem(
-        single_wave(A, PERIOD),
-        SOLID,
-        GAMMA,
-        control or Control(),
-        work_of_adhesion_open=ratio * GAMMA,
-    )
+    gamma_open = ratio * GAMMA
+    return Problem(WAVE, SOLID, GAMMA, control or Control(), work_of_adhesion_open=gamma_open)
 
 
 def closed_form(ratio: float, depth: float) -> tuple[float, float]:
@@ -56,7 +52,7 @@ def test_loss_of_a_wave_is_the_closed_form(ratio, depth):
 
 
 def test_equal_works_of_adhesion_give_the_same_bits_as_one():
-    one = Problem(single_wave(A, PERIOD), SOLID, GAMMA)
+    one = Problem(WAVE, SOLID, GAMMA)
     both = wave(1.0)
     assert both == one
     assert both.work_of_adhesion_open is None

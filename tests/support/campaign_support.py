@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import h5py
@@ -113,17 +113,11 @@ def command(words: Iterable[object], ranks: int = 0, fake: str | None = None) ->
     return [*start, sys.executable, *module, *entry, *map(str, words)]
 
 
-def adhesis(
-    *words: object,
-    ranks: int = 0,
-    fake: str | None = None,
-    cwd: Path | None = None,
-    timeout: float = 150.0,
-) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end; TimeoutExpired if that does not come."""
-    process = start(*words, ranks=ranks, fake=fake, cwd=cwd)
+def adhesis(*words: object, **how: Any) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, started as by ``start``; TimeoutExpired if that does not come."""
+    process = start(*words, **how)
     try:
-        out, errors = process.communicate(timeout=timeout)
+        out, errors = process.communicate(timeout=150.0)
     except BaseException:  # Ctrl-C does not reach a process group of its own
         if process.pid not in hung_launchers():  # which are left to whoever looks for them
             kill_all(process)

@@ -14,6 +14,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
+from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.registry import MethodName
 
 HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)
@@ -42,6 +43,14 @@ def loop_of(
     """Run a loop by a method, over the path of ``run_loop``."""
     method = make_method(name, problem, accuracy=accuracy, nodes_per_wave=nodes_per_wave)
     return run_loop(method, **path)
+
+
+def grid_of(problem: Problem, nodes: int, accuracy: float = 1e-3) -> GridMethod:
+    """Make the method on a grid of ``nodes`` nodes, a power of two."""
+    per_wave = nodes // problem.profile.highest_harmonic
+    method = GridMethod(problem, accuracy=accuracy, nodes_per_wave=per_wave)
+    assert method.nodes == nodes
+    return method
 
 
 def loops_at(problem: Problem, *accuracies: float, **path: Any) -> list[LoopResult]:

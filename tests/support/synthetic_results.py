@@ -154,10 +154,12 @@ def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
     }
 
 
-def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
-    create(path, campaign, attributes={"adhesis_version": "0.1.0"})
+def write(path: Path, plan: Campaign | str, values: dict[str, np.ndarray] | None = None) -> Path:
+    """Write a results file of a campaign, or of its text; its rows if no other values are given."""
+    plan = parse_campaign(plan) if isinstance(plan, str) else plan
+    create(path, plan, attributes={"adhesis_version": "0.1.0"})
     with h5py.File(path, "r+") as file:
-        for name, value in rows.items():
+        for name, value in (rows(plan) if values is None else values).items():
             file[name][...] = value
     return sign(path)
 
