@@ -241,6 +241,10 @@ def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path, finished
     earlier, first = finished
     path, out, whole = tmp_path / "c.toml", tmp_path / "r.h5", tmp_path / "w.h5"
     shutil.copy(earlier, out)
+    path.write_text(text(0.16))
+    stopped = shutil.copy(earlier, tmp_path / "stopped.h5")
+    run(path, stopped, fake="fail=*:*:*", max_failures=1)
+    assert read_status(stopped)["pending"] > 0  # what is wanted now, though not before
     path.write_text(text(0.16, 120))
     second, alone = run(path, out), run(path, whole)
     assert second.computed == alone.computed - first.computed > 0

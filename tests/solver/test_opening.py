@@ -97,18 +97,22 @@ def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
     """It halved each of them once, so that none grew again: such a loop did not end."""
     branch = SimpleNamespace(
         _states=SimpleNamespace(
-            of_point=lambda point: point, energy_residual=lambda before, after: 100.0
+            of_point=lambda point: point, energy_residual=lambda before, after: after.error
         ),
         _output=SimpleNamespace(d=0.0),
         _at_output=None,
         _resolution=SimpleNamespace(jump=1e-6, work=1.0),
-        _work_before=(0.0, math.inf),
         _work_of_fields=0.0,
     )
-    for d in (1.0, 0.5):
-        StableBranch._work_error(branch, SimpleNamespace(d=d))
-    branch._work_before = (0.0, math.inf)  # the step was accepted
-    assert StableBranch._work_error(branch, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
+
+    def judged(*trials: tuple[float, float]) -> list[float]:
+        branch._work_before = (0.0, math.inf)  # the step before was accepted
+        points = (SimpleNamespace(d=d, error=error) for d, error in trials)
+        return [StableBranch._work_error(branch, point) for point in points]
+
+    assert judged((1.0, 100.0), (0.5, 20.0)) == [100.0, 20.0]  # a shorter step reduces it
+    assert judged((1.0, 100.0), (0.5, 100.0)) == [100.0, TRAPEZOID_FAR]
+    assert judged((2.0, 100.0)) == [TRAPEZOID_FAR]
 
 
 def test_patches_that_open_from_the_same_edges_again_end_the_path():

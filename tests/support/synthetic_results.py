@@ -63,7 +63,6 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "status": np.ones(n, dtype=np.uint8),
         "wall_time": rng.uniform(1, 2, n),
         "cpu_time": rng.uniform(1, 2, n),
-        "rank": np.zeros(n, dtype=np.int32),
         "h_max": h_max,
         "h_rms": np.full(n, 1e-6),
         "m0": np.full(n, 1e-12),
@@ -74,21 +73,15 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "loss_from_drops": drops,
         "loss_small_scale": share * drops,
         "loss_large_scale": (1 - share) * drops,
-        "friction": np.zeros(n),
         "gamma_open": gamma,
         "audit_residual": audit,
         "loss_error": 1e-4 * loss,
-        "zone_error": np.zeros(n),
         "valid_range": 1e-2 * h_max,
         "edge_range": 2e-2 * h_max,
         "touch_range": 3e-2 * h_max,
-        "turn_range": np.full(n, np.inf),
         "largest_interior_tension": gamma / (1e-2 * h_max),
         "interior_tension_position": np.full(n, 0.25 * campaign.profile.period),
         "interior_tension_penetration": np.full(n, 0.1),
-        "opening_strength": np.full(n, np.inf),
-        "openings": np.zeros(n),
-        "barrier": np.zeros(n),
         "races": (np.arange(n) % 7 == 3).astype(np.int32),
         "energy_at_stake": np.where(np.arange(n) % 7 == 3, 0.02 * loss, 0.0),
         "pull_off_penetration": pull_off[:, 0],
@@ -107,6 +100,9 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "unloading_energy": np.where(stuck, -2e-6, 0.0),
         "jump_count": rng.integers(1, slots + 1, n).astype(np.int32),
     }
+    none = ("rank", "friction", "zone_error", "openings", "barrier")
+    out |= {name: np.zeros(n) for name in none}
+    out |= {name: np.full(n, np.inf) for name in ("turn_range", "opening_strength")}
     used = np.arange(slots) < out["jump_count"][:, None]
     kinds = rng.integers(0, len(JUMP_KINDS), (n, slots))
     energy = 10 ** rng.uniform(-8, -3, (n, slots))
