@@ -32,7 +32,6 @@ def film(loop: LoopResult) -> Film:
 
 def data_of(page: str) -> dict:
     found = re.search(r"^const film = (\{.*\});$", page, re.MULTILINE)
-    assert found is not None
     return json.loads(found[1])
 
 

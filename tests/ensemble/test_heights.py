@@ -211,7 +211,6 @@ def test_a_period_is_not_warned_of(kind: str) -> None:
 @pytest.mark.parametrize("kind", CUT)
 def test_ends_that_do_not_meet_are_warned_of(kind: str) -> None:
     sentence = heights_warning(CUT[kind], "it.csv")
-    assert sentence is not None
     assert sentence.startswith("the ends of it.csv do not meet: from its last height")
     assert "adhesis trace" in sentence
 

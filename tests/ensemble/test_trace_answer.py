@@ -237,7 +237,6 @@ def test_the_figure_of_the_tables_says_what_turning_points_are(control, at_prelo
         **dict.fromkeys(QUANTITIES, Uncertain(0.5, 0.1, {})),
     )
     drawn = tables_of(found)
-    assert drawn is not None
     assert drawn[0].axes[-1].get_xlabel() == f"turning point: {label}"
 
 
@@ -574,7 +573,6 @@ def test_stripes_reach_every_loop_of_a_trace_with_their_width() -> None:
     width = periods["answer"] / 20
     for name, job in jobs.items():
         problem = job.cycle.problem(job.profile, job.work_of_adhesion)
-        assert problem.pattern is not None
         assert problem.pattern.stripes[0] == round(periods[name] / width)
     found = document_of(of_the_answer_alone(cycle, trace))
     assert found["stripes"] == found["loop"]["stripes"] == 20

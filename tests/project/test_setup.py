@@ -122,7 +122,6 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
         second = subprocess.Popen(
             [setup], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
-        assert second.stdout is not None
         line = second.stdout.readline()
         assert line == "setup: another set-up is at work in this folder: waiting for its end\n"
         assert second.poll() is None
@@ -189,7 +188,6 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Sign
         wait_until((tmp_path / "begun").exists)
         script.send_signal(number)
         assert script.wait(20) == 75
-        assert script.stderr is not None
         assert "the same command resumes it (out/study.h5)" in script.stderr.readline()
     finally:
         os.killpg(script.pid, signal.SIGKILL)  # the stand-in's sleep

@@ -135,7 +135,6 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     edges, ends = method.edges, np.array(gaps, dtype=float)
     prescribed = separation * 2 * np.pi * 1e-3
     near = edges.response_near(ends, prescribed)
-    assert near is not None
     return near.descend(ends, ends, prescribed, most, False, edges.law, edges.model)
 
 
@@ -147,7 +146,6 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     found = run(wave, NARROW, 0.5, 1000)
     assert found.event == DescentEvent.AT_REST
     point = wave.edges.equilibrium(found.gaps, 0.5 * 2 * np.pi * 1e-3, 0.05 * wave.edges.wave)
-    assert point is not None
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
 
 

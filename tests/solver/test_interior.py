@@ -82,7 +82,6 @@ def test_the_tension_is_that_of_an_independent_solution():
     # its basis has each factor sin(·/2) half as large as the product of the edges has
     assert abs(constants[0]) / 2 == pytest.approx(abs(pressure), rel=1e-6)
     found = method.largest_tension([state])
-    assert found is not None
     places = found.position * profile.q0 + np.linspace(-0.02, 0.02, 5)
     kernel = np.sin((places[:, None] - theta[0]) / 2) ** -2
     tension = (kernel @ (opening[0] * weight)) / (4 * np.pi) - full(places) - pressure
@@ -111,7 +110,6 @@ def test_no_state_that_is_left_out_has_more_tension(young, seed):
     loop = loop_of(young, seed=seed)
     states = [state for state in loop.contact_states if state.patches]
     everywhere = loop.new_method().largest_tension(states)
-    assert everywhere is not None
     assert loop.largest_interior_tension == pytest.approx(everywhere.tension, rel=0.02)
 
 
@@ -120,8 +118,6 @@ def test_grid_and_sharp_agree():
     method = make_method("grid", sharp.problem, nodes_per_wave=64)
     grid = run_loop(method, max_penetration=0.9, load_steps=20)
     assert grid.valid_range == pytest.approx(sharp.valid_range, rel=0.03)
-    assert sharp.interior is not None
-    assert grid.interior is not None
     assert grid.interior.position == pytest.approx(sharp.interior.position, abs=1e-3 * PERIOD)
 
 
@@ -160,7 +156,6 @@ def test_where_and_when_are_those_of_a_state_also_of_a_path_and_of_one_loading_b
     assert path.narrowest_length == loop.narrowest_length
     assert path.warnings == ()
     found = loop.interior
-    assert found is not None
     assert ((loop.branch == found.branch) & (loop.penetration == found.penetration)).any()
     assert found.branch == "unloading"
     assert 0 <= found.position < PERIOD

@@ -22,7 +22,6 @@ needs_browser = pytest.mark.skipif(
 
 def seen_by_browser(page: str, script: str, folder: Path) -> Any:
     """Return what a script at the end of a page hands to ``reportSeen``, as soon as it does."""
-    assert BROWSER is not None
     begin = "const reportSeen = found => { document.getElementById('seen').textContent = "
     probe = (
         f"<pre id='seen'></pre><script>{begin}JSON.stringify(found); }};{script}</script></body>"
@@ -36,6 +35,5 @@ def seen_by_browser(page: str, script: str, folder: Path) -> Any:
         check=True,
     )
     found = re.search(r"<pre id=['\"]seen['\"]>(.*?)</pre>", done.stdout, re.DOTALL)
-    assert found is not None
     assert found[1]
     return json.loads(html.unescape(found[1]))
