@@ -18,6 +18,7 @@ from tests.support.launcher_crash import pytest_runtest_protocol  # noqa: F401  
 from tests.support.launchers import without_mpi, without_slurm
 from tests.support.progress import Waiting
 from tests.support.scheduling import rank_of, scheduler
+from tools.interrupted import Interrupt
 
 # Byte code is kept, or each process compiles all that it imports: seconds of the time of a command.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -33,6 +34,19 @@ for number, handler in (
 ):
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
+
+
+@pytest.fixture
+def alarm() -> Iterator[None]:
+    """Let SIGALRM raise what may be taken for a failure of whatever it meets."""
+
+    def handler(number: int, frame: object) -> None:
+        raise Interrupt
+
+    before = signal.signal(signal.SIGALRM, handler)
+    yield
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from study.measure import Reading, Sample
 from study.page import filled, write_pages
 from study.readings import Losses
 from study.text import mean_text, p_equals, p_text
-from tests.support.grids import grid_of
+from tests.support.scenes import grid_of
 
 STUDY = Path(__file__).resolve().parent.parent
 

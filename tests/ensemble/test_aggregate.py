@@ -16,7 +16,7 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.fields import field_plan
 from adhesis.solver.model.jump import JUMP_KINDS
 from tests.support.campaign_support import run_python
-from tests.support.synthetic_results import campaign, rows, sign, write
+from tests.support.synthetic_results import campaign, rows, sign, text_of, write
 
 E_STAR, Q0 = 1e6 / 0.75, 1000.0
 
@@ -248,11 +248,9 @@ print(data.done, (after - before) / 1024)
 
 def test_memory_does_not_grow_with_the_curves(tmp_path):
     """Blocks a twentieth of their size, and a file several times larger than the memory taken."""
-    plan = parse_campaign(
-        campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=1500, jumps=4)
-        .text.replace("unloading_until = -2.0", "unloading_until = -40.0")
-        .replace("field_nodes", "field_penetrations = []\nfield_nodes")
-    )
+    text = text_of(hurst=(0.8,), gamma=(0.01, 0.04), realisations=1500, jumps=4)
+    text = text.replace("unloading_until = -2.0", "unloading_until = -40.0")
+    plan = parse_campaign(text.replace("field_nodes", "field_penetrations = []\nfield_nodes"))
     path = tmp_path / "large.h5"
     create(path, plan)
     with h5py.File(path, "r+") as data:

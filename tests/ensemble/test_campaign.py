@@ -50,6 +50,11 @@ def test_values_units_and_defaults():
     assert campaign.solver.time_limit is None
     assert campaign.profile.normalisation == {"h_rms": 1e-6}
     assert campaign.task_count == 8
+    np.testing.assert_array_equal(campaign.loading_penetration, 0.6 * np.arange(5) / 4)
+    axis = campaign.unloading_penetration
+    assert axis[0] == 0.6
+    assert axis[-1] == pytest.approx(-3)
+    np.testing.assert_allclose(np.diff(axis), -0.15)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.toml")), ids=lambda p: p.name)
@@ -226,11 +231,8 @@ def test_bad_files_are_refused_in_one_sentence(text, words):
 
 def test_growth_and_other_changes_are_told_apart():
     old = parse_campaign(campaign_text())
-    grown = parse_campaign(
-        campaign_text(
-            hurst="[0.9, 0.7, 0.8]", work_of_adhesion="[0.01, 0.04, 0.07]", realisations="3"
-        )
-    )
+    more = {"hurst": "[0.9, 0.7, 0.8]", "work_of_adhesion": "[0.01, 0.04, 0.07]"}
+    grown = parse_campaign(campaign_text(**more, realisations="3"))
     difference = compare(old, grown)
     assert set(difference.grown) == {"sweep.hurst", "sweep.work_of_adhesion", "sweep.realisations"}
     assert not difference.other
@@ -268,15 +270,6 @@ def test_too_many_tasks_are_counted_and_not_made():
     )]  # fmt: skip
     text = campaign_text(hurst=many[0], work_of_adhesion=many[1], young=many[2])
     assert "makes 16000000000 tasks: it must make at most 10000000" in complaint(text)
-
-
-def test_penetration_axes():
-    campaign = parse_campaign(campaign_text())
-    np.testing.assert_array_equal(campaign.loading_penetration, 0.6 * np.arange(5) / 4)
-    axis = campaign.unloading_penetration
-    assert axis[0] == 0.6
-    assert axis[-1] == pytest.approx(-3)
-    np.testing.assert_allclose(np.diff(axis), -0.15)
 
 
 PLAIN = st.one_of(
@@ -337,11 +330,8 @@ def test_every_list_is_an_axis():
 
 
 def test_lists_vary_together_where_that_is_asked_for():
-    campaign = parse_campaign(
-        campaign_text(
-            hurst="[0.8, 0.7]", h_rms="[2e-6, 1e-6]", seed='5\nzip = [["h_rms", "hurst"]]'
-        )
-    )
+    lists = {"hurst": "[0.8, 0.7]", "h_rms": "[2e-6, 1e-6]"}
+    campaign = parse_campaign(campaign_text(**lists, seed='5\nzip = [["h_rms", "hurst"]]'))
     cells = {(h, dict(o)["h_rms"]) for h, o in ((t.hurst, t.others) for t in campaign.tasks())}
     assert cells == {(0.8, 2e-6), (0.7, 1e-6)}
     assert campaign.task_count == 2 * 2 * 2
@@ -391,15 +381,11 @@ def test_fields_under_a_load_are_kept_at_parts_of_it():
 
 # Keys of [material] that make an interface, γ = 0.04 J/m²; what the problems of the tasks have.
 INTERFACES: list[tuple[str, str, list[object]]] = [
-    ("", "measure", ["arc"]),
     ('measure = "flat"', "measure", ["flat"]),
-    ("", "strength", [math.inf]),
     ("adhesion_range = [1e-8, 2e-8]", "strength", [4e6, 2e6]),
     ("strength = 3e6", "strength", [3e6]),
-    ("", "work_of_adhesion_open", [None]),
     ('work_of_adhesion_open = ["50 mJ/m2", 0.08]', "work_of_adhesion_open", [0.05, 0.08]),
     ("work_of_adhesion_open = 0.04", "work_of_adhesion_open", [None]),  # also with the method grid
-    ("", "pattern", [None]),
     ("stripes = 2\nstripe_amplitude = 0.1", "pattern", [stripes(2, 0.1)]),
     (
         "stripes = [2, 8]\nstripe_amplitude = [0.1, 0.3]\nstripe_phase = 0.5",
@@ -416,4 +402,8 @@ def test_keys_of_the_interface_reach_every_task_and_may_be_axes(keys, name, foun
         text = text.replace('method = "grid"\nnodes_per_wave = 16\n', "")
     campaign = parse_campaign(text.replace("poisson = 0.5", f"poisson = 0.5\n{keys}"))
     assert [getattr(make_problem(campaign, task), name) for task in campaign.tasks()] == found
-    assert campaign.material.opens == (name == "strength" and keys != "")
+    assert campaign.material.opens == (name == "strength")
+    plain = make_problem(campaign := parse_campaign(text), campaign.tasks()[0])
+    assert (plain.measure, plain.strength) == ("arc", math.inf)
+    assert plain.work_of_adhesion_open is plain.pattern is None
+    assert not campaign.material.opens

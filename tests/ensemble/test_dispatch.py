@@ -25,17 +25,37 @@ from adhesis.solver._kernels import sum_pull
 from tools.interrupted import Interrupt
 
 
-class SimulatedRanks:
+class Scripted:
+    """A channel whose messages come at given times of a clock that sleep moves on."""
+
+    def __init__(self, workers, messages=()):
+        self.rank, self.workers, self.now = 0, range(1, workers + 1), 0.0
+        self.messages = sorted(messages, key=lambda m: m[0])
+        self.sent = []
+
+    def clock(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
+
+    def send(self, to, message, *, urgent=False):
+        self.sent.append((to, message))
+
+    def poll(self, *, urgent=False):
+        if self.messages and self.messages[0][0] <= self.now:
+            return self.messages.pop(0)[1:]
+        return None
+
+
+class SimulatedRanks(Scripted):
     """A channel whose workers take simulated time; also the clock and the sleep of the master."""
 
-    rank = 0
-
     def __init__(self, workers, seconds, *, halts=True, signal_at=None, message_time=20e-6):
-        self.workers = range(1, workers + 1)
+        super().__init__(workers)
         self._seconds = seconds
         self._halts = halts
         self._message_time = message_time
-        self.now = 0.0
         self.busy = 0.0
         self._queue = {rank: [] for rank in range(1, workers + 1)}
         self._ends: list[tuple[float, int, tuple]] = []
@@ -48,12 +68,6 @@ class SimulatedRanks:
     def _report_later(self, rank):
         at = self.now + REPORT_INTERVAL
         heapq.heappush(self._ends, (at, rank, ("alive", None, None)))
-
-    def clock(self):
-        return self.now
-
-    def sleep(self, seconds):
-        self.now += seconds
 
     def send(self, to, message, *, urgent=False):
         self.now += self._message_time
@@ -108,16 +122,15 @@ def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **
     schedule = schedule_of(tasks, group_of)
     channel = kind(workers, seconds, **ranks)
     collected: list[Outcome] = []
-    master = Master(
-        channel,
-        schedule,
-        collected.append,
-        limits(channel) if limits else Limits(),
-        clock=channel.clock,
-        sleep=channel.sleep,
-    )
+    master = master_of(channel, schedule, collected, limits(channel) if limits else Limits())
     reason = master.run()
     return channel, collected, reason, schedule
+
+
+def master_of(channel, schedule, collected, limits):
+    """Make a master that goes by the clock of its channel."""
+    clock = {"clock": channel.clock, "sleep": channel.sleep}
+    return Master(channel, schedule, collected.append, limits, **clock)
 
 
 def test_a_thousand_workers_are_kept_busy():
@@ -199,39 +212,10 @@ def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
         )
 
 
-class Scripted:
-    """A channel whose messages come at given times of a clock that sleep moves on."""
-
-    def __init__(self, workers, messages=()):
-        self.rank, self.workers, self.now = 0, range(1, workers + 1), 0.0
-        self.messages = sorted(messages, key=lambda m: m[0])
-        self.sent = []
-
-    def clock(self):
-        return self.now
-
-    def sleep(self, seconds):
-        self.now += seconds
-
-    def send(self, to, message, *, urgent=False):
-        self.sent.append((to, message))
-
-    def poll(self, *, urgent=False):
-        if self.messages and self.messages[0][0] <= self.now:
-            return self.messages.pop(0)[1:]
-        return None
-
-
 def scripted_master(channel, tasks, collected=None):
-    group_of = dict.fromkeys(tasks, 0)
-    schedule = schedule_of(tasks, group_of)
+    schedule = schedule_of(tasks, dict.fromkeys(tasks, 0))
     collected = [] if collected is None else collected
-    limits = Limits(silence=120)
-    return Master(
-        *(channel, schedule, collected.append, limits),
-        clock=channel.clock,
-        sleep=channel.sleep,
-    )
+    return master_of(channel, schedule, collected, Limits(silence=120))
 
 
 def done(task, rank):
@@ -365,20 +349,7 @@ def test_a_task_in_a_kernel_meets_its_time_limit():
     assert [o.error for o in outcomes] == ["longer than the time limit of 0.05 s"] * 3
 
 
-@pytest.fixture
-def handler():
-    """A handler of SIGALRM that raises what may be taken for a task's failure."""
-
-    def raise_interrupt(number, frame):
-        raise Interrupt
-
-    before = signal.signal(signal.SIGALRM, raise_interrupt)
-    yield
-    signal.setitimer(signal.ITIMER_REAL, 0)
-    signal.signal(signal.SIGALRM, before)
-
-
-def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_task(handler):
+def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_task(alarm):
     before = signal.signal(signal.SIGUSR2, signal.getsignal(signal.SIGALRM))
     try:
         with pytest.raises(Interrupt):
@@ -387,7 +358,7 @@ def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_task(handler):
         signal.signal(signal.SIGUSR2, before)
 
 
-def test_the_callers_own_timer_goes_on_while_tasks_are_tried(handler):
+def test_the_callers_own_timer_goes_on_while_tasks_are_tried(alarm):
     """It goes off in a task, as it would have without; and when it has not, it is still set."""
     signal.setitimer(signal.ITIMER_REAL, 500, 7)
     assert len(alone(lambda task, check: task)[0]) == 3
@@ -417,13 +388,8 @@ def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
     group_of = dict.fromkeys(range(30), 0)
     together = {task: task // 3 for task in range(30)}
     schedule = schedule_of([t for t in range(30) if t != 4], group_of, together)
-    channel = SimulatedRanks(4, seconds)
     collected: list[Outcome] = []
-    master = Master(
-        *(channel, schedule, collected.append, Limits()),
-        clock=channel.clock,
-        sleep=channel.sleep,
-    )
+    master = master_of(SimulatedRanks(4, seconds), schedule, collected, Limits())
     assert master.run() is None
     done = sorted(outcome.task for outcome in collected)
     assert done == [task for task in range(30) if task != 4]

@@ -10,31 +10,19 @@ from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
 import adhesis.ensemble.loop.film_scenes as scenes_module
-from adhesis import (
-    Control,
-    HalfSpace,
-    InputError,
-    Problem,
-    make_method,
-    run_loop,
-    self_affine_profile,
-    single_wave,
-)
+from adhesis import Control, InputError, LoopResult, Problem, run_loop, single_wave
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.loop.film import Film
 from adhesis.ensemble.loop.film_scenes import scenes_of
-from adhesis.solver.loading.loop_result import LoopResult
 from tests.support.browser import needs_browser, seen_by_browser
 from tests.support.exact_wave import ExactWave
-
-MATERIAL = HalfSpace(1e6, 0.5)
+from tests.support.scenes import HALF_SPACE, loop_of, rough
 
 
 @pytest.fixture(scope="module")
 def loop() -> LoopResult:
-    profile = self_affine_profile(0.8, period=2e-3, n0=2, ratio=8, seed=3, h_rms=1e-6)
-    method = make_method("sharp", Problem(profile, MATERIAL, 0.02))
-    return run_loop(method, max_penetration=0.8, load_steps=8)
+    problem = Problem(rough(2, 8, 3), HALF_SPACE, 0.02)
+    return loop_of(problem, max_penetration=0.8, load_steps=8)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +32,6 @@ def film(loop: LoopResult) -> Film:
 
 def data_of(page: str) -> dict:
     found = re.search(r"^const film = (\{.*\});$", page, re.MULTILINE)
-    assert found is not None
     return json.loads(found[1])
 
 
@@ -91,7 +78,7 @@ def test_of_more_jumps_than_frames_those_with_the_largest_drops_are_shown(loop, 
 
 @pytest.mark.parametrize("control", [Control(), Control(1e9), Control(0.0)])
 def test_a_frame_shows_the_exact_surface_and_patches(control):
-    problem = Problem(single_wave(1e-6, 1e-3), MATERIAL, 1e-3, control)
+    problem = Problem(single_wave(1e-6, 1e-3), HALF_SPACE, 1e-3, control)
     method = ExactWave(problem, states_per_step=4)
     turn = {"max_stress": 500.0} if control.is_load else {"max_penetration": 0.5}
     loop = run_loop(method, load_steps=4, **turn)

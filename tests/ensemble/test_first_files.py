@@ -4,7 +4,6 @@ import dataclasses
 import hashlib
 import re
 import shlex
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -14,8 +13,9 @@ from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
+from tests.support.campaign_support import ROOT
+from tests.support.processes import ran
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 KEYS = [(name, entry.name) for name, table in TABLES.items() for entry in dataclasses.fields(table)]
 
 
@@ -103,9 +103,7 @@ def completed(script: str, *words: str) -> set[str]:
         f"{script}\nCOMP_WORDS=({' '.join(map(repr, words))})\n"
         f"COMP_CWORD={len(words) - 1}\n_adhesis\nprintf '%s\\n' \"${{COMPREPLY[@]}}\""
     )
-    done = subprocess.run(
-        ["bash", "--norc", "-c", code], capture_output=True, text=True, check=True
-    )
+    done = ran("bash", "--norc", "-c", code, check=True)
     assert done.stderr == ""
     return set(done.stdout.split())
 

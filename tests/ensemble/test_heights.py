@@ -19,7 +19,6 @@ from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.model.profile import Array, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.campaign_support import campaign_text
-from tests.support.exact_wave import ExactWave
 
 N = 16
 SINGLE = single_wave(1e-9, 1e-3)
@@ -212,7 +211,6 @@ def test_a_period_is_not_warned_of(kind: str) -> None:
 @pytest.mark.parametrize("kind", CUT)
 def test_ends_that_do_not_meet_are_warned_of(kind: str) -> None:
     sentence = heights_warning(CUT[kind], "it.csv")
-    assert sentence is not None
     assert sentence.startswith("the ends of it.csv do not meet: from its last height")
     assert "adhesis trace" in sentence
 
@@ -232,9 +230,8 @@ def test_no_shift_of_a_periodic_profile_is_warned_of() -> None:
 
 @pytest.mark.parametrize("path", [(), ("--path", "0.5,0.2,0.4,out")], ids=["loop", "path"])
 def test_the_warning_goes_to_stderr_json_and_exit_code(path, tmp_path, monkeypatch, capsys):
-    # The method is of a single wave: only the heights that are read are tilted.
+    # The loop is of a single wave: only the heights that are read are tilted.
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
     monkeypatch.setattr(loop_command, "profile_from_heights", lambda heights, period: SINGLE)
     Path("a.csv").write_text("\n".join(repr(float(h)) for h in CUT["tilted"]))
     Path("b.csv").write_text("\n".join(METRES))

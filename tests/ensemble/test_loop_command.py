@@ -18,7 +18,7 @@ from adhesis.ensemble.quantities import units_of
 from adhesis.ensemble.versions import provenance
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
-from tests.support.options import replacing
+from tests.support.options import SCENE, replacing, rough_loop
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
@@ -71,17 +71,28 @@ def test_stripes_lower_the_loss_of_a_wave_whose_crest_is_weak(wave_file, tmp_pat
     assert "J/m² along the profile)" in capsys.readouterr().out
 
 
-def test_json_names_the_range_and_what_zones_at_edges_change(wave_file, tmp_path):
+RANGE = 0.1 * AMPLITUDE
+
+
+@pytest.mark.parametrize(
+    "words", [("--strength", GAMMA / RANGE), ("--adhesion-range", RANGE, "--measure", "flat")]
+)
+def test_json_names_range_and_measure_and_what_zones_at_edges_change(
+    words, wave_file, tmp_path, capsys
+):
     out = tmp_path / "loop.json"
-    range_ = 0.1 * AMPLITUDE
-    words = ("--max-penetration", 0.8, "--adhesion-range", range_, "--load-steps", 5)
-    assert run(*wave_words(wave_file, *words, "--json", out)) == 0
-    data = json.loads(out.read_text())
-    assert data["adhesion_range"] == pytest.approx(range_, rel=1e-12)
-    assert data["strength"] == pytest.approx(GAMMA / range_, rel=1e-12)
-    share = 0.05 * (range_ / data["edge_range"]) ** 4
+    steps = ("--max-penetration", 0.8, "--load-steps", 5, "--json", out)
+    assert run(*wave_words(wave_file, *steps, *words)) == 0
+    data, text = json.loads(out.read_text()), capsys.readouterr().out
+    assert data["adhesion_range"] == pytest.approx(RANGE, rel=1e-12)
+    assert data["strength"] == pytest.approx(GAMMA / RANGE, rel=1e-12)
+    share = 0.05 * (RANGE / data["edge_range"]) ** 4
     assert data["zone_error"] == pytest.approx(share * data["loss"], rel=1e-9)
     assert (data["stripes"], data["stripe_amplitude"], data["stripe_phase"]) == (None,) * 3
+    assert (data["openings"], data["barrier"]) == (0, 0.0)
+    assert {jump["barrier"] for jump in data["jumps"]} == {0.0}
+    assert data["measure"] == ("flat" if "flat" in words else "arc")
+    assert (", flat measure, " in text) == ("flat" in words)
 
 
 @pytest.mark.usefixtures("exact_method")
@@ -261,7 +272,7 @@ def test_fields_are_those_of_the_chosen_penetrations(wave_file, tmp_path):
 
 
 @pytest.mark.usefixtures("exact_method")
-def test_no_file_appears_if_the_fields_cannot_be_had(wave_file, tmp_path, monkeypatch):
+def test_an_error_of_adhesis_itself_leaves_no_file(wave_file, tmp_path, monkeypatch, capsys):
     def broken(self, state, n):
         raise FloatingPointError("no fields")
 
@@ -269,6 +280,7 @@ def test_no_file_appears_if_the_fields_cannot_be_had(wave_file, tmp_path, monkey
     out, fields = tmp_path / "loop.json", tmp_path / "fields.npz"
     words = wave_words(wave_file, "--load-steps", 2, "--json", out, "--fields", fields)
     assert run(*words) == 70
+    assert "FloatingPointError: no fields" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
 
 
@@ -325,20 +337,6 @@ def test_files_that_are_not_one_period_of_heights_are_refused(
     assert sentence in printed.err
 
 
-@pytest.mark.usefixtures("exact_method")
-def test_strength_and_measure_are_options_and_stand_in_the_json(wave_file, tmp_path, capsys):
-    out = tmp_path / "loop.json"
-    steps = ("--max-penetration", 0.8, "--load-steps", 2, "--json", out)
-    for words in (("--strength", 1e4), ("--adhesion-range", GAMMA / 1e4, "--measure", "flat")):
-        assert run(*wave_words(wave_file, *steps, *words)) == 0
-        data, text = json.loads(out.read_text()), capsys.readouterr().out
-        assert data["strength"] == pytest.approx(1e4)
-        assert (data["openings"], data["barrier"]) == (0, 0.0)
-        assert {jump["barrier"] for jump in data["jumps"]} == {0.0}
-        assert data["measure"] == ("flat" if "flat" in words else "arc")
-        assert (", flat measure, " in text) == ("flat" in words)
-
-
 def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(capsys):
     words = ("--hurst", 0.8, "--n0", 4, "--ratio", 4, "--load-steps", 2, "--young", 1e6, "--quiet")
     assert run(*words) == 0
@@ -352,23 +350,9 @@ def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(caps
     assert "--h-rms" not in line
 
 
-SCENE = [
-    "loop", "--hurst", "0.8", "--seed", "4", "--period", "1e-3", "--n0", "3", "--ratio", "6",
-    "--work-of-adhesion", "0.01", "--load-steps", "6", "--quiet",
-]  # fmt: skip
-
-
-def rough(tmp_path, capsys, *words: str) -> tuple[dict, str]:
-    out = tmp_path / "loop.json"
-    assert main([*SCENE, *words, "--json", str(out)]) == 0
-    return json.loads(out.read_text()), capsys.readouterr().out
-
-
-def test_several_turning_points_are_turns_of_one_document(tmp_path, capsys):
+def test_several_turning_points_are_turns_of_one_document(tmp_path):
     figure = tmp_path / "loops.png"
-    document, _ = rough(
-        tmp_path, capsys, "--max-penetration", "0.6,0.3,0.8", "--figure", str(figure)
-    )
+    document, *_ = rough_loop(tmp_path, "--max-penetration", "0.6,0.3,0.8", "--figure", figure)
     assert [turn["max_penetration"] for turn in document["turns"]] == [0.3, 0.6, 0.8]
     losses = [turn["loss"] for turn in document["turns"]]
     assert losses == sorted(losses)
@@ -376,36 +360,35 @@ def test_several_turning_points_are_turns_of_one_document(tmp_path, capsys):
     for turn in document["turns"]:
         assert turn["work_spent"] - turn["work_gained"] == pytest.approx(turn["loss"])
     assert imread(figure).ndim == 3
-    alone, _ = rough(tmp_path, capsys, "--max-penetration", "0.8")
+    alone, *_ = rough_loop(tmp_path, "--max-penetration", "0.8")
     assert "turns" not in alone
     assert alone["loss"] == pytest.approx(losses[-1], rel=1e-4)
 
 
-def test_a_path_tells_of_its_minor_loops(tmp_path, capsys):
-    document, text = rough(tmp_path, capsys, "--path", "0.8,0.3,0.6,out")
+def test_a_path_tells_of_its_minor_loops(tmp_path):
+    document, text, _ = rough_loop(tmp_path, "--path", "0.8,0.3,0.6,out")
     (minor,) = document["minor_loops"]
     assert (minor["start"], minor["turn"]) == (0.3, 0.6)
     assert document["out"]
     assert set(document["leg"]) == {0, 1, 2, 3}
     assert "minor loop  0.3, 0.6, 0.3:" in text
-    stays, _ = rough(tmp_path, capsys, "--path", "0.8,0.3")
+    stays, *_ = rough_loop(tmp_path, "--path", "0.8,0.3", "--work-of-adhesion", "0.01")
     assert not stays["out"]
     assert stays["energy_change"] < 0
 
 
-def test_a_stiffness_and_a_load(tmp_path, capsys):
-    fixed, _ = rough(tmp_path, capsys, "--max-penetration", "0.5")
-    soft, text = rough(tmp_path, capsys, "--max-penetration", "0.5", "--stiffness", "1e9")
+def test_a_stiffness_and_a_load(tmp_path):
+    fixed, *_ = rough_loop(tmp_path, "--max-penetration", "0.5")
+    soft, text, _ = rough_loop(tmp_path, "--max-penetration", "0.5", "--stiffness", "1e9")
     assert fixed["stiffness"] is None
     assert soft["stiffness"] == 1e9
     assert soft["loss"] > fixed["loss"]
     assert max(soft["displacement"]) == pytest.approx(0.5)
     assert "held by 1e+09 Pa/m" in text
-    load, _ = rough(tmp_path, capsys, "--stiffness", "0", "--max-stress", "500")
+    load, *_ = rough_loop(tmp_path, "--stiffness", "0", "--max-stress", "500")
     assert max(load["mean_stress"]) == pytest.approx(500)
-    layer, _ = rough(
-        tmp_path, capsys, "--max-penetration", "0.5", "--poisson", "0.3", "--layer", "1e-3"
-    )
+    layer_words = ("--max-penetration", "0.5", "--poisson", "0.3", "--layer", "1e-3")
+    layer, *_ = rough_loop(tmp_path, *layer_words)
     assert layer["stiffness"] == pytest.approx(1e6 * 0.7 / (1.3 * 0.4 * 1e-3))
 
 

@@ -83,6 +83,16 @@ def test_loops_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
     assert differences(tmp_path / "merged.h5", whole) == []
 
 
+def goes_on(path, out, whole) -> int:
+    """Run what is left, each task that is not done once; returns how many were done."""
+    done, log = done_rows(out), out.with_name("rest.log")
+    again = here(path, out, f"log={log}")
+    assert (again.done, again.computed) == (8, 8 - done)
+    assert len(log.read_text().splitlines()) == 8 - done
+    assert differences(out, whole) == []
+    return done
+
+
 @pytest.mark.parametrize("victim", ["worker", "master"])
 def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
     """A kill of all ranks: test_precision.py, and with the other writer below."""
@@ -135,8 +145,7 @@ def test_ranks_end_with_a_run_that_is_killed_and_the_next_one_resumes(tmp_path, 
     process.kill()
     process.wait()
     wait_until(lambda: all(map(has_ended, left)))
-    assert here(path, out).done == 8
-    assert differences(out, whole) == []
+    assert goes_on(path, out, whole) >= 1
 
 
 def test_a_rank_that_hangs_ends_the_job_and_the_same_command_goes_on(tmp_path, whole):
@@ -159,11 +168,7 @@ def test_a_rank_that_hangs_ends_the_job_and_the_same_command_goes_on(tmp_path, w
         "adhesis run: rank 2 has not answered for 1 s; what was done is kept, run the same command "
         "again to resume"
     )
-    done = done_rows(out)
-    assert done >= 2
-    again = here(path, out)
-    assert (again.done, again.computed) == (8, 8 - done)
-    assert differences(out, whole) == []
+    assert goes_on(path, out, whole) >= 2
 
 
 def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(tmp_path):
@@ -229,17 +234,14 @@ def rows_done(path) -> set[str]:
 
 @pytest.mark.parametrize("to", ["launcher", "one rank"])
 def test_a_signal_stops_every_rank_within_a_load_step(tmp_path, whole, to):
-    path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = start("run", path, "--out", out, ranks=3, fake="step=0.1 hang=0.8:0.04:1")
     wait_until(lambda: done_rows(out) >= 2)
     os.kill(process.pid if to == "launcher" else ranks_of(process.pid)[-1], signal.SIGUSR1)
     _, errors = process.communicate(timeout=150)  # one of the tasks would never end
     assert process.returncode == 75, errors
     assert "stopped early: SIGUSR1 received" in errors
-    kept = done_rows(out)
-    assert here(path, out, f"log={log}").computed == 8 - kept
-    assert len(log.read_text().splitlines()) == 8 - kept
-    assert differences(out, whole) == []
+    assert goes_on(path, out, whole) >= 2
 
 
 def test_an_error_that_is_not_a_tasks_ends_the_job(tmp_path):

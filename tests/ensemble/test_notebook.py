@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -319,10 +320,7 @@ def _inside_itself():
 
 
 def _nested(depth):
-    values: Any = 0.7
-    for _ in range(depth):
-        values = [values]
-    return values
+    return reduce(lambda values, _: [values], range(depth), 0.7)
 
 
 class _Printed(float):

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,9 +14,8 @@ from adhesis.ensemble.report.findings import verdict
 from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import beyond_zero_range
-from adhesis.ensemble.trace import answer as answers
 from adhesis.ensemble.trace.answer import check as check_trace
-from adhesis.ensemble.trace.answer import make_cycle, run_plan
+from adhesis.ensemble.trace.answer import make_cycle
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.ensemble.trace.variants import make_plan
@@ -73,12 +71,7 @@ def test_the_table_of_a_trace_keeps_the_ratio_of_both_works_of_adhesion():
     assert found == {(0.04, 0.06), (0.02, 0.03), (0.08, 0.12)}
 
 
-def test_the_answer_of_a_trace_has_its_friction(monkeypatch):
-    def only_the_answer(prepared, cycle, plan, watch):
-        jobs = tuple(job for job in plan.jobs if job.name == "answer")
-        return run_plan(prepared, cycle, replace(plan, runs=plan.runs[:1], jobs=jobs), watch)
-
-    monkeypatch.setattr(answers, "run_plan", only_the_answer)
+def test_the_answer_of_a_trace_has_its_friction():
     answer = adhesis.loss_of_trace(
         small_trace(),
         half_space=HALF_SPACE,

@@ -115,8 +115,7 @@ def test_every_figure_is_drawn_into_axes_that_are_given(tmp_path, monkeypatch):
     What its layout is asked for: test_report_axes.py.
     """
     monkeypatch.setattr(Figure, "draw_without_rendering", lambda figure: None)
-    plan = campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=4)
-    results = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan)))
+    results = adhesis.open(write(tmp_path / "r.h5", campaign(hurst=(0.8,), realisations=4)))
     names = [name for name in dir(results.plot) if name != "loss_along"]
     for name in names:
         draw = getattr(results.plot, name)
@@ -126,10 +125,8 @@ def test_every_figure_is_drawn_into_axes_that_are_given(tmp_path, monkeypatch):
         assert draw(ax=given) is mine
         for panel, own in zip(given[:, 0], alone.axes, strict=True):
             assert len(panel.collections) == len(own.collections), name
-            assert (panel.get_xscale(), panel.get_yscale()) == (
-                own.get_xscale(),
-                own.get_yscale(),
-            ), name
+            assert panel.get_xscale() == own.get_xscale(), name
+            assert panel.get_yscale() == own.get_yscale(), name
             assert panel.get_xlabel(), name
         assert given[0, 0].get_legend() is not None, name
 

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import resource
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,15 +11,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json, write_new
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.single_wave import SingleWave
-from tests.support.exact_wave import ExactWave
-from tests.support.synthetic_results import campaign, rows, write
+from tests.support.processes import ran
+from tests.support.synthetic_results import campaign, write
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9
 GAMMA = SingleWave.with_alpha(0.2, AMPLITUDE, PERIOD, 1e6 / 0.75).work_of_adhesion
@@ -35,7 +33,6 @@ Ask = Callable[..., tuple[int, str, str]]
 def ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Run a command in a folder that holds wave.csv; gives exit code, output and last error."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
     Path("wave.csv").write_text("\n".join(map(repr, HEIGHTS.tolist())))
 
     def run(*words: object) -> tuple[int, str, str]:
@@ -183,8 +180,7 @@ def test_older_files_of_the_writers_own_names_are_removed(tmp_path: Path) -> Non
 
 
 def test_a_report_on_a_full_disk_ends_in_one_sentence_and_leaves_the_old_one(ask: Ask) -> None:
-    small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
-    write(Path("r.h5"), small, rows(small))
+    write(Path("r.h5"), campaign(hurst=(0.8,), gamma=(0.01,), realisations=2))
     Path("out").mkdir()
     Path("out/losses.csv").write_text("old")
     # files may not grow beyond this, which HDF5 and matplotlib meet as they meet a full disk
@@ -193,9 +189,7 @@ def test_a_report_on_a_full_disk_ends_in_one_sentence_and_leaves_the_old_one(ask
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY)); "
         "sys.exit(main(['report', 'r.h5', '--to', 'out']))"
     )
-    done = subprocess.run(
-        python("-c", code), env=python_environment(), capture_output=True, text=True, check=False
-    )
+    done = ran(*python("-c", code), env=python_environment())
     assert done.returncode == 74, done.stderr
     lines = done.stderr.splitlines()
     progress = re.compile(r"adhesis report: .+  [\d.]+ s")  # on a busy machine

@@ -16,8 +16,6 @@ import numpy as np
 import pytest
 
 import adhesis
-import adhesis.ensemble.command.loop as loop_command
-import adhesis.ensemble.command.trace as trace_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.run.lock import holder
@@ -25,7 +23,8 @@ from adhesis.ensemble.run.session import run_campaign
 from tests.support.campaign_support import campaign_text
 from tests.support.exact_wave import ExactWave
 from tests.support.fake_run import fake_engine
-from tests.support.synthetic_results import campaign, rows, write
+from tests.support.options import forbid_work
+from tests.support.synthetic_results import campaign, write
 
 ANOTHER_USER = 12345
 LONGEST = 20  # s; nothing here takes one
@@ -144,24 +143,16 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     signal.signal(signal.SIGALRM, before)
 
 
-def no_work(*_: object, **__: object) -> None:
-    raise AssertionError("the work began before the paths were looked at")
-
-
 @pytest.fixture
-def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
-    for name in ("run_loop", "run_loops", "run_path"):
-        monkeypatch.setattr(loop_command, name, no_work)
-    monkeypatch.setattr(trace_command, "run_plan", no_work)
-    monkeypatch.setattr("adhesis.ensemble.bench.benchmark.benchmark", no_work)
-    monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", no_work)
+def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    forbid_work(monkeypatch)
+    monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", None)
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> str:
     small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
-    return str(write(tmp_path_factory.mktemp("results") / "sound.h5", small, rows(small)))
+    return str(write(tmp_path_factory.mktemp("results") / "sound.h5", small))
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +230,7 @@ CASES = [
 ]
 
 
-@pytest.mark.usefixtures("no_loop")
+@pytest.mark.usefixtures("no_work")
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_a_crafted_path_is_refused_in_one_sentence_before_anything_is_done(
     name, kind, place, results, loop, capsys

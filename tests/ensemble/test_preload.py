@@ -2,7 +2,6 @@
 
 import json
 import re
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -10,15 +9,7 @@ import pytest
 from matplotlib.axes import Axes
 
 import adhesis
-from adhesis import (
-    Control,
-    HalfSpace,
-    Problem,
-    prepare_trace,
-    read_trace,
-    run_loop,
-    self_affine_profile,
-)
+from adhesis import Control, Problem, prepare_trace, read_trace, run_loop
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
@@ -34,22 +25,13 @@ from adhesis.ensemble.trace.loops import compute as compute_job
 from adhesis.ensemble.trace.trace_page import page_text
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
+from tests.support.options import SCENE, rough_loop
+from tests.support.scenes import HALF_SPACE, loop_of, rough
 from tests.support.synthetic_results import campaign, rows, write
 
-SCENE = [
-    "loop", "--hurst", "0.8", "--seed", "4", "--period", "1e-3", "--n0", "3", "--ratio", "6",
-    "--work-of-adhesion", "0.005", "--load-steps", "10", "--quiet",
-]  # fmt: skip
 
-
-def run(tmp_path: Path, capsys, *words: str) -> tuple[dict, str, str]:
-    out = tmp_path / "loop.json"
-    assert main([*SCENE, *words, "--json", str(out)]) == 0
-    return json.loads(out.read_text()), *capsys.readouterr()
-
-
-def test_the_loop_of_a_machine_turns_at_the_preload(tmp_path, capsys):
-    document, text, _ = run(tmp_path, capsys, "--preload", "0.5kPa")
+def test_the_loop_of_a_machine_turns_at_the_preload(tmp_path):
+    document, text, _ = rough_loop(tmp_path, "--preload", "0.5kPa")
     assert document["preload"] == 500.0
     assert document["preload_reached"] is True
     assert document["turning_stress"] == pytest.approx(500.0, rel=1e-8)
@@ -63,11 +45,11 @@ def test_the_loop_of_a_machine_turns_at_the_preload(tmp_path, capsys):
     stress = np.array(document["mean_stress"])[np.array(document["branch"]) == "loading"]
     assert stress.max() == stress[-1]
     table = ("--csv", str(tmp_path / "loop.csv"))
-    several, _, _ = run(tmp_path, capsys, "--preload", "0.5kPa,200", *table)
+    several, *_ = rough_loop(tmp_path, "--preload", "0.5kPa,200", *table)
     assert [turn["preload"] for turn in several["turns"]] == [200.0, 500.0]
     assert "preload (Pa)" in (tmp_path / "loop.csv").read_text().splitlines()[0]
     assert several["loss"] == pytest.approx(document["loss"], rel=1e-5)
-    soft, text, _ = run(tmp_path, capsys, "--preload", "500", "--stiffness", "1e9")
+    soft, text, _ = rough_loop(tmp_path, "--preload", "500", "--stiffness", "1e9")
     assert soft["turning_stress"] == pytest.approx(500.0, rel=1e-8)
     assert soft["loss"] > document["loss"]
     assert "held by 1e+09 Pa/m, turning at the preload of 0.5 kPa, at u_tot/h_max = " in text
@@ -75,7 +57,7 @@ def test_the_loop_of_a_machine_turns_at_the_preload(tmp_path, capsys):
 
 def test_a_preload_that_is_not_reached_is_doubted(tmp_path, capsys):
     words = ("--preload", "500kPa", "--max-penetration", "0.6")
-    document, text, errors = run(tmp_path, capsys, *words)
+    document, text, errors = rough_loop(tmp_path, *words)
     assert document["preload_reached"] is False
     assert document["turning_point"] == 0.6
     assert "turning at Δ/h_max = 0.6, before the preload of 500 kPa is reached" in text
@@ -87,8 +69,8 @@ def test_a_preload_that_is_not_reached_is_doubted(tmp_path, capsys):
     assert "Pa, less than the preload" in capsys.readouterr().err
 
 
-def test_the_loss_of_a_weight_says_so(tmp_path, capsys):
-    document, text, _ = run(tmp_path, capsys, "--stiffness", "0", "--max-stress", "500")
+def test_the_loss_of_a_weight_says_so(tmp_path):
+    document, text, _ = rough_loop(tmp_path, "--stiffness", "0", "--max-stress", "500")
     (line,) = (line for line in text.splitlines() if line.startswith("loss"))
     assert document["loss_note"] in line
     assert document["loss_note"].startswith("under a weight; it falls off at ")
@@ -97,33 +79,32 @@ def test_the_loss_of_a_weight_says_so(tmp_path, capsys):
         f": drops before the fall {1e3 * sum(before):.3g} mJ/m², closed at the separation of the "
         f"fall {1e3 * (sum(before) + last):.3g} mJ/m²"
     )
-    machine, text, _ = run(tmp_path, capsys, "--preload", "500")
+    machine, text, _ = rough_loop(tmp_path, "--preload", "500")
     assert machine["loss_note"] == ""
     assert machine["loss"] > document["loss"]
     assert "under a weight" not in text
 
 
 def test_a_trace_doubts_a_fall_and_takes_shares_of_the_drops_before_it():
-    profile = self_affine_profile(0.8, period=1e-3, n0=3, ratio=6, seed=4, h_rms=1e-6)
-    half_space, gamma, stress = HalfSpace(1e6, 0.5), 0.012, 2000.0
-    cycle = Cycle(half_space, (gamma,), (stress,), load_steps=5, control=Control(0.0))
+    profile, gamma, stress = rough(3, 6, 4, period=1e-3), 0.012, 2000.0
+    cycle = Cycle(HALF_SPACE, (gamma,), (stress,), load_steps=5, control=Control(0.0))
     found = compute_job(Job("answer", profile, cycle, gamma, stress))
-    problem = Problem(profile, half_space, gamma, Control(0.0))
-    loop = run_loop(make_method("auto", problem), max_stress=stress, load_steps=5)
+    problem = Problem(profile, HALF_SPACE, gamma, Control(0.0))
+    loop = loop_of(problem, "auto", max_stress=stress, load_steps=5)
     assert found["fall_warnings"] == loop.fall_warnings() != []
     small = sum(jump.energy_drop for jump in loop.jumps[:-1] if jump.small_scale)
     before = sum(jump.energy_drop for jump in loop.jumps[:-1])
     assert found["small_scale_share"] == pytest.approx(small / before)
 
 
-def test_a_surface_that_is_flat_enough_to_stick_says_so(tmp_path, capsys):
+def test_a_surface_that_is_flat_enough_to_stick_says_so(tmp_path):
     words = ("--h-rms", "0.2um", "--preload", "0.5kPa")
-    document, text, _ = run(tmp_path, capsys, *words)
+    document, text, _ = rough_loop(tmp_path, *words)
     full = document["full_contact_energy"]
     assert full < document["work_of_adhesion"]
     (line,) = (line for line in text.splitlines() if line.startswith("sticking"))
     assert f"flat enough to stick: full contact costs {1e3 * full:.3g} mJ/m² of γ = 5 mJ/m²" in line
-    _, text, _ = run(tmp_path, capsys, "--preload", "0.5kPa")
+    _, text, _ = rough_loop(tmp_path, "--preload", "0.5kPa")
     assert "stick" not in text
 
 
@@ -142,9 +123,9 @@ def test_the_way_of_a_trace_under_a_weight_has_a_unit(monkeypatch):
         assert f"(unloading, {text}" in _progress(Loops((), 1), load)
 
 
-def test_fields_are_written_at_mean_stresses(tmp_path, capsys):
+def test_fields_are_written_at_mean_stresses(tmp_path):
     path = tmp_path / "fields.npz"
-    document, _, _ = run(tmp_path, capsys, "--preload", "500", "--fields", str(path))
+    document, *_ = rough_loop(tmp_path, "--preload", "500", "--fields", str(path))
     found = np.load(path)
     wanted = np.tile(500.0 * np.array([0.25, 0.5, 0.75, 1.0]), 2)
     assert found["mean_stress"] == pytest.approx(wanted, rel=1e-8)
@@ -152,7 +133,7 @@ def test_fields_are_written_at_mean_stresses(tmp_path, capsys):
     assert found["gap"].mean(axis=1) == pytest.approx(found["separation"], rel=1e-3)
     assert found["penetration"][7] == pytest.approx(document["turning_point"], rel=1e-9)
     words = ("--fields", str(path), "--field-stresses=-100", "--stiffness", "1e9")
-    run(tmp_path, capsys, *words, "--max-penetration", "0.6")
+    rough_loop(tmp_path, *words, "--max-penetration", "0.6")
     found = np.load(path)  # no state of contact has so small a tension on loading
     assert found["mean_stress"] == pytest.approx([-100.0], rel=1e-8)
     assert found["branch"].tolist() == ["unloading"]
@@ -175,7 +156,7 @@ def test_a_trace_turns_at_the_preload(tmp_path, capsys, monkeypatch):
     assert document["max_penetration"] is None
     assert document["loop"]["turning_stress"] == pytest.approx(300.0, rel=1e-8)
     prepared = prepare_trace(read_trace(path, unit="m"))
-    scene = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.002, "load_steps": 3}
+    scene = {"half_space": HALF_SPACE, "work_of_adhesion": 0.002, "load_steps": 3}
     latest = {"max_penetration": 0.5, "quick": True, "processes": 0}
     far = adhesis.loss_of_trace(prepared, **scene, preload=1e9, **latest)
     (others,) = (text for text in far.warnings if "did not turn at the preload" in text)

@@ -17,7 +17,7 @@ from adhesis.ensemble.run.price import price
 from adhesis.ensemble.run.session import run_campaign
 from adhesis.solver.method import PathError
 from tests.support.campaign_support import adhesis_here, campaign_text, write_campaign
-from tests.support.fake_run import fake_engine, fake_result
+from tests.support.fake_run import fake_engine, write_results
 
 
 def cost(task):
@@ -142,9 +142,7 @@ def test_cells_that_take_more_than_in_proportion_are_followed(monkeypatch):
 def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
     campaign, path = parse_campaign(campaign_text()), tmp_path / "r.h5"
     create(path, campaign)
-    with Writer(path) as writer:
-        for row, task in enumerate(campaign.tasks()[:6]):
-            writer.write_result(row, fake_result(campaign, task) | {"cpu_time": 7.0})
+    write_results(path, campaign, range(6), cpu_time=7.0)
     reported = price(campaign, path, compute=compute)
     assert (reported.done, reported.pilots) == (6, 2)
     assert reported.seconds == pytest.approx(cost(campaign.tasks()[6]) + cost(campaign.tasks()[7]))
@@ -185,9 +183,8 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
     # What the rule has left out is not priced.
     path = tmp_path / "r.h5"
     create(path, campaign)
+    write_results(path, campaign, range(72), cpu_time=7.0)
     with Writer(path) as writer:
-        for row, task in enumerate(campaign.tasks()[:72]):
-            writer.write_result(row, fake_result(campaign, task) | {"cpu_time": 7.0})
         writer.mark(range(72, 200), needed=False)
     reported = price(campaign, path, compute=compute, seconds=-1.0)
     assert reported.done == 72

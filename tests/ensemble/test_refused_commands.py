@@ -11,14 +11,12 @@ import h5py
 import numpy as np
 import pytest
 
-import adhesis.ensemble.command.loop as loop_command
-import adhesis.ensemble.command.trace as trace_command
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.run import launch
 from tests.support.campaign_support import write_campaign
-from tests.support.options import replacing
+from tests.support.options import forbid_work, replacing
 
 # A case begins with a command or one of these, whose options give way to those of the case.
 BASES = {
@@ -83,7 +81,7 @@ LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
 LOOP --layer 0 -> --layer is 0.0: it must be a positive number
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
-LOOP --stripes 2 -> the amplitude of stripes of the work of adhesion is missing
+{{LOOP,TRACE --plan --unit um}} --stripes 2 -> the amplitude of stripes of the work of adhesion is
 LOOP --stripe-phase 1.0 -> the number of stripes of the work of adhesion is missing
 LOOP --stripes 2 --stripe-amplitude 0.1 --strength 1e8 -> is given beside a strength
 loop --heights none.npy --period 1e-3 -> with --heights the material has to be given
@@ -198,15 +196,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.chdir(folder)
         fill(folder)
-        for name in ("run_loop", "run_loops", "run_path"):
-            monkeypatch.setattr(loop_command, name, begins)
-        monkeypatch.setattr(trace_command, "run_plan", begins)
-        monkeypatch.setattr("adhesis.ensemble.bench.benchmark.benchmark", begins)
+        forbid_work(monkeypatch)
         yield folder
-
-
-def begins(*_: object, **__: object) -> None:
-    raise AssertionError("bad input reached the computation")
 
 
 def fill(folder: Path) -> None:

@@ -25,7 +25,7 @@ from adhesis.ensemble.report.tables.loss_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import FAILED
-from tests.support.synthetic_results import campaign, rows, sign, write
+from tests.support.synthetic_results import campaign, rows, sign, text_of, write
 
 TOPS = (0.5, 0.7, 0.9)
 AXES = {"ratio": [50, 100], "max_penetration": list(TOPS)}
@@ -77,14 +77,10 @@ def test_figures_show_one_place_on_the_further_axes_that_has_results(file, data,
     values["status"][values["max_penetration"] > 0.8] = 0
     early = aggregate(write(tmp_path / "r.h5", data.campaign, values))
     assert {c.others[1] for c in early.shown.cells} == {("max_penetration", 0.7)}
-
-
-def test_figures_of_a_part_show_one_place_too(data, tmp_path):
-    """Of few realisations a part has not every cell; those shown have the same further values."""
-    plan, part = data.campaign, Part(3, 7)
-    create(tmp_path / "part.h5", plan, part=part)
-    with h5py.File(tmp_path / "part.h5", "r+") as file:
-        file["status"][:] = 1
+    # of few realisations a part has not every cell; those shown have the same further values
+    create(tmp_path / "part.h5", data.campaign, part=Part(3, 7))
+    with h5py.File(tmp_path / "part.h5", "r+") as part:
+        part["status"][:] = 1
     found = aggregate(sign(tmp_path / "part.h5"))
     assert len(found.cells) < len(data.cells)
     assert {cell.others for cell in found.shown.cells} == {
@@ -173,9 +169,9 @@ def test_the_status_has_the_units_of_the_axes(tmp_path):
 
 
 def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):
-    text = campaign(hurst=(0.7, 0.8), gamma=(0.04,), realisations=2, ratio=[8, 10]).text
-    plan = parse_campaign(text.replace("seed = 1", 'seed = 1\nzip = [["hurst", "ratio"]]'))
-    found = aggregate(write(tmp_path / "r.h5", plan, rows(plan)))
+    text = text_of(hurst=(0.7, 0.8), gamma=(0.04,), realisations=2, ratio=[8, 10])
+    text = text.replace("seed = 1", 'seed = 1\nzip = [["hurst", "ratio"]]')
+    found = aggregate(write(tmp_path / "r.h5", text))
     assert [(c.hurst, *c.others) for c in found.shown.cells] == [
         (0.7, ("ratio", 8)), (0.8, ("ratio", 10))
     ]  # fmt: skip
@@ -185,10 +181,9 @@ def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):
 
 def test_a_second_scale_of_stress_needs_one_modulus(tmp_path):
     for zipped, scales in (("", 1), ('\nzip = [["hurst", "young"]]', 0)):
-        text = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=2).text
-        text = text.replace("seed = 1", f"seed = 1{zipped}")
-        plan = parse_campaign(text.replace("young = 1e6", "young = [1e6, 2e6]"))
-        path = write(tmp_path / f"{scales}.h5", plan, rows(plan))
+        text = text_of(realisations=2).replace("seed = 1", f"seed = 1{zipped}")
+        text = text.replace("young = 1e6", "young = [1e6, 2e6]")
+        path = write(tmp_path / f"{scales}.h5", text)
         (axes,) = adhesis.open(path).plot.pull_off().axes
         found = [child for child in axes.child_axes if "sigma" in child.get_ylabel()]
         assert len(found) == scales
@@ -227,7 +222,7 @@ def test_units_are_those_in_which_the_campaign_was_written(tmp_path):
     plan = parse_campaign(re.sub(r"h_rms = .*", 'h_rms = ["0.5 um", "1 um"]', text))
     assert pickle.loads(pickle.dumps(plan)) == plan
     assert plan.tasks()[0].cell_name == "H = 0.8, γ = 10 mJ/m², h_rms = 0.5 µm"
-    path = write(tmp_path / "r.h5", plan, rows(plan))
+    path = write(tmp_path / "r.h5", plan)
     plot = adhesis.open(path).plot
     figure = plot.loss_along("h_rms")
     assert figure.axes[-1].get_xlabel().endswith("(µm)")
@@ -295,10 +290,9 @@ def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, qui
 
 
 def test_a_loss_under_a_weight_says_so_at_its_axis(tmp_path):
-    text = campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=2).text
+    text = text_of(hurst=(0.8,), realisations=2).replace("unloading_until = -2.0\n", "")
     text = text.replace("max_penetration = 0.9", 'control = "load"\nmax_stress = [100, 200]')
-    plan = parse_campaign(text.replace("unloading_until = -2.0\n", ""))
-    plot = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan))).plot
+    plot = adhesis.open(write(tmp_path / "r.h5", text)).plot
     labels = [axes.get_ylabel() for axes in plot.loss_along("max_stress").axes]
     assert [label for label in labels if "mJ" in label] == [
         "loss\nunder a weight (mJ/m²)",
@@ -337,9 +331,9 @@ def test_a_note_that_is_cut_off_is_a_warning(with_failures):
 
 
 def test_a_notebook_tells_small_values_of_an_axis_apart(tmp_path):
-    text = campaign(hurst=(0.8,), gamma=(0.04,), realisations=2).text
-    plan = parse_campaign(re.sub(r"h_rms = .*", 'h_rms = ["1 um", "1.4 um"]', text))
-    results = adhesis.open(write(tmp_path / "r.h5", plan, rows(plan)))
+    text = text_of(hurst=(0.8,), gamma=(0.04,), realisations=2)
+    text = re.sub(r"h_rms = .*", 'h_rms = ["1 um", "1.4 um"]', text)
+    results = adhesis.open(write(tmp_path / "r.h5", text))
     page = results._repr_html_()
     assert ">1e-06</th>" in page
     assert ">1.4e-06</th>" in page

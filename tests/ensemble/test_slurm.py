@@ -22,10 +22,10 @@ from pathlib import Path
 import pytest
 
 from adhesis.ensemble.run import launch
-from tests.support.campaign_support import campaign_text, done_rows, wait_until
+from tests.support.campaign_support import ROOT, campaign_text, done_rows, wait_until
 from tests.support.launchers import PATH
+from tests.support.processes import ran
 
-ROOT = Path(__file__).parent.parent.parent
 SCRIPT = ROOT / "jobs" / "slurm.sh"
 pytestmark = pytest.mark.slurm
 
@@ -57,9 +57,7 @@ class Cluster:
     env: dict[str, str]
 
     def call(self, *command: str | Path, cwd: Path | None = None) -> str:
-        done = subprocess.run(
-            command, env=self.env, cwd=cwd, capture_output=True, text=True, timeout=150, check=False
-        )
+        done = ran(*command, env=self.env, cwd=cwd)
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
         return done.stdout
 
@@ -146,8 +144,8 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
     )
     # Control groups are often missing where tests run. Later versions can do without, earlier ones
     # need none as long as they look for the old kind.
-    version = subprocess.run(["slurmd", "-V"], env=os.environ | {"PATH": PATH}, capture_output=True)
-    found = re.search(rb"(\d+)\.(\d+)", version.stdout)
+    version = ran("slurmd", "-V", env=os.environ | {"PATH": PATH})
+    found = re.search(r"(\d+)\.(\d+)", version.stdout)
     recent = found is not None and (int(found[1]), int(found[2])) >= (24, 5)
     plugin = "disabled" if recent else "cgroup/v1"
     (folder / "cgroup.conf").write_text(f"CgroupPlugin={plugin}\n")
@@ -170,10 +168,7 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
             )
 
     def idle() -> bool:
-        done = subprocess.run(
-            ["sinfo", "--noheader", "--format=%T"], env=env, capture_output=True, text=True
-        )
-        return done.stdout.strip() == "idle"
+        return ran("sinfo", "--noheader", "--format=%T", env=env).stdout.strip() == "idle"
 
     try:
         socket_path = folder / "munge.socket"
@@ -207,7 +202,7 @@ class Job:
 
     def again(self, *words: str) -> Job:
         words = ("sbatch", "--parsable", "--ntasks=2", str(SCRIPT), "study.toml", *words)
-        done = subprocess.run(words, env=self.env, cwd=self.folder, capture_output=True, text=True)
+        done = ran(*words, env=self.env, cwd=self.folder)
         assert done.returncode == 0, done.stderr
         return Job(self.cluster, self.folder, done.stdout.strip(), self.env)
 
@@ -247,13 +242,7 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Callab
     if mpirun is None:
         pytest.skip("no mpirun here")
 
-    def submit(
-        *words: str,
-        realisations: int = 3,
-        launcher: str = "",
-        silence: int = 120,
-        staging: str = "",
-    ) -> Job:
+    def submit(*words, realisations=3, launcher="", silence=120, staging="") -> Job:
         folder = tmp_path_factory.mktemp("a study, ")
         text = campaign_text(realisations=str(realisations))
         (folder / "study.toml").write_text(text)
@@ -273,7 +262,7 @@ exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
         env |= {"STAGING": staging and str(folder / staging)}
         if not words[0].startswith("/"):
             words = ("sbatch", "--parsable", *words, str(SCRIPT), "study.toml")
-        done = subprocess.run(words, env=env, cwd=folder, capture_output=True, text=True)
+        done = ran(*words, env=env, cwd=folder)
         assert done.returncode == 0, done.stderr
         numbers = re.findall(r"\d+", done.stdout)
         return Job(cluster, folder, numbers[-1], env)

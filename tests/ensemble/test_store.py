@@ -7,7 +7,6 @@ import json
 import os
 import re
 import signal
-import subprocess
 import sys
 
 import h5py
@@ -28,7 +27,7 @@ from adhesis.ensemble.results.write import DatasetRows, Writer
 from adhesis.ensemble.run.lock import RunLock, holder
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS
-from tests.support.campaign_support import ROOT, campaign_text
+from tests.support.campaign_support import ROOT, campaign_text, run_python, started
 from tests.support.fake_run import fake_result
 
 
@@ -155,9 +154,7 @@ print("sound")
 
 
 def test_a_reader_sees_only_whole_rows_while_a_run_writes(path, campaign):
-    reader = subprocess.Popen(
-        [sys.executable, "-c", READ_WHILE_WRITING, str(path)], stdout=subprocess.PIPE, text=True
-    )
+    reader = started([sys.executable, "-c", READ_WHILE_WRITING, str(path)])
     tasks = campaign.tasks()
     with Writer(path) as writer:
         for turn in itertools.count():
@@ -266,7 +263,6 @@ def test_a_file_of_many_tasks_is_as_large_as_its_data(tmp_path):
 
 HOLD_LOCK = """
 import sys, time
-sys.path.insert(0, sys.argv[2])
 from adhesis.ensemble.run.lock import RunLock
 RunLock(sys.argv[1]).acquire(4, 0.0)
 print("held", flush=True)
@@ -277,9 +273,7 @@ time.sleep(60)
 def holding(path, *, join=False):
     """Start a process that holds the lock, or joins it, until it is killed."""
     code = HOLD_LOCK.replace(".acquire(4, 0.0)", ".join()") if join else HOLD_LOCK
-    holder = subprocess.Popen(
-        [sys.executable, "-c", code, str(path), str(ROOT)], stdout=subprocess.PIPE, text=True
-    )
+    holder = started([sys.executable, "-c", code, str(path)])
     assert holder.stdout.readline() == "held\n"
     return holder
 
@@ -305,9 +299,7 @@ def test_one_run_a_file_and_a_killed_one_holds_nothing(tmp_path):
 
 
 def wanted_by_another_process(path):
-    code = HOLD_LOCK.replace("time.sleep(60)", "")
-    command = [sys.executable, "-c", code, str(path), str(ROOT)]
-    return subprocess.run(command, capture_output=True, check=False).returncode != 0
+    return run_python("-c", HOLD_LOCK.replace("time.sleep(60)", ""), path).returncode != 0
 
 
 def test_the_lock_lasts_whatever_its_process_opens_and_closes(tmp_path):

@@ -20,61 +20,33 @@ from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.zero_range import InteriorTension
-from adhesis.solver.method import MethodReport, PathError
+from adhesis.solver.method import PathError
 from adhesis.solver.model.jump import JUMP_KINDS, Jump
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
-from tests.support.fake_run import fake_result
+from tests.support.fake_run import fake_result, write_results
 
 
-def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
-    """A made-up loop: values that name their place."""
-    problem = make_problem(campaign, campaign.tasks()[0])
-    n, top = campaign.cycle.load_steps, campaign.cycle.max_penetration
-    down = np.arange(n, -steps_below_zero - 1, -1)
-    penetration = np.concatenate([[0], top * np.arange(n + 1) / n, top * down / n])
-    branch = np.array(["loading"] * (n + 2) + ["unloading"] * len(down))
-    on_axis = np.ones(len(branch), bool)
-    on_axis[0] = False
-    value = np.arange(1.0, len(branch) + 1)
-    kinds = [JUMP_KINDS[i % len(JUMP_KINDS)] for i in range(jumps)]
-    catalogue = tuple(
-        Jump("unloading", problem.separation(-0.1 * i), float(i % 5), kind, 2, 1, 0.2, 0.1, 1e-5)
-        for i, kind in enumerate(kinds)
+def loop_of(campaign) -> LoopResult:
+    """The loop of the first task, with a loss and drops of whole numbers."""
+    method = make_method("grid", make_problem(campaign, campaign.tasks()[0]), nodes_per_wave=16)
+    cycle = campaign.cycle
+    loop = run_loop(method, max_penetration=cycle.max_penetration, load_steps=cycle.load_steps)
+    return replace(loop, loss=2.0, loss_from_drops=1.5, loss_error=0.02)
+
+
+def with_jumps(loop: LoopResult, count: int, **more) -> LoopResult:
+    """A loop with so many jumps in place of its own, each between two states of unloading."""
+    first = int(np.argmax(loop.branch == "unloading"))
+    s, contact = loop.separation, loop.contact_fraction
+    jumps = tuple(
+        Jump(
+            *("unloading", s[k], float(i % 5), JUMP_KINDS[i % len(JUMP_KINDS)]),
+            *(2, 1, contact[k], contact[k + 1], 1e-5),
+        )
+        for i, k in enumerate(range(first, first + count))
     )
-    at = n + 2  # where unloading begins: both states of every jump, which are none of load steps
-    separation, contact = problem.separation(0) * (1 - penetration), value
-    for jump in reversed(catalogue):
-        separation = np.insert(separation, at, [jump.separation] * 2)
-        contact = np.insert(contact, at, [jump.contact_before, jump.contact_after])
-    more = [at] * (2 * jumps)
-    branch, on_axis = np.insert(branch, more, "unloading"), np.insert(on_axis, more, False)
-    penetration, value = np.insert(penetration, more, 0.0), np.insert(value, more, 1.0)
-    return LoopResult(
-        problem=problem,
-        turning_point=top,
-        max_penetration=top,
-        load_steps=n,
-        branch=branch,
-        load_step=on_axis,
-        penetration=penetration,
-        separation=separation,
-        mean_stress=value,
-        tangent=value,
-        contact_fraction=contact,
-        patches=value.astype(int),
-        elastic_energy=value,
-        adhesion_energy=value,
-        jumps=catalogue,
-        loss=2.0,
-        loss_dimensionless=3.0,
-        loss_from_drops=1.5,
-        loss_error=0.02,
-        work_gained=1.0,
-        work_spent=3.0,
-        seconds=0.1,
-        method=MethodReport("grid", None),
-    )
+    return replace(loop, jumps=jumps, **more)
 
 
 def loop_row(campaign, loop):
@@ -83,22 +55,27 @@ def loop_row(campaign, loop):
 
 def test_curves_end_in_zeros_after_detachment():
     campaign = parse_campaign(campaign_text())
-    row = loop_row(campaign, loop_of(campaign, steps_below_zero=2))
-    n = campaign.cycle.load_steps
-    np.testing.assert_array_equal(row["loading_mean_stress"], np.arange(2, n + 3))
-    unloading = row["unloading_mean_stress"]
-    assert unloading.shape == campaign.unloading_penetration.shape
-    np.testing.assert_array_equal(unloading[: n + 3], np.arange(n + 3, 2 * n + 6))
-    assert not unloading[n + 3 :].any()
+    loop = loop_of(campaign)
+    row = loop_row(campaign, loop)
+    for branch, axis in (
+        ("loading", campaign.loading_penetration),
+        ("unloading", campaign.unloading_penetration),
+    ):
+        stress, reached = row[f"{branch}_mean_stress"], loop.states(branch, load_steps_only=True)
+        assert stress.shape == axis.shape
+        np.testing.assert_array_equal(stress[: len(reached)], loop.mean_stress[reached])
+        assert not stress[len(reached) :].any()
+    assert loop.patches[reached[:-1]].all()
+    assert len(reached) < len(axis)
     assert row["audit_residual"] == 0.25
     assert (row["loss_error"], row["races"], row["energy_at_stake"]) == (0.02, 0, 0.0)
 
 
 def test_the_range_of_adhesion_is_in_the_row():
     campaign = parse_campaign(campaign_text())
-    loop = loop_of(campaign, steps_below_zero=2)
+    loop = loop_of(campaign)
     names = ("valid_range", "largest_interior_tension", "interior_tension_position")
-    row = loop_row(campaign, loop)
+    row = loop_row(campaign, replace(loop, interior=None))
     np.testing.assert_array_equal([row[name] for name in names], [np.inf, 0.0, np.nan])
     found = InteriorTension(2e5, 3e-4, "unloading", -0.5)
     row = loop_row(campaign, replace(loop, interior=found, narrowest_length=1e-6))
@@ -107,13 +84,9 @@ def test_the_range_of_adhesion_is_in_the_row():
     assert row["interior_tension_penetration"] == -0.5
     assert row["edge_range"] > 0
     assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [np.inf, 0, 0.0]
-    s, contact = loop.separation, loop.contact_fraction
-    openings = tuple(
-        Jump("unloading", s[k], 1.0, "opening", 1, 2, contact[k], contact[k + 1], 1e-5, barrier=0.5)
-        for k in (-3, -2)
-    )
-    problem = replace(loop.problem, strength=1e12)
-    opened = replace(loop, jumps=openings, problem=problem, narrowest_length=1e-6)
+    opened = with_jumps(loop, 2, problem=replace(loop.problem, strength=1e12))
+    openings = tuple(replace(jump, kind="opening", barrier=0.5) for jump in opened.jumps)
+    opened = replace(opened, jumps=openings, narrowest_length=1e-6)
     row = loop_row(campaign, opened)
     assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [1e12, 2, 1.0]
     assert row["zone_error"] == opened.zone_error > 0
@@ -121,23 +94,27 @@ def test_the_range_of_adhesion_is_in_the_row():
 
 def test_curves_are_cut_where_the_axis_ends():
     campaign = parse_campaign(campaign_text(unloading_until="-0.1"))
-    row = loop_row(campaign, loop_of(campaign, steps_below_zero=9))
+    row = loop_row(campaign, loop_of(campaign))
     assert row["unloading_patches"].shape == campaign.unloading_penetration.shape
     assert row["unloading_patches"].all()
 
 
 def test_the_catalogue_keeps_the_largest_drops_in_the_order_of_the_path():
-    campaign = parse_campaign(campaign_text())
-    few = loop_row(campaign, loop_of(campaign, steps_below_zero=2, jumps=3))
+    campaign = parse_campaign(campaign_text(load_steps="40"))
+    loop = loop_of(campaign)
+    few = loop_row(campaign, with_jumps(loop, 3))
     assert few["jump_count"] == 3
     np.testing.assert_array_equal(few["jump_kind"], [0, 1, 2, -1, -1, -1, -1, -1])
     assert np.isnan(few["jump_energy_drop"][3:]).all()
-    many = loop_row(campaign, loop_of(campaign, steps_below_zero=2, jumps=20))
+    several = with_jumps(loop, 20)
+    many = loop_row(campaign, several)
     assert many["jump_count"] == 20
     drops = np.arange(20.0) % 5
     kept = np.sort(np.argsort(-drops, kind="stable")[:8])
     np.testing.assert_array_equal(many["jump_energy_drop"], drops[kept])
-    np.testing.assert_allclose(many["jump_penetration"], -0.1 * kept, atol=1e-12)
+    places = [loop.problem.penetration(several.jumps[k].separation) for k in kept]
+    np.testing.assert_array_equal(many["jump_penetration"], places)
+    assert len(set(places)) == 8
     total = many["loss_small_scale"] + many["loss_large_scale"]
     assert total == drops.sum()
 
@@ -161,7 +138,7 @@ def sharp(turns: str):
     return parse_campaign(text.replace("nodes_per_wave = 16\n", ""))
 
 
-TURNS = sharp("[0.3, 0.45, 0.6]")
+TURNS = sharp("[0.3, 0.5, 0.6]")  # fields at thirds of 0.5 are between load steps of 0.6
 
 
 def bits(row):
@@ -174,7 +151,7 @@ def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_compute
     """One alone, all in turn, some left out, out of order, after one that was given up."""
     campaign = TURNS
     tasks = campaign.sharing(campaign.tasks()[0])
-    assert [campaign.at(task).cycle.max_penetration for task in tasks] == [0.3, 0.45, 0.6]
+    assert [campaign.at(task).cycle.max_penetration for task in tasks] == [0.3, 0.5, 0.6]
     alone = [bits(Runner()(campaign, task)) for task in tasks]
     together = Runner()
     assert [bits(together(campaign, task)) for task in tasks] == alone
@@ -325,10 +302,8 @@ def test_a_number_that_is_not_finite_makes_a_loss_doubtful_and_the_status_lists_
 ):
     campaign, path = parse_campaign(campaign_text()), tmp_path / "r.h5"
     create(path, campaign)
-    with Writer(path) as writer:
-        for row, task in enumerate(campaign.tasks()):
-            wrong = {name: value} if row == 2 else {}
-            writer.write_result(row, fake_result(campaign, task) | wrong)
+    write_results(path, campaign, [0, 1, *range(3, 8)])
+    write_results(path, campaign, [2], **{name: value})
     status = read_status(path)
     assert [loop["row"] for loop in status["doubtful"]] == [2]
     assert "1 losses are doubtful: by their own account" in as_text(status)
@@ -376,20 +351,13 @@ def test_reductions_agree_with_the_states_of_the_loop():
     campaign = campaign_with("field_nodes = 16\n", nodes_per_wave="64")
     plan, task = field_plan(campaign), campaign.tasks()[0]
     method = make_method("grid", make_problem(campaign, task), nodes_per_wave=64)
+    cycle = campaign.cycle
+    loop = run_loop(method, max_penetration=cycle.max_penetration, load_steps=cycle.load_steps)
     wanted = {}
-
-    def on_state(branch, state):
-        for k, penetration in enumerate(plan.penetration):
-            s = method.problem.separation(penetration)
+    for branch, state in zip(loop.branch, loop.contact_states, strict=True):
+        for k, s in enumerate(map(method.problem.separation, plan.penetration)):
             if abs(state.separation - s) < 1e-12 * s:
                 wanted[int(branch == "unloading"), k] = state
-
-    loop = run_loop(
-        method,
-        max_penetration=campaign.cycle.max_penetration,
-        load_steps=campaign.cycle.load_steps,
-        on_state=on_state,
-    )
     assert len(wanted) == 6
     row = field_row(plan, method, loop, keep=True)
     profile = method.problem.profile

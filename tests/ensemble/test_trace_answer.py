@@ -36,7 +36,7 @@ from adhesis.ensemble.trace.figures import _tables as tables_of
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.reading.measured_trace import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
 from adhesis.ensemble.trace.variants import Plan, Run, make_plan
 from benchmarks.trace_coverage import case, judged
@@ -125,6 +125,8 @@ def test_the_document_says_what_was_read_done_and_found(document: dict[str, Any]
     assert document["read"]["step"] == pytest.approx(LENGTH / N, rel=1e-4)
     assert [step["name"] for step in document["preparation"]] == ["drop-outs", "form", "cut-off"]
     assert document["degree"] == 2
+    noisy = [r["name"] for r in document["runs"] if r["group"] == "noise"]
+    assert noisy == ["noise 1", "noise 2"]
     tables = {
         r["name"]: r
         for r in document["runs"]
@@ -162,6 +164,9 @@ def test_the_page_holds_its_figures_and_needs_nothing_else(folder: Path) -> None
     text = (folder / "trace.md").read_text()
     for name in FIGURES:
         assert f"]({name})" in text
+    table = re.findall(r"^\| +([\d.]+) +\| +([\d.]+) +\| +[\d.]+ ± ", text, re.M)
+    gammas, depths = ("0.02", "0.04", "0.04", "0.04", "0.08"), ("0.9", "0.3", "0.6", "0.9", "0.9")
+    assert table == list(zip(gammas, depths, strict=True))
     for words in ("decimal commas", "tilt and bow", "interval", "taper 10 %", "γ, J/m²"):
         assert words in text, words
         assert words in html, words
@@ -182,20 +187,15 @@ def test_the_document_carries_its_provenance(folder: Path, document: dict[str, A
 
 
 @pytest.mark.parametrize(
-    ("words", "control", "turns"),
+    ("words", "control", "turns", "pattern"),
     [
-        (["--stiffness", "0", "--max-stress", "300.0,100.0"], Control(0.0), (300.0, 100.0)),
-        (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3)),
-        (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4)),
+        (["--stiffness", "0", "--max-stress", "300.0,100.0"], Control(0.0), (300.0, 100.0), None),
+        (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3), None),
+        (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4), None),
+        (["--stripes", "8", "--stripe-amplitude", "0.3"], Control(), None, stripes(8, 0.3)),
     ],
 )
-def test_the_command_passes_control_and_turning_points(
-    words: list[str],
-    control: Control,
-    turns: tuple[float, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_command_passes_what_is_given(words, control, turns, pattern, tmp_path, monkeypatch):
     path = tmp_path / "t.txt"
     np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
     given: list[Any] = []
@@ -207,7 +207,8 @@ def test_the_command_passes_control_and_turning_points(
     monkeypatch.setattr("adhesis.ensemble.command.trace.run_plan", stop)
     rest = ["--unit", "um", "--to", str(tmp_path / "out"), "--quiet"]
     assert main(["trace", str(path), *CONTACT, *rest, *words]) == 1
-    assert (given[0].control, given[0].turning_points) == (control, turns)
+    assert (given[0].control, given[0].pattern) == (control, pattern)
+    assert turns is None or given[0].turning_points == turns
 
 
 def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
@@ -236,7 +237,6 @@ def test_the_figure_of_the_tables_says_what_turning_points_are(control, at_prelo
         **dict.fromkeys(QUANTITIES, Uncertain(0.5, 0.1, {})),
     )
     drawn = tables_of(found)
-    assert drawn is not None
     assert drawn[0].axes[-1].get_xlabel() == f"turning point: {label}"
 
 
@@ -432,12 +432,16 @@ def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_pat
     assert document["single_features"][0]["position"] == pytest.approx(640e-6, abs=2e-6)
 
 
-def test_the_command_excludes_ranges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_plans_with_ranges_left_out_and_writes_nothing(tmp_path, capsys):
     path = tmp_path / "t.txt"
-    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
-    words = ["trace", str(path), *CONTACT, "--unit", "um", "--plan"]
+    rows = [f"{1e6 * a:.3f};{1e6 * z:.6f}" for a, z in zip(X, PROFILE.at(X), strict=True)]
+    path.write_text("\n".join(["x (µm);z (µm)", *rows]).replace(".", ","))
+    words = ["trace", str(path), *CONTACT, "--tip-radius", "2um", "--plan"]
     assert main([*words, "--exclude", "0.2mm:230um", "--exclude", "900um:2mm"]) == 0
     said = capsys.readouterr().out
+    for text in ("400 points, step 2.5 µm", "decimal commas", "positions in µm", "plan ", "waves"):
+        assert text in said
+    assert sorted(tmp_path.iterdir()) == [path]
     assert "excluded    200 µm to 230 µm, as given: 13 heights treated as drop-outs" in said
     assert "excluded    900 µm to 2 mm, as given: 40 heights" in said
     assert "ends        cut off where heights are missing: 40" in said
@@ -476,25 +480,19 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     assert "ended with code -9" in str(done[killed[0]])
 
 
+@pytest.mark.usefixtures("alarm")
 @pytest.mark.parametrize("processes", [0, 2])
 def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
     """In what was raised, though it is of a class that loops fail with; and no process is left."""
     _, _, plan = small_plan()
     loops = Loops(plan.jobs, processes=processes)
 
-    def handler(number: int, frame: object) -> None:
-        raise Interrupt
-
     def watch(loops: Loops) -> None:
         if processes == 0 or len(loops.running) == processes:
             os.kill(os.getpid(), signal.SIGALRM)
 
-    before = signal.signal(signal.SIGALRM, handler)
-    try:
-        with pytest.raises(Interrupt):
-            loops.run(watch, every=0.05)
-    finally:
-        signal.signal(signal.SIGALRM, before)
+    with pytest.raises(Interrupt):
+        loops.run(watch, every=0.05)
     assert len(loops.pids) == processes
     for pid in loops.pids:
         with pytest.raises(ProcessLookupError):
@@ -576,26 +574,11 @@ def test_stripes_reach_every_loop_of_a_trace_with_their_width() -> None:
     width = periods["answer"] / 20
     for name, job in jobs.items():
         problem = job.cycle.problem(job.profile, job.work_of_adhesion)
-        assert problem.pattern is not None
         assert problem.pattern.stripes[0] == round(periods[name] / width)
     found = document_of(of_the_answer_alone(cycle, trace))
     assert found["stripes"] == found["loop"]["stripes"] == 20
     assert found["stripe_amplitude"] == pytest.approx(0.3)
     assert found["least_work_of_adhesion"] == pytest.approx(0.7 * 0.04)
-
-
-def test_the_command_takes_stripes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, out = tmp_path / "t.txt", tmp_path / "out"
-    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
-    given: list[Any] = []
-    monkeypatch.setattr(
-        "adhesis.ensemble.command.trace.make_plan",
-        lambda _, cycle, **__: given.append(cycle) or small_plan()[2],
-    )
-    words = ["trace", str(path), *CONTACT, "--unit", "um", "--to", str(out), "--plan"]
-    assert main([*words, "--stripes", "8", "--stripe-amplitude", "0.3"]) == 0
-    assert given[0].pattern == stripes(8, 0.3)
-    assert main([*words, "--stripes", "8"]) == 2
 
 
 def test_a_range_of_a_trace_is_said_with_what_zones_at_edges_change() -> None:
@@ -616,16 +599,18 @@ def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys, mon
     rows = [f"{1e6 * a:.4f},{1e6 * b:.5f}" for a, b in zip(X, 5 * PROFILE.at(X), strict=True)]
     file = tmp_path / "t.csv"
     file.write_text("x (um),z (um)\n" + "\n".join(rows))
-    words = ["trace", str(file), *CONTACT, "--quick", "--quiet"]
+    words = ["trace", str(file), *CONTACT, "--quick", "--quiet", "--to", str(tmp_path / "out")]
     words = [*words, "--load-steps", "4", "--max-penetration", "0.3", "--accuracy", "1e-2"]
-    found = {}
-    for measure in ("arc", "flat"):
-        out = tmp_path / measure
-        assert main([*words, "--measure", measure, "--to", str(out)]) == 0
-        assert ("(flat)" in capsys.readouterr().out) == (measure == "flat")
-        found[measure] = json.loads((out / "trace.json").read_text())
-        assert found[measure]["measure"] == found[measure]["loop"]["measure"] == measure
-    arc, flat = (found[name]["loop"] for name in ("arc", "flat"))
-    assert 0.02 * arc["m2"] < arc["loss"] / flat["loss"] - 1 < 2 * arc["m2"]
+    assert main([*words, "--measure", "flat"]) == 0
+    assert "(flat)" in capsys.readouterr().out
+    found = json.loads((tmp_path / "out" / "trace.json").read_text())
+    assert found["measure"] == found["loop"]["measure"] == "flat"
+    arc = of_the_answer_alone(
+        make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-2), prepare_trace(read_trace(file))
+    )
+    assert "(flat)" not in summary(arc)
+    assert document_of(arc)["measure"] == "arc"
+    m2 = found["loop"]["m2"]
+    assert 0.02 * m2 < arc.loss.value / found["loop"]["loss"] - 1 < 2 * m2
     assert main([*words, "--measure", "round", "--plan"]) == 2
     assert "--measure is 'round'" in capsys.readouterr().err

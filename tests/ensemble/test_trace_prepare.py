@@ -78,6 +78,7 @@ def test_drop_outs_are_interpolated_up_to_a_length() -> None:
     assert found.filled[100] == pytest.approx((Z[99] + Z[101]) / 2)
     assert "5 heights" in said(found, "drop-outs")
     assert "2 gaps" in said(found, "drop-outs")
+    assert said(found, "drop-outs").endswith("the longest over 5 µm")
     heights[300:400] = np.nan
     with pytest.raises(InputError, match=r"gap of 101 µm at 300 µm: up to 16 µm is interpolated"):
         prepared(heights)

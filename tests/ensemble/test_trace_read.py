@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from tests.support.wrong_values import WithUnit
@@ -342,16 +341,3 @@ def test_what_is_in_doubt_is_refused_in_one_sentence(kind: str, tmp_path: Path) 
     with pytest.raises(InputError, match=words) as refusal:
         read(tmp_path, lines, **options)
     assert "\n" not in str(refusal.value)
-
-
-CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
-
-
-def test_a_plan_is_said_and_nothing_is_written(tmp_path, capsys):
-    path = tmp_path / "t.txt"
-    path.write_text("\n".join([UM, *rows(";", ",")]))
-    assert main(["trace", str(path), *CONTACT, "--plan", "--tip-radius", "2um"]) == 0
-    said = capsys.readouterr().out
-    for words in ("200 points, step 500 nm", "decimal commas", "positions in µm", "plan ", "waves"):
-        assert words in said
-    assert sorted(tmp_path.iterdir()) == [path]

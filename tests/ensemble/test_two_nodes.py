@@ -26,6 +26,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
+from tests.support.processes import ran
 
 pytestmark = pytest.mark.mpi
 NETWORK = "10.77.0.0/24"
@@ -38,8 +39,8 @@ def missing() -> str:
         return f"no {', '.join(lacking)} here"
     if os.geteuid() != 0:
         return "only root may make network namespaces"
-    reported = subprocess.run([MPIRUN, "--version"], capture_output=True, text=True, check=False)
-    return "" if "Open MPI) 4" in reported.stdout else "the options are those of Open MPI 4"
+    reported = ran(MPIRUN, "--version").stdout
+    return "" if "Open MPI) 4" in reported else "the options are those of Open MPI 4"
 
 
 @dataclass
@@ -69,10 +70,7 @@ class Nodes:
         return started(self.words([*start, *program]))
 
     def kill(self, node: int) -> None:
-        pids = subprocess.run(
-            ["ip", "netns", "pids", self.spaces[node]], capture_output=True, text=True, check=True
-        )
-        for pid in pids.stdout.split():
+        for pid in ran("ip", "netns", "pids", self.spaces[node], check=True).stdout.split():
             os.kill(int(pid), signal.SIGKILL)
 
 
@@ -106,13 +104,13 @@ def nodes(tmp_path: Path) -> Iterator[Nodes]:
         ]
     try:
         for step in steps:
-            done = subprocess.run(step.split(), capture_output=True, text=True, check=False)
+            done = ran(*step.split())
             if done.returncode:
                 pytest.skip(f"no network namespaces here: {step}: {done.stderr.strip()}")
         yield Nodes((spaces[0], spaces[1]), tmp_path)
     finally:
         for space in spaces:
-            subprocess.run(["ip", "netns", "del", space], capture_output=True, check=False)
+            ran("ip", "netns", "del", space)
 
 
 def test_a_campaign_runs_over_two_nodes_and_outlives_one(nodes: Nodes, tmp_path: Path) -> None:

@@ -15,10 +15,10 @@ from PIL import Image
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
+from tests.support.campaign_support import ROOT
 from tools import commands as commands_page
 from tools import transcripts
 
-ROOT = Path(__file__).parent.parent.parent
 PAGES = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
     *(p for p in sorted(ROOT.glob("docs/**/*.md")) if "_build" not in p.parts),

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent.parent
-JOBS = ROOT / "jobs"
+from tests.support.processes import ran
+
+JOBS = Path(__file__).parents[2] / "jobs"
 
 # Each writes its arguments to the file `calls`. `adhesis run` ends with $CODE, after it has sent
 # the signal $SIGNAL to the script, if any, and has received what the script passes on.
@@ -57,15 +58,7 @@ class Cluster:
     env: dict[str, str]
 
     def run(self, *command: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [str(word) for word in command],
-            cwd=self.folder,
-            env=self.env | env,
-            capture_output=True,
-            text=True,
-            timeout=150,
-            check=False,
-        )
+        return ran(*command, cwd=self.folder, env=self.env | env)
 
     def calls(self, program: str) -> list[list[str]]:
         path = self.folder / "calls"
@@ -328,7 +321,7 @@ def test_pbs_job_tells_the_run_its_time_and_submits_the_report(cluster: Cluster)
     assert job["l"] == "select=1:ncpus=1 walltime=1:00:00"
     assert (job["-q"], job["-A"], job["-P"]) == ("small", "ab12", "rough")
     (cluster.folder / "job").write_text(job["script"])
-    subprocess.run(["bash", cluster.folder / "job"], env=cluster.env, cwd="/", check=True)
+    ran("bash", cluster.folder / "job", env=cluster.env, cwd="/", check=True)
     assert cluster.calls("adhesis")[-1] == ["report", "study.h5", "--to", "study"]
 
 
@@ -349,14 +342,8 @@ def test_pbs_job_submits_a_continuation_with_all_that_it_was_given(cluster: Clus
         # A job of PBS has the variables of PBS alone, and begins in the home folder.
         kept = {key: value for key, value in cluster.env.items() if key != "ADHESIS"}
         given = {k: v for k, v in pbs_variables(cluster).items() if k.startswith(("PBS", "Q"))}
-        done = subprocess.run(
-            ["bash", cluster.folder / "job"],
-            env=kept | given | {"CODE": "137", "PBS_O_QUEUE": "route"},
-            cwd="/",
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        given |= {"CODE": "137", "PBS_O_QUEUE": "route"}
+        done = ran("bash", cluster.folder / "job", env=kept | given, cwd="/")
         assert done.returncode == 137, done.stderr
         assert f"start {restart + 1}" in done.stdout
         runs = [words for words in cluster.calls("adhesis") if words[0] == "run"]

@@ -5,7 +5,6 @@ import builtins
 import inspect
 import pkgutil
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -14,12 +13,12 @@ from typing import Any
 import pytest
 
 import adhesis
-from tests.support.campaign_support import run_python
-from tests.support.synthetic_results import campaign, rows, text_of, write
+from tests.support.campaign_support import ROOT, run_python
+from tests.support.processes import ran
+from tests.support.synthetic_results import text_of, write
 from tools.readme_without_links import readme
 from tools.stub import stub
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
@@ -43,13 +42,8 @@ def test_the_readme_of_the_package_has_no_link_into_the_checkout() -> None:
 
 @pytest.mark.slow(reason="installs everything anew and compiles once more")
 def test_the_wheel_works_in_a_bare_environment() -> None:
-    done = subprocess.run(
-        [ROOT / "tools" / "check_package.sh"],
-        env={"PATH": "/usr/bin:/bin", "PYTHON": sys.executable},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    env = {"PATH": "/usr/bin:/bin", "PYTHON": sys.executable}
+    done = ran(ROOT / "tools" / "check_package.sh", env=env, timeout=None)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "package: good" in done.stdout
 
@@ -135,8 +129,7 @@ import mpi4py
 def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     """The settings are those of a site, and not of a rank."""
     one_cell = {"hurst": (0.8,), "gamma": (0.04,), "realisations": 2}
-    small = campaign(**one_cell)
-    results = write(tmp_path / "r.h5", small, rows(small))
+    results = write(tmp_path / "r.h5", text_of(**one_cell))
     (tmp_path / "c.toml").write_text(text_of(**one_cell))
     done = run_python("-c", COMMANDS, tmp_path / "c.toml", results, tmp_path / "report")
     assert done.returncode == 0, done.stderr

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from tests.support.campaign_support import started, wait_until
+from tests.support.campaign_support import ROOT, started, wait_until
+from tests.support.processes import ran
 
-ROOT = Path(__file__).parent.parent.parent
 # Distribution names that differ from what is imported, and what other packages need to find.
 IMPORTED_AS = {"markdown-it-py": "markdown_it", "surfacetopography": "SurfaceTopography"}
 LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
@@ -83,9 +83,7 @@ def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
         pytest.skip("these tests do not run in a .venv that tools/setup.sh made for this checkout")
     before = stamp.stat().st_mtime_ns
     env = {k: v for k, v in os.environ.items() if k not in ("VIRTUAL_ENV", "PYTHONHOME")}
-    done = subprocess.run(
-        [ROOT / "tools" / "setup.sh"], env=env, capture_output=True, text=True, check=True
-    )
+    done = ran(ROOT / "tools" / "setup.sh", env=env, check=True)
     assert "nothing to do" in done.stdout
     assert stamp.stat().st_mtime_ns == before
 
@@ -110,8 +108,7 @@ def test_an_older_python_is_named_before_anything_is_installed(tmp_path: Path) -
     old = tmp_path / "python3.10"
     old.write_text('#!/bin/sh\n[ "$1" = -V ] && echo Python 3.10.13 && exit 0\nexit 1\n')
     old.chmod(0o755)
-    env = os.environ | {"PYTHON": str(old)}
-    done = subprocess.run([copied(tmp_path)], env=env, capture_output=True, text=True, check=False)
+    done = ran(copied(tmp_path), env=os.environ | {"PYTHON": str(old)})
     assert done.returncode == 1
     assert done.stdout == ""
     assert done.stderr == (
@@ -132,7 +129,6 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
         second = subprocess.Popen(
             [setup], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
-        assert second.stdout is not None
         line = second.stdout.readline()
         assert line == "setup: another set-up is at work in this folder: waiting for its end\n"
         assert second.poll() is None
@@ -149,14 +145,7 @@ def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
         log={tmp_path}/log TELL_EVERY=1
         . {ROOT}/tools/parts.sh
     """
-    done = subprocess.run(
-        ["bash", "-c", head + text],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    done = ran("bash", "-c", head + text, cwd=tmp_path)
     assert done.stderr == ""
     return done.returncode, done.stdout.splitlines()
 
@@ -187,7 +176,7 @@ def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: P
 
 
 def test_local_script_asks_for_a_campaign() -> None:
-    done = subprocess.run([ROOT / "jobs" / "local.sh"], capture_output=True, text=True, check=False)
+    done = ran(ROOT / "jobs" / "local.sh")
     assert done.returncode != 0
     assert "usage: jobs/local.sh CAMPAIGN.toml" in done.stderr
 
@@ -206,7 +195,6 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Sign
         wait_until((tmp_path / "begun").exists)
         script.send_signal(number)
         assert script.wait(20) == 75
-        assert script.stderr is not None
         assert "the same command resumes it (out/study.h5)" in script.stderr.readline()
     finally:
         os.killpg(script.pid, signal.SIGKILL)  # the stand-in's sleep
@@ -215,7 +203,6 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Sign
 def test_modules_are_not_searched_for_above_the_checkout() -> None:
     """A file of the user there, beside the clone, would be taken for a library."""
     code = "import sys; print(*sys.path, sep='\\n')"
-    done = subprocess.run(
-        [sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True
-    )
-    assert str(ROOT.parent) not in done.stdout.splitlines()
+    searched = ran(sys.executable, "-I", "-c", code, check=True).stdout.splitlines()
+    assert searched
+    assert str(ROOT.parent) not in searched

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile, single_wave
-from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.model.control import Control
-from adhesis.solver.model.profile import Profile
+from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support import scenes
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3
 HALF_SPACE = HalfSpace(1e6, 0.0)
@@ -27,10 +25,13 @@ def loop_of(
 ) -> LoopResult:
     """Loop by sharp to the turning point in units of h_max, under a load of σ~ = 1."""
     problem = Problem(profile, HALF_SPACE, work_of_adhesion, Control(stiffness))
-    method = make_method("sharp", problem, accuracy=options.get("accuracy", 1e-3))
-    if stiffness == 0:
-        return run_loop(method, max_stress=turn * problem.stress_scale, load_steps=6)
-    return run_loop(method, max_penetration=turn, load_steps=6)
+    return scenes.loop_of(problem, **turn_at(turn, problem), load_steps=6, **options)
+
+
+def turn_at(turn: float, problem: Problem) -> dict[str, float]:
+    if problem.control.is_load:
+        return {"max_stress": turn * problem.stress_scale}
+    return {"max_penetration": turn}
 
 
 @pytest.mark.parametrize("relative", [np.inf, 3.0, 0.1, 0.0])
@@ -81,7 +82,7 @@ def test_the_work_of_each_branch_of_a_wave_is_that_of_the_closed_form(relative):
 
 @pytest.fixture(scope="module")
 def rough() -> Profile:
-    return self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)
+    return scenes.rough(3, 8, 4, period=PERIOD)
 
 
 def test_jumps_under_a_weight_do_work_on_their_branch(rough):
@@ -98,12 +99,12 @@ def test_jumps_under_a_weight_do_work_on_their_branch(rough):
 
 @pytest.mark.parametrize("relative", [1.0, 0.0])
 def test_the_two_methods_agree_under_every_control(relative):
-    profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=4, seed=2, h_rms=1e-6)
+    profile = scenes.rough(2, 4, 2, period=PERIOD)
     unit = Problem(profile, HALF_SPACE, 0.0).stress_scale / profile.h_max
     problem = Problem(profile, HALF_SPACE, 0.01, Control(relative * unit))
-    turn = {"max_stress": 0.3 * problem.stress_scale} if relative == 0 else {"max_penetration": 0.4}
-    grid = run_loop(make_method("grid", problem, nodes_per_wave=128), load_steps=4, **turn)
-    sharp = run_loop(make_method("sharp", problem), load_steps=4, **turn)
+    turn = turn_at(0.4 if relative else 0.3, problem)
+    grid = scenes.loop_of(problem, "grid", nodes_per_wave=128, load_steps=4, **turn)
+    sharp = scenes.loop_of(problem, load_steps=4, **turn)
     assert abs(grid.audit_residual) < 2e-3
     assert grid.loss == pytest.approx(sharp.loss, rel=0.01)
     assert grid.pull_off_stress == pytest.approx(sharp.pull_off_stress, rel=0.01)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from adhesis import Problem, single_wave
 from adhesis.solver._kernels import (
     Descent,
     DescentEvent,
@@ -17,10 +17,9 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
+from tests.support import scenes
 from tests.support.dense import DenseSolution, dense_tangent, solve_densely
-from tests.support.scenes import loops_at
-
-SOLID = HalfSpace(1e6, 0.5)
+from tests.support.scenes import HALF_SPACE, of_paper
 
 
 class Solved(NamedTuple):
@@ -60,8 +59,8 @@ WAVE = 2 * np.pi / 240  # the shortest of ``rough``
 @pytest.fixture(scope="module")
 def rough() -> Solved:
     """Five gaps of a rough profile, one of them narrow, with waves much shorter than the gaps."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=60, seed=1, h_rms=1e-6)
-    method = SharpMethod(Problem(profile, SOLID, 0.02), accuracy=1e-6)
+    profile = scenes.rough(4, 60, 1, period=2e-3 * np.pi)
+    method = SharpMethod(Problem(profile, HALF_SPACE, 0.02), accuracy=1e-6)
     gaps = np.array([[0.3, 0.8], [0.9, 2.0], [2.2, 3.1], [3.3, 4.1], [4.3, 6.4]])
     separation = 0.5 * profile.h_max * profile.q0
     solution = solve_densely(gaps, separation, method.edges.model)
@@ -128,7 +127,7 @@ def test_a_model_without_a_minimum_has_none_at_any_distance():
 
 @pytest.fixture(scope="module")
 def wave() -> SharpMethod:
-    return SharpMethod(Problem(single_wave(1e-6, 1e-3), SOLID, 0.02))
+    return SharpMethod(Problem(single_wave(1e-6, 1e-3), HALF_SPACE, 0.02))
 
 
 def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: int) -> Descent:
@@ -136,7 +135,6 @@ def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: i
     edges, ends = method.edges, np.array(gaps, dtype=float)
     prescribed = separation * 2 * np.pi * 1e-3
     near = edges.response_near(ends, prescribed)
-    assert near is not None
     return near.descend(ends, ends, prescribed, most, False, edges.law, edges.model)
 
 
@@ -148,27 +146,23 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     found = run(wave, NARROW, 0.5, 1000)
     assert found.event == DescentEvent.AT_REST
     point = wave.edges.equilibrium(found.gaps, 0.5 * 2 * np.pi * 1e-3, 0.05 * wave.edges.wave)
-    assert point is not None
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
 
 
 def test_a_step_after_which_a_gap_needs_more_nodes_is_judged():
     """Without that it passed a minimum 0.04 λ_min beyond a fold: one jump less, loss 3e-3 off."""
-    profile = self_affine_profile(
-        0.269, period=2e-3, n0=6, ratio=2, seed=432018, h_rms=7.815913146729246e-5,
-        amplitudes="deterministic",
-    )  # fmt: skip
-    problem = Problem(profile, SOLID, 56.953749479986186, strength=7.224849617527944e7)
+    profile = scenes.rough(6, 2, 432018, hurst=0.269, h_rms=7.815913146729246e-5)
+    problem = Problem(profile, HALF_SPACE, 56.953749479986186, strength=7.224849617527944e7)
     path = {"max_penetration": 0.8079232131592422, "load_steps": 18}
-    coarse, fine = loops_at(problem, 1e-3, 1e-4, **path)
+    coarse, fine = scenes.loops_at(problem, 1e-3, 1e-4, **path)
     assert [jump.kind for jump in coarse.jumps] == [jump.kind for jump in fine.jumps]
     assert abs(coarse.loss - fine.loss) < coarse.loss_error + fine.loss_error
 
 
 def test_later_steps_after_which_a_gap_needs_more_nodes_are_judged_too():
     """Without that the gap beside a new patch closed beyond a minimum: the loss was 4 % off."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=10, seed=5, h_rms=1e-6)
-    method = SharpMethod(Problem(profile, SOLID, 0.01), accuracy=1e-6)
+    profile = of_paper(5, ratio=10)
+    method = SharpMethod(Problem(profile, HALF_SPACE, 0.01), accuracy=1e-6)
     path = method.follow(method.detached(profile.h_max), 0.1022 * profile.h_max)
     assert (path.jumps[-1].kind, path.states[-1].patches) == ("snap-in", 13)
 

@@ -4,49 +4,39 @@ import copy
 import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from threading import Barrier
 
 import numpy as np
 import pytest
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    Problem,
-    make_method,
-    run_loop,
-    run_loops,
-    run_path,
-    self_affine_profile,
-    single_wave,
-)
+from adhesis import Control, Problem, make_method, run_loop, run_loops, run_path, single_wave
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.sharp.continuation.descent import Descents
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.exact_wave import ExactWave
-from tests.support.grids import grid_of
+from tests.support.scenes import HALF_SPACE, grid_of, loop_of, rough
 
 WAVE = single_wave(1e-6, 1e-3)
-ROUGH = self_affine_profile(0.8, period=1e-3, n0=2, ratio=3, seed=4, h_rms=1e-6)
-HALF_SPACE = HalfSpace(1e6, 0.5)
 FULL = Problem(WAVE, HALF_SPACE, 0.0).full_contact_energy
 
 
 def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) -> Problem:
     """γ is ``share`` of the energy of full contact, at 1 MPa; the stiffness is in p*/A."""
     unit = np.pi * HALF_SPACE.modulus / WAVE.period
-    return Problem(WAVE, HalfSpace(young, 0.5), share * FULL, Control(stiffness * unit))
+    half_space = replace(HALF_SPACE, young=young)
+    return Problem(WAVE, half_space, share * FULL, Control(stiffness * unit))
 
 
 @pytest.mark.parametrize("name", ["sharp", "grid"])
 def test_shallow_and_deep_loops_tend_to_limits(name):
     """At first touch alone, and next to full contact, where only the last gap closes further."""
-    problem, accuracy = Problem(ROUGH, HALF_SPACE, 0.02), 1e-2 if name == "grid" else 1e-3
+    problem = Problem(rough(2, 3, 4, period=1e-3), HALF_SPACE, 0.02)
+    accuracy = 1e-2 if name == "grid" else 1e-3
 
-    def loss(max_penetration: float) -> tuple[float, float]:
-        method = make_method(name, problem, accuracy=accuracy)
-        loop = run_loop(method, max_penetration=max_penetration, load_steps=6)
+    def loss(turn: float) -> tuple[float, float]:
+        loop = loop_of(problem, name, accuracy=accuracy, max_penetration=turn, load_steps=6)
         assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
         return loop.loss, loop.loss_error
 
@@ -58,8 +48,7 @@ def test_shallow_and_deep_loops_tend_to_limits(name):
 def test_a_load_that_is_next_to_none_ends():
     """Unloading by steps that vanish beside the tension at which contact is lost."""
     problem = wave_problem(1e-3, stiffness=0.0)
-    loop = run_loop(make_method("sharp", problem), max_stress=1e-30, load_steps=6)
-    deep = run_loop(make_method("sharp", problem), max_stress=1e-3, load_steps=6)
+    loop, deep = (loop_of(problem, max_stress=turn, load_steps=6) for turn in (1e-30, 1e-3))
     assert loop.loss == pytest.approx(deep.loss, rel=1e-3)
 
 
@@ -83,16 +72,15 @@ def test_adhesion_that_no_method_resolves_is_refused(name, share, young, advice)
 
 @pytest.mark.parametrize("share", [1.0, 1e4, 1e8, 1e10])
 def test_adhesion_of_every_accepted_strength_ends_in_an_audited_loss(share):
-    loop = run_loop(SharpMethod(wave_problem(share)), max_penetration=0.5, load_steps=1)
+    loop = loop_of(wave_problem(share), max_penetration=0.5, load_steps=1)
     assert abs(loop.audit_residual) < 1e-3
     assert loop.loss_error < 1e-3 * loop.loss
 
 
 def test_no_adhesion_at_all_is_accepted_whatever_the_modulus():
     for young in (1e-3, 1e15):
-        loop = run_loop(
-            make_method("auto", wave_problem(0.0, young=young)), max_penetration=0.3, load_steps=2
-        )
+        problem = wave_problem(0.0, young=young)
+        loop = loop_of(problem, "auto", max_penetration=0.3, load_steps=2)
         assert abs(loop.loss_dimensionless) < 1e-9
 
 

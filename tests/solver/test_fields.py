@@ -4,30 +4,20 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.method import ContactState, Method, Opening
-from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import self_affine_profile, single_wave
+from adhesis import ContactState, Method, Opening, Problem, make_method, run_loop, single_wave
 from adhesis.solver.observables import gap_shares
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.registry import make_method
+from tests.support.scenes import HALF_SPACE as SOFT
+from tests.support.scenes import rough
 
 PERIOD = 2e-3
-SOFT = HalfSpace(young=1e6, poisson=0.5)
 BINS = np.logspace(-4, 2, 97)
 
 
 def loaded(method: Method, penetration: float) -> ContactState:
-    found: list[ContactState] = []
+    loop = run_loop(method, max_penetration=penetration, load_steps=4)
     s = method.problem.separation(penetration)
-    run_loop(
-        method,
-        max_penetration=penetration,
-        load_steps=4,
-        on_state=lambda _, state: found.append(state),
-    )
-    return next(state for state in found if abs(state.separation - s) < 1e-9 * s)
+    return next(state for state in loop.contact_states if abs(state.separation - s) < 1e-9 * s)
 
 
 def shares_of(method: Method, state: ContactState) -> np.ndarray:
@@ -64,8 +54,7 @@ def test_density_of_the_gap_is_that_of_johnsons_wave(name, options, accuracy, al
 
 def test_density_of_the_gap_on_a_rough_profile_is_a_converged_one():
     """Wide gaps: counted on very many nodes. Narrow ones: Griffith's opening of every edge."""
-    profile = self_affine_profile(0.8, period=PERIOD, n0=4, ratio=25, seed=1, h_rms=1e-6)
-    gamma = 0.005
+    profile, gamma = rough(4, 25, 1), 0.005
     method = make_method("sharp", Problem(profile, SOFT, gamma), accuracy=1e-4)
     state = loaded(method, 0.4)
     assert state.patches > 5
@@ -87,8 +76,7 @@ def test_density_of_the_gap_on_a_rough_profile_is_a_converged_one():
 
 
 def test_openings_of_both_methods_are_one():
-    profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=8, seed=3, h_rms=1e-6)
-    problem = Problem(profile, SOFT, 0.02)
+    problem = Problem(rough(2, 8, 3), SOFT, 0.02)
     found = []
     for name, options in (("sharp", {"accuracy": 1e-4}), ("grid", {"nodes_per_wave": 64})):
         method = make_method(name, problem, **options)

@@ -7,24 +7,15 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    LoopResult,
-    Problem,
-    make_method,
-    run_loop,
-    run_path,
-    self_affine_profile,
-    single_wave,
-)
+from adhesis import Control, HalfSpace, LoopResult, Problem, make_method, run_path, single_wave
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.mechanics import Point
 from adhesis.solver.sharp.nucleation.nucleation import Touch
+from tests.support import scenes
 from tests.support.dugdale_wave import DugdaleWave
-from tests.support.explicit_solution import explicit_openings
+from tests.support.explicit_solution import between, explicit_openings
 
 A, PERIOD, SOLID = 1e-6, 1e-3, HalfSpace(1e6, 0.0)
 GAMMA = 0.04
@@ -46,15 +37,14 @@ def loop_at(
         adhesion_range=share * A or None, measure="flat",
     )  # fmt: skip
     turning = {"max_stress": 500.0} if control.is_load else {"max_penetration": turn}
-    return run_loop(make_method("sharp", problem, accuracy=1e-5), load_steps=10, **turning)
+    return scenes.loop_of(problem, accuracy=1e-5, load_steps=10, **turning)
 
 
 @cache
 def rough_loop(range_: float | None) -> LoopResult:
-    profile = self_affine_profile(0.7, period=2e-3, n0=3, ratio=5, seed=1, h_rms=1e-6)
+    profile = scenes.rough(3, 5, 1, hurst=0.7)
     problem = Problem(profile, HalfSpace(1e8, 0.5), GAMMA, adhesion_range=range_)
-    method = make_method("sharp", problem, accuracy=1e-4)
-    return run_loop(method, max_penetration=0.6, load_steps=10)
+    return scenes.loop_of(problem, accuracy=1e-4, max_penetration=0.6, load_steps=10)
 
 
 @cache
@@ -132,7 +122,6 @@ def test_a_loop_says_what_zones_at_its_edges_change(alpha, share, doubtful):
     wave, loop = wave_of(alpha), loop_at(alpha, share)
     left_out = 100 * (loop.loss - dugdale_loss(alpha, share)) / wave.loop.loss
     said = re.search(r"edges, left out, change the loss by about (\S+) %", loop.range_summary())
-    assert said is not None
     assert 0.6 < float(said[1]) / left_out < 1.6
     assert 0.6 < 100 * loop.zone_error / wave.loop.loss / left_out < 1.6
     assert any("0.67 of edge_range" in text for text in loop.warnings) == doubtful
@@ -172,8 +161,7 @@ def test_a_gap_is_as_wide_as_the_range_where_it_touches():
     for jump, k in zip(loop.jumps, loop.states_before_jumps(), strict=True):
         state = loop.contact_states[k]
         if jump.kind == "snap-in" and state.patches:
-            edges = state.edges * profile.q0
-            gaps = np.stack([edges[:, 1], np.append(edges[1:, 0], edges[0, 0] + 2 * np.pi)], axis=1)
+            gaps = between(state.edges * profile.q0)
             both = explicit_openings(profile, gaps, state.separation * profile.q0, 600)
             least = [minimum for gap in zip(*both, strict=True) for minimum in minima(*gap)]
             assert min(abs(m / profile.q0 - range_) for m in least) < 1e-3 * range_

@@ -3,21 +3,11 @@
 import numpy as np
 import pytest
 
-from adhesis import (
-    HalfSpace,
-    LoopResult,
-    Problem,
-    Profile,
-    make_method,
-    run_loop,
-    self_affine_profile,
-    single_wave,
-)
+from adhesis import HalfSpace, LoopResult, Problem, Profile, make_method, run_loop, single_wave
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
-from tests.support.grids import grid_of
-from tests.support.scenes import HALF_SPACE
+from tests.support.scenes import HALF_SPACE, grid_of, loop_of, rough
 
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5
 
@@ -32,7 +22,7 @@ def wave_method(alpha: float, **options) -> GridMethod:
 
 
 def rough_profile() -> Profile:
-    return self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, seed=4, h_rms=1e-7)
+    return rough(2, 6, 4, period=1e-3, h_rms=1e-7)
 
 
 def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6, **options) -> LoopResult:
@@ -75,11 +65,9 @@ def test_shift_mirror_and_scale_change_nothing(loop):
 
 def test_no_jump_hides_in_a_long_load_step():
     """From nearly full contact in two load steps: the drops of thirty."""
-    profile = self_affine_profile(
-        0.553, period=2e-3, n0=1, ratio=11, seed=876325, h_rms=1.7697e-6, amplitudes="deterministic"
-    )
+    profile = rough(1, 11, 876325, hurst=0.553, h_rms=1.7697e-6)
     gamma = 0.065377 * 1e6 * profile.h_rms**2 * profile.q0
-    method = GridMethod(Problem(profile, HalfSpace(1e6, 0.5), gamma))
+    method = GridMethod(Problem(profile, HALF_SPACE, gamma))
     few, many = (run_loop(method, max_penetration=0.99992, load_steps=steps) for steps in (2, 30))
     assert few.loss_from_drops == pytest.approx(many.loss_from_drops, rel=1e-2)
 
@@ -101,16 +89,11 @@ def test_gap_is_open_outside_and_nothing_overlaps():
 
 def test_no_state_overlaps_not_even_before_a_touch_is_followed():
     """A step to a touch is shortened until nodes overlap by 1e-6 h_max at most; once 7e-4."""
-    profile = self_affine_profile(
-        0.7, period=2e-3, n0=3, ratio=5, seed=12, h_rms=1e-6, amplitudes="rayleigh"
-    )
+    profile = rough(3, 5, 12, hurst=0.7, amplitudes="rayleigh")
     method = grid_of(Problem(profile, HALF_SPACE, 5e-3), nodes=512)
-    states = []
-    loop = run_loop(
-        method, max_penetration=0.9, load_steps=5, on_state=lambda _, state: states.append(state)
-    )
+    loop = run_loop(method, max_penetration=0.9, load_steps=5)
     assert sum(jump.kind == "snap-in" for jump in loop.jumps) >= 3
-    least = min(method.fields(state, 512).gap.min() for state in states)
+    least = min(method.fields(state, 512).gap.min() for state in loop.contact_states)
     assert least > -1.1e-6 * profile.h_max
 
 
@@ -138,10 +121,8 @@ def test_two_equal_maxima_touch_together_and_leave_as_in_sharp():
     """Apart they are unstable before both could leave together: one of them leads."""
     two = Profile(PERIOD, np.array([0, 0, AMPLITUDE / 2], dtype=complex))
     problem = Problem(two, HALF_SPACE, 0.1 * wave(0.2).work_of_adhesion)
-    grid, sharp = (
-        run_loop(method, max_penetration=0.5, load_steps=10)
-        for method in (grid_of(problem, nodes=2048), make_method("sharp", problem))
-    )
+    grid = run_loop(grid_of(problem, nodes=2048), max_penetration=0.5, load_steps=10)
+    sharp = loop_of(problem, max_penetration=0.5, load_steps=10)
     steps = [(0, 2), (2, 1), (1, 0)]
     for result in (grid, sharp):
         assert [(j.patches_before, j.patches_after) for j in result.jumps] == steps
@@ -174,7 +155,7 @@ def test_without_adhesion_a_rough_loop_is_reversible():
 
 @pytest.mark.parametrize("hurst", [0.05, 0.97])
 def test_any_hurst_exponent_gives_an_audited_loop(hurst):
-    profile = self_affine_profile(hurst, period=1e-3, n0=1, ratio=6, seed=1, h_rms=1e-7)
+    profile = rough(1, 6, 1, hurst=hurst, period=1e-3, h_rms=1e-7)
     result = rough_loop(profile, nodes=256)
     assert result.loss > 0
     assert abs(result.audit_residual) < 5e-3
@@ -201,21 +182,16 @@ def test_a_state_of_another_method_is_refused():
 
 def weak(seed: int, share: float) -> Problem:
     """Adhesion is weak beside the roughness: γ in units of E* h_rms² q0 n0."""
-    profile = self_affine_profile(0.6, period=2e-3, n0=2, ratio=5, seed=seed, h_rms=1e-6)
+    profile = rough(2, 5, seed, hurst=0.6)
     return Problem(profile, HALF_SPACE, share * HALF_SPACE.modulus * 1e-12 * profile.q0 * 2)
 
 
 @pytest.mark.parametrize(("seed", "share"), [(3, 5e-3), (19, 2e-3)])
 def test_drops_that_a_weakly_adhesive_patch_loses_on_the_grid_count_in_its_error(seed, share):
     """With 64 nodes a wave; the error was up to 2.2 times too small."""
-    problem = weak(seed, share)
-    grid, exact = (
-        run_loop(method, max_penetration=0.7, load_steps=10)
-        for method in (
-            make_method("grid", problem, nodes_per_wave=64),
-            make_method("sharp", problem),
-        )
-    )
+    path = {"max_penetration": 0.7, "load_steps": 10}
+    grid = loop_of(weak(seed, share), "grid", nodes_per_wave=64, **path)
+    exact = loop_of(weak(seed, share), **path)
     assert len(grid.jumps) < len(exact.jumps)
     assert abs(grid.loss - exact.loss) < grid.loss_error + exact.loss_error
 
@@ -223,6 +199,6 @@ def test_drops_that_a_weakly_adhesive_patch_loses_on_the_grid_count_in_its_error
 @pytest.mark.parametrize(("seed", "share", "nodes"), [(6, 3e-3, 64), (0, 6e-5, 32)])
 def test_a_loss_that_is_not_resolved_is_refused(seed, share, nodes):
     """What is left of it is the error of two works; with 3e-3 it was 3.5 times what was stated."""
-    method = make_method("grid", weak(seed, share), nodes_per_wave=nodes)
+    path = {"max_penetration": 0.7, "load_steps": 10}
     with pytest.raises(PathError, match=r"the loss is not resolved: .* as large as itself"):
-        run_loop(method, max_penetration=0.7, load_steps=10)
+        loop_of(weak(seed, share), "grid", nodes_per_wave=nodes, **path)

@@ -3,47 +3,27 @@
 import signal
 import threading
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
+from adhesis import Method, Problem, make_method, run_loop
 from adhesis.solver._kernels import set_up_response
-from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.method import Method
-from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import self_affine_profile
-from adhesis.solver.registry import make_method
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 from adhesis.solver.sharp.method import SharpMethod
-from tests.support.scenes import HALF_SPACE
+from tests.support.scenes import HALF_SPACE, of_paper, rough
 from tools.interrupted import Interrupt, interrupted
 
 INTERRUPTS = 8  # of each method
 
 
-def method(name: str) -> Method:
-    if name == "grid":
-        few = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=3, h_rms=1e-6)
-        return make_method("grid", Problem(few, HALF_SPACE, 0.04), nodes_per_wave=8)
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=1, h_rms=1e-6)
-    return make_method("sharp", Problem(profile, HALF_SPACE, 0.04))
-
-
 @pytest.fixture(scope="module", params=["sharp", "grid"])
 def chosen(request: pytest.FixtureRequest) -> Method:
     """A method for all loops of the test, each as it comes after another one."""
-    return method(request.param)
-
-
-@pytest.fixture
-def alarm() -> Iterator[None]:
-    def handler(number: int, frame: object) -> None:
-        raise Interrupt
-
-    before = signal.signal(signal.SIGALRM, handler)
-    yield
-    signal.signal(signal.SIGALRM, before)
+    if request.param == "grid":
+        few = Problem(rough(2, 4, 3, period=1e-3), HALF_SPACE, 0.04)
+        return make_method("grid", few, nodes_per_wave=8)
+    return make_method("sharp", Problem(of_paper(1, ratio=4), HALF_SPACE, 0.04))
 
 
 def loss(chosen: Method) -> tuple[str, str]:
@@ -53,8 +33,7 @@ def loss(chosen: Method) -> tuple[str, str]:
 
 def test_a_signal_that_comes_in_a_long_kernel_ends_it(alarm):
     """A descent of many gaps takes seconds; its handler is called between two steps."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, seed=1, h_rms=1e-6)
-    edges = SharpMethod(Problem(profile, HALF_SPACE, 0.01)).edges
+    edges = SharpMethod(Problem(of_paper(1), HALF_SPACE, 0.01)).edges
     ends = np.linspace(0.1, 6.2, 800).reshape(-1, 2)
     response = set_up_response(ends, 1e-3, edges.law, edges.model)
     ended = threading.Event()

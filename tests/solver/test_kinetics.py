@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import Control, HalfSpace, Problem, Profile, run_loop, run_loops, self_affine_profile
+from adhesis import Control, Problem, Profile, run_loop, run_loops
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.continuation.descent import leaving_step
 from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.method import SharpMethod
-from tests.support.grids import grid_of
-from tests.support.scenes import loops_at
+from tests.support.scenes import HALF_SPACE as SOLID
+from tests.support.scenes import grid_of, loop_of, loops_at, of_paper, rough
 
-SOLID = HalfSpace(1e6, 0.5)
 PHASES = [
     0.07427745862364432, 2.8303468781729233, -2.2358110930610913, 2.8189476143269747,
     -1.1822978560010347, -0.4817541292647971, 2.0590161226172397, -0.5705186522445032,
@@ -70,8 +69,7 @@ def test_finer_steps_decide_next_to_a_separatrix(swapped):
 
     Swapped, finer steps end where equal speeds lead, with more energy: that is a race as well.
     """
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, seed=1, h_rms=1e-6)
-    method = SharpMethod(Problem(profile, SOLID, 0.04), accuracy=1e-5)
+    method = SharpMethod(Problem(of_paper(1), SOLID, 0.04), accuracy=1e-5)
     if swapped:
         relax = method.jumps.descents.relax
         method.jumps.descents.relax = lambda gaps, d, share=1.0, **_: relax(
@@ -99,11 +97,9 @@ def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
     """Two folds lie so near to each other here that at a fixed separation both orders are."""
     asked = []
     monkeypatch.setattr(Jumps, "_end_of", lambda *where: asked.append(where))
-    profile = self_affine_profile(
-        0.5, period=2e-3, n0=4, ratio=2, seed=453976, h_rms=1e-6, amplitudes="rayleigh"
-    )
+    profile = rough(4, 2, 453976, hurst=0.5, amplitudes="rayleigh")
     problem = Problem(profile, SOLID, 0.0034070872, Control(0.0))
-    loop = run_loop(SharpMethod(problem), max_stress=1243.6, load_steps=3)
+    loop = loop_of(problem, max_stress=1243.6, load_steps=3)
     assert len(loop.jumps) == 7
     assert loop.races == 0
     assert asked == []
@@ -115,7 +111,7 @@ def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
     ids=["a patch goes or stays", "contact is lost or stays on a crest", "a shallow minimum"],
 )
 def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ratio, gamma, seed):
-    profile = self_affine_profile(hurst, period=1e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
+    profile = rough(n0, ratio, seed, hurst=hurst, period=1e-3)
 
     def loss_with(share: float) -> float:
         method = SharpMethod(Problem(profile, SOLID, gamma))
@@ -139,9 +135,7 @@ def jumps_on_loading(problem: Problem, accuracy: float, depth: float, stops: int
 
 def test_a_touch_and_a_fold_too_near_to_be_told_apart_are_a_race():
     """At a finer accuracy the fold comes first, and another loss: the coarser path states it."""
-    profile = self_affine_profile(
-        0.756, period=2e-3, n0=14, ratio=72, seed=468326, h_rms=1e-6, amplitudes="rayleigh"
-    )
+    profile = rough(14, 72, 468326, hurst=0.756, amplitudes="rayleigh")
     problem = Problem(profile, SOLID, work_of_adhesion=0.04262480422968221)
     coarse, fine = (jumps_on_loading(problem, a, 0.892824341, 24) for a in (1e-3, 2e-4))
     raced = max(coarse, key=lambda jump: jump.at_stake)
@@ -154,9 +148,7 @@ def test_a_touch_and_a_fold_too_near_to_be_told_apart_are_a_race():
 
 def test_two_folds_too_near_to_be_told_apart_are_a_race():
     """At a finer accuracy the other one comes first, and another loss: the coarser loop says so."""
-    profile = self_affine_profile(
-        0.815, period=2e-3, n0=8, ratio=46, seed=849858, h_rms=1e-6, amplitudes="rayleigh"
-    )
+    profile = rough(8, 46, 849858, hurst=0.815, amplitudes="rayleigh")
     gamma = 0.3660918153358999 * SOLID.modulus * 1e-12 * profile.q0 * 8
     problem, depth = Problem(profile, SOLID, gamma), 0.8667227826221429
     coarse, fine = loops_at(problem, 1e-3, 1e-4, max_penetration=depth, load_steps=31)
@@ -171,7 +163,7 @@ def test_two_folds_too_near_to_be_told_apart_are_a_race():
 
 @pytest.mark.parametrize(("method", "ratio"), [(SharpMethod, 8), (GridMethod, 3)])
 def test_nothing_races_where_the_rules_agree(method, ratio):
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=5, ratio=ratio, seed=3, h_rms=1e-6)
+    profile = rough(5, ratio, 3, period=2e-3 * np.pi)
     result = run_loop(method(Problem(profile, SOLID, 0.02)), max_penetration=0.9, load_steps=9)
     assert len(result.jumps) > 5
     assert (result.races, result.energy_at_stake) == (0, 0)
@@ -186,14 +178,14 @@ def test_grid_runs_the_same_race():
 
 
 def equal_waves(n0: int, seed: int, g: float, shift: float = 0.0) -> Problem:
-    profile = self_affine_profile(0.8, period=2e-3, n0=n0, ratio=1, seed=seed, h_rms=1e-6)
+    profile = rough(n0, 1, seed)
     gamma = g * SOLID.modulus * 1e-12 * profile.q0 * n0
     return Problem(profile.shifted(shift * 2e-3), SOLID, gamma)
 
 
 def loss(problem: Problem, accuracy: float = 1e-3) -> float:
-    method = SharpMethod(problem, accuracy=accuracy)
-    return run_loop(method, max_penetration=0.8, load_steps=10).loss_dimensionless
+    path = {"max_penetration": 0.8, "load_steps": 10}
+    return loop_of(problem, accuracy=accuracy, **path).loss_dimensionless
 
 
 def test_equal_crests_are_left_alike_at_every_accuracy_and_wherever_they_lie():
@@ -217,15 +209,11 @@ def test_equal_parts_stay_alike_and_are_left_alike_wherever_they_lie():
     profile = Profile(2e-3, a)
     profile = profile.scaled(1e-6 / profile.h_rms)
     gamma = 0.02 * SOLID.modulus * 1e-12 * profile.q0 * 5
-    loops = [
-        run_loop(
-            SharpMethod(Problem(profile.shifted(shift * 2e-3), SOLID, gamma), accuracy=accuracy),
-            max_penetration=0.8,
-            load_steps=10,
-        )
+    losses = [
+        loss(Problem(profile.shifted(shift * 2e-3), SOLID, gamma), accuracy)
         for shift, accuracy in ((0.0, 1e-3), (0.1234, 1e-3), (0.37, 1e-3), (0.0, 1e-4))
     ]
-    assert [loop.loss for loop in loops] == pytest.approx([loops[-1].loss] * 4, rel=2e-4)
+    assert losses == pytest.approx([losses[-1]] * 4, rel=2e-4)
 
 
 def test_a_mode_that_has_softened_is_left_like_one_that_is_unstable():
@@ -261,9 +249,7 @@ def test_grid_leaves_equal_crests_as_sharp_does_and_a_coarse_one_tells_what_it_m
 
 def test_two_folds_within_one_step_are_taken_in_their_order_or_flagged():
     """They are 4e-6 h_max apart, and the second does not come once the other was taken first."""
-    profile = self_affine_profile(
-        0.833, period=2e-3, n0=10, ratio=79, seed=136711, amplitudes="rayleigh", h_rms=1e-6
-    )
+    profile = rough(10, 79, 136711, hurst=0.833, amplitudes="rayleigh")
     gamma = 0.4953283928122993 * SOLID.modulus * 1e-12 * profile.q0 * 10
     problem = Problem(profile, SOLID, gamma)
     found = [jumps_on_loading(problem, a, 0.884879261502729, 18) for a in (1e-3, 3e-4)]
@@ -275,10 +261,7 @@ def test_two_folds_within_one_step_are_taken_in_their_order_or_flagged():
 
 def test_a_descent_that_goes_to_and_fro_beside_a_fold_ends():
     """Without patience it did not, in a loop that turns on a branch shared with others."""
-    profile = self_affine_profile(
-        0.9, period=6.283185307179586e-3, n0=10, ratio=100, seed=4342150509908855, h_rms=1e-6
-    )
-    method = SharpMethod(Problem(profile, SOLID, 0.07))
+    method = SharpMethod(Problem(of_paper(4342150509908855, 0.9), SOLID, 0.07))
     loops = run_loops(method, max_penetration=[0.5, 0.7, 0.9], load_steps=40)
     alone = run_loop(method, max_penetration=0.7, load_steps=40)
     assert loops[1].loss == pytest.approx(alone.loss, rel=3e-5)

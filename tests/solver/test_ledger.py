@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from adhesis import Control, HalfSpace, Problem, make_method, run_path, self_affine_profile
+from adhesis import Control, Problem, make_method, run_path
 from adhesis.solver.loading.ledger import Ledger, states_before_jumps
 from adhesis.solver.model.jump import Jump
-from tests.support.scenes import UNEVEN
+from tests.support.scenes import HALF_SPACE, UNEVEN, rough
 
-SOLID = HalfSpace(1e6, 0.5)
-ROUGH = self_affine_profile(0.8, period=2e-3, n0=2, ratio=6, seed=3, h_rms=1e-6)
-
-
+ROUGH = rough(2, 6, 3)
 INTERFACES = {
     "separation": {},
     "stiffness": {"control": Control(1e9)},
@@ -25,7 +22,7 @@ INTERFACES = {
 @pytest.mark.parametrize("name", INTERFACES)
 def test_every_interval_of_a_path_balances(name):
     """Work is rise and loss: to the error of the loss in jumps and between them."""
-    problem = Problem(ROUGH, SOLID, 0.002, **INTERFACES[name])
+    problem = Problem(ROUGH, HALF_SPACE, 0.002, **INTERFACES[name])
     is_load = problem.control.is_load
     points = [800.0, 0.0, 400.0] if is_load else [0.7, 0.2, 0.5]
     path = run_path(make_method("sharp", problem), points, load_steps=10)
@@ -50,7 +47,7 @@ def test_every_interval_of_a_path_balances(name):
 
 def test_a_ledger_states_work_jump_and_friction_of_each_interval():
     """p̄ = s³ is integrated exactly, by its slopes; of the friction a jump's is in its drop."""
-    problem = Problem(ROUGH, SOLID, 0.002, work_of_adhesion_open=0.003)
+    problem = Problem(ROUGH, HALF_SPACE, 0.002, work_of_adhesion_open=0.003)
     s = np.array([1.0, 0.6, 0.6, 0.9])
     contact, none = np.array([0.1, 0.2, 0.4, 0.3]), np.zeros(4)
     jump = Jump("loading", 0.6, 5.0, "spreading", 1, 1, 0.2, 0.4, 1e-3)

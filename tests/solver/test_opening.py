@@ -11,58 +11,31 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    LoopResult,
-    Problem,
-    Profile,
-    make_method,
-    run_loop,
-    self_affine_profile,
-)
+from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, make_method
 from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import beyond_limit, range_warnings
-from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
 from adhesis.solver.sharp.continuation.branch import StableBranch
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.nucleation.crack import Crack, judge_maximum
 from adhesis.solver.sharp.tolerances import TRAPEZOID_FAR
+from tests.support.scenes import HALF_SPACE, loop_of, rough
 
-PERIOD = 2e-3
 # Two troughs, of which the one at x = λ/2 is the shallower.
 TROUGHS = Profile(1e-3, np.array([0.0, -0.15, -0.5]) * 1e-9)
-SOLID = HalfSpace(1e6, 0.5)
+STIFF = HalfSpace(1e9, 0.5)
 GAMMA, STRENGTH = 1e-10, 4.0
 
 
-def rough(seed: int = 0, ratio: int = 8) -> Profile:
-    return self_affine_profile(0.8, period=PERIOD, n0=2, ratio=ratio, seed=seed, h_rms=1e-6)
-
-
 @cache
-def rough_loop(strength: float, seed: int = 0) -> tuple[LoopResult, tuple[ContactState, ...]]:
-    return loop_of(rough(seed), strength, 0.04)
+def rough_loop(strength: float, ratio: int = 8) -> LoopResult:
+    problem = Problem(rough(2, ratio, 0), STIFF, 0.04, strength=strength)
+    return loop_of(problem, max_penetration=0.9, load_steps=20)
 
 
-def loop_of(
-    profile: Profile, strength: float, gamma: float
-) -> tuple[LoopResult, tuple[ContactState, ...]]:
-    problem = Problem(profile, HalfSpace(1e9, 0.5), gamma, strength=strength)
-    states: list[ContactState] = []
-    loop = run_loop(
-        make_method("sharp", problem),
-        max_penetration=0.9,
-        load_steps=20,
-        on_state=lambda branch, state: states.append(state),
-    )
-    return loop, tuple(states)
-
-
-def troughs_problem(strength: float = STRENGTH) -> Problem:
-    return Problem(TROUGHS, SOLID, GAMMA, strength=strength)
+def troughs_problem() -> Problem:
+    return Problem(TROUGHS, HALF_SPACE, GAMMA, strength=STRENGTH)
 
 
 def test_the_largest_excess_opens_first_with_what_equals_it():
@@ -79,9 +52,7 @@ def test_the_last_gap_between_flat_surfaces_is_koiters_crack():
 
 
 def test_a_strength_that_is_never_reached_asks_for_no_finer_steps():
-    gamma, profile = 0.04, rough(ratio=3)
-    zero_range, _ = loop_of(profile, math.inf, gamma)
-    strong, _ = loop_of(profile, 1e12, gamma)
+    zero_range, strong = rough_loop(math.inf, 3), rough_loop(1e12, 3)
     assert strong.openings == 0
     assert strong.method.field_tolerance == zero_range.method.field_tolerance
     assert strong.method.energies < 1.1 * zero_range.method.energies
@@ -91,18 +62,18 @@ def test_a_strength_that_is_never_reached_asks_for_no_finer_steps():
 
 def test_no_state_that_is_kept_is_above_the_strength_inside():
     """But those from which patches open, which are at it."""
-    loop, states = rough_loop(4e6)
+    loop = rough_loop(4e6)
     assert loop.openings > 0
     assert abs(loop.audit_residual) < 1e-4
     opened = {jump.separation for jump in loop.jumps if jump.kind == "opening"}
-    kept = [state for state in states if state.patches and state.separation not in opened]
-    found = loop.new_method().largest_tension(kept)
+    states = (state for state in loop.contact_states if state.patches)
+    found = loop.new_method().largest_tension([s for s in states if s.separation not in opened])
     assert found.tension < 4e6 * (1 + 1e-3)
     # energy rises in no jump but by a barrier
     assert all(jump.energy_drop > -jump.barrier - 1e-9 * loop.loss for jump in loop.jumps)
     assert all((jump.barrier > 0) == (jump.kind == "opening") for jump in loop.jumps)
     # and valleys that are held closed lose more
-    assert loop.loss < 0.8 * rough_loop(math.inf)[0].loss
+    assert loop.loss < 0.8 * rough_loop(math.inf).loss
 
 
 @pytest.mark.parametrize(
@@ -114,8 +85,8 @@ def test_no_state_that_is_kept_is_above_the_strength_inside():
     ids=("stiffness", "load"),
 )
 def test_patches_open_under_every_control(control, turning_point):
-    problem = Problem(rough(1, 3), HalfSpace(1e9, 0.5), 0.04, strength=3e6, control=control)
-    loop = run_loop(make_method("sharp", problem), **turning_point, load_steps=20)
+    problem = Problem(rough(2, 3, 1), STIFF, 0.04, strength=3e6, control=control)
+    loop = loop_of(problem, **turning_point, load_steps=20)
     assert loop.openings > 0
     assert abs(loop.audit_residual) < 1e-4
     opened = [jump for jump in loop.jumps if jump.kind == "opening"]
@@ -126,18 +97,22 @@ def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
     """It halved each of them once, so that none grew again: such a loop did not end."""
     branch = SimpleNamespace(
         _states=SimpleNamespace(
-            of_point=lambda point: point, energy_residual=lambda before, after: 100.0
+            of_point=lambda point: point, energy_residual=lambda before, after: after.error
         ),
         _output=SimpleNamespace(d=0.0),
         _at_output=None,
         _resolution=SimpleNamespace(jump=1e-6, work=1.0),
-        _work_before=(0.0, math.inf),
         _work_of_fields=0.0,
     )
-    for d in (1.0, 0.5):
-        StableBranch._work_error(branch, SimpleNamespace(d=d))
-    branch._work_before = (0.0, math.inf)  # the step was accepted
-    assert StableBranch._work_error(branch, SimpleNamespace(d=2.0)) == TRAPEZOID_FAR
+
+    def judged(*trials: tuple[float, float]) -> list[float]:
+        branch._work_before = (0.0, math.inf)  # the step before was accepted
+        points = (SimpleNamespace(d=d, error=error) for d, error in trials)
+        return [StableBranch._work_error(branch, point) for point in points]
+
+    assert judged((1.0, 100.0), (0.5, 20.0)) == [100.0, 20.0]  # a shorter step reduces it
+    assert judged((1.0, 100.0), (0.5, 100.0)) == [100.0, TRAPEZOID_FAR]
+    assert judged((2.0, 100.0)) == [TRAPEZOID_FAR]
 
 
 def test_patches_that_open_from_the_same_edges_again_end_the_path():
@@ -161,7 +136,7 @@ def test_patches_that_open_from_the_same_edges_again_end_the_path():
 
 def test_work_and_energy_agree_between_openings():
     """Between two folds the slopes at the ends of a step hide the error of its integral."""
-    loop = run_loop(make_method("sharp", troughs_problem()), max_penetration=0.99, load_steps=5)
+    loop = loop_of(troughs_problem(), max_penetration=0.99, load_steps=5)
     assert loop.openings > 0
     assert abs(loop.audit_residual) < 1e-5
 
@@ -188,11 +163,9 @@ def test_an_energy_that_rises_by_a_barrier_is_no_error():
 
 def test_openings_at_a_range_and_tensions_that_are_not_small_make_a_loss_doubtful():
     problem = troughs_problem()
-    texts = [rough_loop(strength)[0].range_warnings() for strength in (4e6, 1e12)]
-    assert ["patches open from inside: a real" in " ".join(found) for found in texts] == [
-        True,
-        False,
-    ]
+    for strength, opens in ((4e6, True), (1e12, False)):
+        found = " ".join(rough_loop(strength).range_warnings())
+        assert ("patches open from inside: a real" in found) == opens
     assert range_warnings(problem, GAMMA / (1.005 * STRENGTH), 1.0, [0.5]) == []
     assert len(range_warnings(problem, GAMMA / (1.02 * STRENGTH), 1.0, [0.5])) == 1
     (excess,) = range_warnings(problem, GAMMA / (2 * STRENGTH), 1.0, [0.5])
@@ -209,8 +182,8 @@ def test_openings_at_a_range_and_tensions_that_are_not_small_make_a_loss_doubtfu
 
 
 def test_a_range_is_a_strength():
-    problem = Problem(rough(), SOLID, 1e-4, adhesion_range=1e-10)
+    problem = Problem(TROUGHS, HALF_SPACE, 1e-4, adhesion_range=1e-10)
     assert problem.strength == 1e6
-    assert problem == Problem(rough(), SOLID, 1e-4, strength=1e6)
+    assert problem == Problem(TROUGHS, HALF_SPACE, 1e-4, strength=1e6)
     assert replace(problem, work_of_adhesion=2e-4).strength == 1e6
-    assert Problem(rough(), SOLID, 0.0, adhesion_range=1e-10).strength == math.inf
+    assert Problem(TROUGHS, HALF_SPACE, 0.0, adhesion_range=1e-10).strength == math.inf

@@ -5,26 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    Problem,
-    make_method,
-    run_loop,
-    run_loops,
-    run_path,
-    self_affine_profile,
-)
+from adhesis import Problem, make_method, run_loop, run_loops, run_path
 from adhesis.solver.loading.path_record import Axis
-from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
+from tests.solver.test_control_loops import AMPLITUDE, HALF_SPACE, PERIOD, single_wave, wave_of
 from tests.support.exact_wave import ExactWave
+from tests.support.scenes import rough
 
-ROUGH = self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)
-HALF_SPACE = HalfSpace(1e6, 0.0)
-
-
-def problem_of(work_of_adhesion: float = 0.01, control: Control | None = None) -> Problem:
-    return Problem(ROUGH, HALF_SPACE, work_of_adhesion, control or Control())
+ROUGH = rough(3, 8, 4, period=PERIOD)
+PROBLEM = Problem(ROUGH, HALF_SPACE, 0.01)
+WAVE = wave_of(0.2)
+OF_WAVE = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, WAVE.work_of_adhesion)
 
 
 def test_load_steps_of_a_leg_are_multiples_and_marks():
@@ -38,10 +28,9 @@ def test_load_steps_of_a_leg_are_multiples_and_marks():
 
 def test_loops_of_one_loading_branch_are_the_separate_loops():
     turns = [0.3, 0.55, 0.8]
-    method = make_method("sharp", problem_of())
-    together = run_loops(method, max_penetration=turns, load_steps=8)
+    together = run_loops(make_method("sharp", PROBLEM), max_penetration=turns, load_steps=8)
     for turn, loop in zip(turns, together, strict=True):
-        alone = run_loop(make_method("sharp", problem_of()), max_penetration=turn, load_steps=8)
+        alone = run_loop(make_method("sharp", PROBLEM), max_penetration=turn, load_steps=8)
         assert loop.max_penetration == turn
         # other load steps, so jumps are found elsewhere within their resolution
         assert loop.loss == pytest.approx(alone.loss, rel=1e-4)
@@ -53,10 +42,8 @@ def test_loops_of_one_loading_branch_are_the_separate_loops():
 
 
 def test_unloading_from_between_two_load_steps_ends_at_each_load_step_below():
-    wave = wave_of(0.2)
-    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave.work_of_adhesion)
-    low, _ = run_loops(ExactWave(problem), max_penetration=[0.55, 0.8], load_steps=8)
-    path = run_path(ExactWave(problem), [0.8, 0.3, 0.55], load_steps=8)
+    low, _ = run_loops(ExactWave(OF_WAVE), max_penetration=[0.55, 0.8], load_steps=8)
+    path = run_path(ExactWave(OF_WAVE), [0.8, 0.3, 0.55], load_steps=8)
     for result, chosen in ((low, low.branch == "unloading"), (path, path.leg == 3)):
         on_axis = result.penetration[chosen & result.load_step]
         way = [0.55, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0]
@@ -64,38 +51,35 @@ def test_unloading_from_between_two_load_steps_ends_at_each_load_step_below():
 
 
 def test_nested_minor_loops_close_from_the_inside():
-    method = make_method("sharp", problem_of())
-    path = run_path(method, [0.8, 0.2, 0.7, 0.4, 0.6], load_steps=8)
+    path = run_path(make_method("sharp", PROBLEM), [0.8, 0.2, 0.7, 0.4, 0.6], load_steps=8)
     assert [(m.start, m.turn) for m in path.minor_loops] == [(0.4, 0.6), (0.2, 0.7)]
     assert abs(path.audit_residual) < 1e-4
 
 
 def test_the_single_wave_closes_every_minor_loop_without_loss():
     """Between touch and fold its states lie on one branch."""
-    wave = wave_of(0.2)
-    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave.work_of_adhesion)
-    path = run_path(ExactWave(problem), [0.5, 0.1, 0.4], load_steps=5)
+    path = run_path(ExactWave(OF_WAVE), [0.5, 0.1, 0.4], load_steps=5)
     (minor,) = path.minor_loops
     assert minor.closes
     assert abs(minor.loss) < 1e-6 * path.work
-    assert path.work == pytest.approx(wave.loop.loss, rel=1e-4)
+    assert path.work == pytest.approx(WAVE.loop.loss, rel=1e-4)
 
 
 def test_doubt_of_a_path_is_said_as_that_of_a_loop():
-    path = run_path(make_method("sharp", problem_of()), [0.5], load_steps=5)
+    path = run_path(make_method("sharp", PROBLEM), [0.5], load_steps=5)
     assert path.warnings == ()
     wrong = replace(path, work=1.1 * path.work)
     assert [text[:18] for text in wrong.warnings] == ["the audit residual"]
     uncertain = replace(path, loss_error=0.01 * path.work)
     (text,) = uncertain.warnings
     assert text.startswith("the numerical error of the work")
-    steep = replace(problem_of(), profile=ROUGH.scaled(30))
+    steep = replace(PROBLEM, profile=ROUGH.scaled(30))
     steep_path = run_path(make_method("sharp", steep), [0.1], load_steps=2)
     assert any("linear elasticity itself" in text for text in steep_path.warnings)
 
 
 def test_a_method_without_adhesion_remembers_no_path_before():
-    method = make_method("sharp", problem_of(0.0))
+    method = make_method("sharp", replace(PROBLEM, work_of_adhesion=0.0))
     first, again = (run_path(method, [0.4, 0.2, 0.4], load_steps=4) for _ in range(2))
     assert again == first
     assert np.all(np.diff(first.separation[first.leg == 3]) >= 0)

@@ -1,5 +1,7 @@
 """Work of adhesion that varies along the profile: closed forms, invariances, both methods."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -8,24 +10,23 @@ from scipy.optimize import brentq, minimize_scalar
 import adhesis
 from adhesis import (
     AdhesionPattern,
-    HalfSpace,
     LoopResult,
     Problem,
     Profile,
     make_method,
-    run_loop,
     run_path,
-    self_affine_profile,
     single_wave,
     stripes,
 )
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.references.single_wave import SingleWave
-from tests.support.scenes import UNEVEN
+from tests.support import scenes
+from tests.support.scenes import HALF_SPACE as SOLID
+from tests.support.scenes import UNEVEN, rough
 
-A, PERIOD, GAMMA, SOLID = 1e-6, 1e-4, 0.004, HalfSpace(1e6, 0.5)
+A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
 Q0 = 2 * np.pi / PERIOD
-ROUGH = self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, seed=3, h_rms=1e-6)
+ROUGH = rough(2, 6, 3, period=1e-3)
 
 
 class StripedWave:
@@ -60,11 +61,9 @@ class StripedWave:
         return into, out, (self.energy(out) - self.energy(into)) / PERIOD
 
 
-def loop_of(problem: Problem, accuracy: float = 1e-4, **given: float) -> LoopResult:
-    return run_loop(
-        make_method("sharp", problem, accuracy=accuracy),
-        **{"max_penetration": 0.5, "load_steps": 20, **given},
-    )
+def loop_of(problem: Problem, accuracy: float = 1e-4, **given: Any) -> LoopResult:
+    path = {"max_penetration": 0.5, "load_steps": 20} | given
+    return scenes.loop_of(problem, accuracy=accuracy, **path)
 
 
 @pytest.mark.parametrize("measure", ["flat", "arc"])
@@ -136,10 +135,10 @@ def test_two_works_and_a_pattern_share_their_variation_and_are_kept_in_a_file(tm
 
 
 def test_both_methods_agree_on_a_pattern():
-    sharp = loop_of(Problem(ROUGH, SOLID, 2e-3, pattern=UNEVEN), max_penetration=0.7, load_steps=10)
-    method = make_method("grid", sharp.problem, nodes_per_wave=64)
-    grid = run_loop(method, max_penetration=0.7, load_steps=10)
-    even = loop_of(Problem(ROUGH, SOLID, 2e-3), max_penetration=0.7, load_steps=10)
+    path = {"max_penetration": 0.7, "load_steps": 10}
+    sharp = loop_of(Problem(ROUGH, SOLID, 2e-3, pattern=UNEVEN), **path)
+    grid = loop_of(sharp.problem, 1e-3, name="grid", nodes_per_wave=64, **path)
+    even = loop_of(Problem(ROUGH, SOLID, 2e-3), **path)
     assert abs(grid.loss - sharp.loss) < grid.loss_error + sharp.loss_error
     assert abs(grid.loss - sharp.loss) < 0.1 * abs(even.loss - sharp.loss)
 
@@ -161,11 +160,8 @@ def test_a_pattern_knows_its_stripes_also_on_another_period():
     assert wide.stripes == pytest.approx((20, 0.3, 1.0), rel=1e-12)
     assert wide.on_period(0.91) == stripes(18, 0.3, 1.0)
     assert wide.on_period(1e-3) == stripes(1, 0.3, 1.0)
-    assert (
-        AdhesionPattern([0, 0, 0.1, 0.2]).stripes
-        == (None, None, None)
-        == AdhesionPattern([0, 0]).stripes
-    )
+    for coefficients in ([0, 0, 0.1, 0.2], [0, 0]):
+        assert AdhesionPattern(coefficients).stripes == (None, None, None)
 
 
 def test_a_range_of_a_loop_is_that_of_the_weakest_place():

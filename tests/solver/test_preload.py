@@ -6,36 +6,25 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    PathError,
-    Problem,
-    make_method,
-    run_loop,
-    run_loops,
-    self_affine_profile,
-    single_wave,
-)
+from adhesis import Control, PathError, Problem, make_method, run_loop, run_loops, single_wave
 from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.mean_stress_event import up_to
 from adhesis.solver.method import ContactState, Method, Path
 from adhesis.solver.model.jump import Jump
-from adhesis.solver.model.profile import Profile
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.exact_wave import ExactWave
-from tests.support.scenes import HALF_SPACE
+from tests.support.scenes import HALF_SPACE, loop_of
+from tests.support.scenes import rough as rough_profile
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11
 WAVE = SingleWave.with_alpha(0.2, AMPLITUDE, PERIOD, HALF_SPACE.modulus)
-PROFILE = self_affine_profile(0.8, period=2e-3, n0=4, ratio=5, seed=1, h_rms=1e-6)
+PROFILE = rough_profile(4, 5, 1)
 GAMMA, PRELOAD = 0.005, 500.0
 FIXED, SOFT = Control(), Control(1e9)
 
 
-def rough(control: Control = FIXED, profile: Profile = PROFILE, **options) -> Problem:
-    values = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": GAMMA} | options
-    return Problem(profile, control=control, **values)
+def rough(control: Control = FIXED, gamma: float = GAMMA) -> Problem:
+    return Problem(PROFILE, HALF_SPACE, gamma, control)
 
 
 def of_wave(control: Control = FIXED) -> Problem:
@@ -141,9 +130,7 @@ def test_a_preload_that_is_never_reached_is_said_and_the_turning_point_named():
     assert loop.warnings[0] == text
     assert "is not reached: on loading the mean stress is at most" in text
     assert "the loop turns at Δ/h_max = 0.999" in text
-    strong = run_loop(
-        make_method("sharp", rough(work_of_adhesion=0.05)), preload=PRELOAD, max_penetration=0.7
-    )
+    strong = loop_of(rough(gamma=0.05), preload=PRELOAD, max_penetration=0.7)
     assert strong.turning_point == 0.7
     assert "a tension in every state of contact; the loop turns at Δ/h_max = 0.7" in str(strong)
 
@@ -230,10 +217,9 @@ def test_a_mean_stress_that_a_branch_does_not_have_is_refused():
 
 
 def test_a_closing_drop_that_is_negative_is_doubted():
-    profile = self_affine_profile(0.8, period=1e-3, n0=3, ratio=6, seed=4, h_rms=1e-6)
+    problem = Problem(rough_profile(3, 6, 4, period=1e-3), HALF_SPACE, 0.012, Control(0.0))
     for max_stress, count in ((500.0, 0), (2000.0, 1)):  # the same branch, turned early and late
-        problem = Problem(profile, HalfSpace(1e6, 0.5), 0.012, Control(0.0))
-        loop = run_loop(make_method("sharp", problem), max_stress=max_stress, load_steps=5)
+        loop = loop_of(problem, max_stress=max_stress, load_steps=5)
         assert loop.closing_drop == loop.jumps[-1].energy_drop
         assert (loop.closing_drop < 0) == bool(count)
         doubts = [text for text in loop.warnings if "at which the weight falls off" in text]

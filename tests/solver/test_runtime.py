@@ -1,6 +1,5 @@
 """What the mechanics ask of the process: one thread of linear algebra, and memory that is kept."""
 
-import subprocess
 import sys
 
 import numpy as np
@@ -9,6 +8,7 @@ from threadpoolctl import ThreadpoolController
 
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.continuation.descent import leaving_step
+from tests.support.processes import ran
 
 
 def threads() -> set[int]:
@@ -56,8 +56,7 @@ print(faults())
 def faults(keep: bool) -> int:
     """Pages that ten rounds of twenty megabytes, taken and freed, ask of the system."""
     work = WORK.replace("KEEP", "keep_freed()" if keep else "")
-    done = subprocess.run([sys.executable, "-c", work], capture_output=True, text=True, check=True)
-    return int(done.stdout)
+    return int(ran(sys.executable, "-c", work, check=True).stdout)
 
 
 @pytest.mark.skipif(not keep_freed(), reason="the C library is not glibc")

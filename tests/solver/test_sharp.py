@@ -5,28 +5,30 @@ import pytest
 
 from adhesis import Problem, Profile, make_method, run_loop, self_affine_profile
 from adhesis.solver.sharp.method import SharpMethod
-from tests.support.scenes import HALF_SPACE
+from tests.support import scenes
+from tests.support.scenes import HALF_SPACE, loop_of, of_paper
 
 PERIOD = 2e-3 * np.pi
 
 
 def rough(seed=3, *, n0=5, ratio=8, hurst=0.8):
-    return self_affine_profile(hurst, period=PERIOD, n0=n0, ratio=ratio, h_rms=1e-6, seed=seed)
+    return scenes.rough(n0, ratio, seed, hurst=hurst, period=PERIOD)
 
 
-def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, solid=HALF_SPACE):
-    method = make_method("sharp", Problem(profile, solid, gamma), accuracy=accuracy)
-    return run_loop(method, max_penetration=max_penetration, load_steps=load_steps)
+def loop(profile, gamma, **path):
+    path = {"max_penetration": 0.9, "load_steps": 20} | path
+    return loop_of(Problem(profile, HALF_SPACE, gamma), **path)
 
 
 def test_grid_converges_to_sharp():
     """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
     problem = Problem(rough(n0=2, ratio=6), HALF_SPACE, 0.01)
-    sharp = run_loop(make_method("sharp", problem), max_penetration=0.9, load_steps=10).loss
+    path = {"max_penetration": 0.9, "load_steps": 10}
+    sharp = loop_of(problem, **path).loss
     errors = []
     for nodes in (8, 64):
-        grid = make_method("grid", problem, nodes_per_wave=nodes)
-        errors.append(abs(run_loop(grid, max_penetration=0.9, load_steps=10).loss / sharp - 1))
+        grid = loop_of(problem, "grid", nodes_per_wave=nodes, **path)
+        errors.append(abs(grid.loss / sharp - 1))
     assert errors[1] < errors[0]
     assert errors[1] < 2e-3
 
@@ -45,7 +47,7 @@ def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
 
 def test_touching_is_looked_for_before_a_branch_ends():
     """Surfaces touch at s = 0.10517 h_max, just before a branch that is followed finely ends."""
-    losses = [loop(rough(5, n0=10, ratio=100), 0.04, accuracy=a).loss for a in (1e-3, 1e-5)]
+    losses = [loop(of_paper(5), 0.04, accuracy=a).loss for a in (1e-3, 1e-5)]
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
 
 
@@ -56,6 +58,9 @@ def test_no_loss_without_adhesion():
     assert abs(result.loss_dimensionless) < 1e-12
     assert result.pull_off_penetration == pytest.approx(0.0, abs=1e-12)
     assert result.mean_stress.min() > -1e-3 * result.mean_stress.max()
+    assert result.interior is None
+    assert result.valid_range == result.turn_range == np.inf
+    assert result.warnings == ()
 
 
 def test_first_touch_may_run_to_almost_full_contact():
@@ -75,10 +80,9 @@ def test_a_hurst_exponent_next_to_1():
 
 def test_ten_thousand_waves():
     """Wave numbers 10 … 10,000: the field needs no more modes than before."""
-    profile = rough(1, n0=10, ratio=1000)
+    profile = of_paper(1, ratio=1000)
     method = make_method("sharp", Problem(profile, HALF_SPACE, 0.01))
-    state = method.detached(profile.h_max)
-    path = method.follow(state, profile.h_max)
+    path = method.follow(method.detached(profile.h_max), profile.h_max)
     assert path.jumps[0].kind == "snap-in"
     assert path.jumps[0].energy_drop > 0
 
@@ -149,12 +153,8 @@ def test_fields_obey_the_boundary_conditions():
     ],
 )
 def test_loops_that_once_did_not_end(hurst, n0, ratio, gamma, seed, accuracy, max_penetration):
-    result = loop(
-        rough(seed, n0=n0, ratio=ratio, hurst=hurst),
-        gamma,
-        accuracy=accuracy,
-        max_penetration=max_penetration,
-    )
+    profile = rough(seed, n0=n0, ratio=ratio, hurst=hurst)
+    result = loop(profile, gamma, accuracy=accuracy, max_penetration=max_penetration)
     assert result.patches[-1] == 0
     assert abs(result.audit_residual) < 1e-4
 

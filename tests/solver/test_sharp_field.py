@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from adhesis import Problem, self_affine_profile, single_wave
+from adhesis import Problem, single_wave
 from adhesis.solver._kernels import FieldModel, LoadingDevice, solve_field
-from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.gap_field import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import FIXED_SEPARATION
+from tests.support import scenes
 from tests.support.dense import solve_densely
 from tests.support.explicit_solution import explicit_openings, explicit_solution
-from tests.support.grids import grid_of
-from tests.support.scenes import HALF_SPACE
+from tests.support.scenes import HALF_SPACE, grid_of
 
+PERIOD = 2e-3 * np.pi
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
-SMOOTH = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=5, h_rms=1e-6, seed=2)
+SMOOTH = scenes.rough(4, 5, 2, period=PERIOD)
 
 MOST_NODES = 21  # the order of the rule with the most nodes
 
@@ -23,7 +23,7 @@ MOST_NODES = 21  # the order of the rule with the most nodes
 @pytest.fixture(scope="module")
 def rough():
     """Paper's spectrum with wave numbers 10 … 1000."""
-    return self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
+    return scenes.of_paper(1)
 
 
 @pytest.fixture(scope="module")
@@ -36,13 +36,7 @@ def separation(rough):
     return 0.5 * rough.h_max * rough.q0
 
 
-def solved_field(
-    source: StressSource,
-    gaps: Array,
-    prescribed: float,
-    tolerance: float,
-    device: LoadingDevice = FIXED_SEPARATION,
-) -> GapField:
+def solved_field(source, gaps, prescribed, tolerance, device=FIXED_SEPARATION) -> GapField:
     model = FieldModel(device, float(-np.log(tolerance)), source.panels)
     return GapField(source, gaps, prescribed, lambda: solve_field(gaps, prescribed, model))
 
@@ -180,7 +174,7 @@ def test_edge_opening_against_the_edge_stress_of_the_grid():
     The stress of a patch's last node is 0.7602 K/sqrt(dx), and the edge lies 0.190 dx inside the
     outer face of that node (docs/methods.md).
     """
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=2, ratio=8, h_rms=1e-6, seed=2)
+    profile = scenes.rough(2, 8, 2, period=PERIOD)
     source, half_space = StressSource(profile), HALF_SPACE
     separation = 0.3 * profile.h_max
     wanted = np.array([[0.4, 1.5], [2.0, 2.9], [3.3, 4.6], [5.1, 5.9]])  # patches
@@ -220,7 +214,7 @@ def test_a_gap_is_solved_by_the_inverse_of_its_block_at_every_order(order):
 @pytest.mark.parametrize("k", range(3))
 def test_openings_at_fine_nodes_are_sums_of_their_modes(k):
     """Of fifty numbers of nodes, from few to many."""
-    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=25, h_rms=1e-6, seed=2)
+    profile = scenes.rough(4, 25, 2, period=PERIOD)
     model = FieldModel(FIXED_SEPARATION, 20.0, StressSource(profile).panels)
     gaps = np.array([[0.3, 0.8], [1.0, 2.0], [2.3, 5.1]])
     field = solve_field(gaps, 0.5 * profile.h_max * profile.q0, model)

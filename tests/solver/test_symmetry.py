@@ -3,30 +3,14 @@
 import numpy as np
 import pytest
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    Problem,
-    Profile,
-    make_method,
-    run_loop,
-    self_affine_profile,
-)
-from adhesis.solver.loading.loop_result import LoopResult
+from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, run_loop
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import MethodName
-from tests.support.grids import grid_of
-from tests.support.scenes import UNEVEN
+from tests.support.scenes import HALF_SPACE as SOFT
+from tests.support.scenes import UNEVEN, grid_of, loop_of, loops_at, rough
 
-SOFT = HalfSpace(1e6, 0.5)
 SHIFT = np.exp(1e-7j)
-
-
-def rough(n0: int, ratio: int, seed: int) -> Profile:
-    return self_affine_profile(0.8, period=2e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
-
-
 DEEP = {"max_penetration": 0.7}
 # Problem, turning point, and how near the losses are: by the accuracy with which jumps are found.
 SCENES: dict[str, tuple[Problem, dict[str, float], float]] = {
@@ -40,10 +24,6 @@ SCENES: dict[str, tuple[Problem, dict[str, float], float]] = {
     "pattern": (Problem(rough(2, 6, 3), SOFT, 2e-3, pattern=UNEVEN), DEEP, 1e-5),
     "two works": (Problem(rough(2, 3, 3), SOFT, 2e-3, work_of_adhesion_open=4e-3), DEEP, 1e-5),
 }
-
-
-def loop_of(problem: Problem, turn: dict[str, float]) -> LoopResult:
-    return run_loop(make_method("sharp", problem, accuracy=1e-4), **turn, load_steps=10)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -62,8 +42,9 @@ def test_mirror_shift_and_scale_change_nothing(name):
         pattern=pattern and pattern.mirrored().shifted(0.3),
     )
     scale = 1.0 if turn is DEEP else stresses
-    here = loop_of(problem, turn)
-    there = loop_of(other, {k: scale * v for k, v in turn.items()})
+    path = {"accuracy": 1e-4, "load_steps": 10}
+    here = loop_of(problem, **path, **turn)
+    there = loop_of(other, **path, **{k: scale * v for k, v in turn.items()})
     assert [jump.kind for jump in there.jumps] == [jump.kind for jump in here.jumps]
     assert len(here.jumps) > 2
     scale = stresses if "max_stress" in turn else 1.0
@@ -84,8 +65,7 @@ def bumpy(wave: int, amplitude: float, shift: complex = 1.0) -> Profile:
 
 def loop_of_bumps(wave: int, amplitude: float, gamma: float, shift: complex = 1.0) -> LoopResult:
     problem = Problem(bumpy(wave, amplitude, shift), HalfSpace(1.0, 0.0), gamma)
-    method = make_method("sharp", problem, accuracy=1e-4)
-    return run_loop(method, max_penetration=0.8, load_steps=30)
+    return loop_of(problem, accuracy=1e-4, max_penetration=0.8, load_steps=30)
 
 
 @pytest.mark.parametrize(
@@ -122,14 +102,8 @@ def even_profile(seed: int) -> tuple[Profile, Profile, float, float]:
 def test_a_random_symmetric_profile_loses_what_one_hardly_asymmetric_does(seed, accuracy):
     """Of touches and folds that are mirror images one comes first, in both."""
     even, shifted, gamma, depth = even_profile(seed)
-    one, other = (
-        run_loop(
-            make_method("sharp", Problem(profile, SOFT, gamma), accuracy=accuracy),
-            max_penetration=depth,
-            load_steps=10,
-        )
-        for profile in (even, shifted)
-    )
+    path = {"accuracy": accuracy, "max_penetration": depth, "load_steps": 10}
+    one, other = (loop_of(Problem(profile, SOFT, gamma), **path) for profile in (even, shifted))
     assert abs(one.loss - other.loss) < one.loss_error
     assert one.method.newton_steps < 2 * other.method.newton_steps
 
@@ -139,12 +113,7 @@ def test_parts_that_may_go_one_after_the_other_are_a_race_with_what_is_at_stake(
     amplitudes = np.zeros(13, dtype=complex)
     amplitudes[[6, 12]] = 1e-6 * np.array([0.648, 0.282]) * np.exp([-1.22j, 1.99j])
     problem = Problem(Profile(2e-3, amplitudes), SOFT, 1.7e-4)
-    coarse, fine = (
-        run_loop(
-            make_method("sharp", problem, accuracy=accuracy), max_penetration=0.75, load_steps=10
-        )
-        for accuracy in (1e-3, 1e-4)
-    )
+    coarse, fine = loops_at(problem, 1e-3, 1e-4, max_penetration=0.75, load_steps=10)
     apart = abs(coarse.loss - fine.loss)
     assert apart < max(coarse.loss_error, coarse.energy_at_stake)
     # ends that differ by a turn are one
@@ -164,11 +133,10 @@ def test_two_equal_parts_that_are_mirrored_lose_the_same_wherever_they_lie(
     even = Profile(2e-3, coefficients)
     coefficients[4] *= SHIFT
     profiles = [even.shifted(share * even.period) for share in (0.0, 0.1234, 0.3777, 0.61)]
-    methods = [
-        make_method("sharp", Problem(profile, SOFT, gamma))
+    losses = [
+        loop_of(Problem(profile, SOFT, gamma), max_penetration=depth, load_steps=10).loss
         for profile in (*profiles, Profile(2e-3, coefficients))
     ]
-    losses = [run_loop(method, max_penetration=depth, load_steps=10).loss for method in methods]
     np.testing.assert_allclose(losses, losses[0], rtol=1e-4)
 
 
@@ -177,10 +145,8 @@ def test_grid_takes_mirror_images_one_after_the_other_too():
     profile = Profile(2e-3, np.array([0, 1e-7, -4e-7, -1e-7], dtype=complex))
     assert len(profile.crests().position) == 2
     problem = Problem(profile, SOFT, 2e-4)
-    sharp, grid = (
-        run_loop(method, max_penetration=0.5, load_steps=10)
-        for method in (make_method("sharp", problem), grid_of(problem, nodes=512))
-    )
+    sharp = loop_of(problem, max_penetration=0.5, load_steps=10)
+    grid = run_loop(grid_of(problem, nodes=512), max_penetration=0.5, load_steps=10)
     for loop in (sharp, grid):
         assert loop.jumps[0].patches_after == 1
     assert sharp.jumps[0].raced
@@ -190,13 +156,10 @@ def test_grid_takes_mirror_images_one_after_the_other_too():
 def test_axes_and_equal_parts_of_a_profile():
     even = bumpy(8, 6e-5)
     assert even.mirror_axes.tolist() == [0.0]
-    shifted = even.shifted(0.3)
-    np.testing.assert_allclose(shifted.mirror_axes, [0.3])
+    np.testing.assert_allclose(even.shifted(0.3).mirror_axes, [0.3])
     assert len(bumpy(8, 6e-5, np.exp(0.1j)).mirror_axes) == 0
-    assert (even.equal_parts, Profile(1.0, np.array([0, 0, 0, 0, 1e-6, 0, 1e-7])).equal_parts) == (
-        1,
-        2,
-    )
+    assert even.equal_parts == 1
+    assert Profile(1.0, np.array([0, 0, 0, 0, 1e-6, 0, 1e-7])).equal_parts == 2
 
 
 PERIOD = 1e-3
@@ -208,8 +171,8 @@ def loop_in(
 ) -> LoopResult:
     problem = Problem(profile, SOFT, gamma, measure=measure)
     nodes_per_wave = 16 if method == "grid" else None
-    chosen = make_method(method, problem, nodes_per_wave=nodes_per_wave)
-    return run_loop(chosen, max_penetration=0.7, load_steps=5)
+    path = {"max_penetration": 0.7, "load_steps": 5}
+    return loop_of(problem, method, nodes_per_wave=nodes_per_wave, **path)
 
 
 @pytest.mark.parametrize("method", ["sharp", "grid"])

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from numpy.polynomial.legendre import legval
 
 from adhesis.solver.model.measured_profile import (
     band_limited,
+    form_shares,
     one_period,
     polynomial_form,
     trace_spectrum,
@@ -32,6 +34,12 @@ def test_a_polynomial_is_all_form_and_its_rest_has_none(degree: int) -> None:
     np.testing.assert_allclose(polynomial_form(rest, degree), 0, atol=1e-18)
     with pytest.raises(ValueError, match="degree is -1"):
         polynomial_form(form, -1)
+
+
+def test_shares_of_a_form_are_the_mean_squares_of_its_polynomials() -> None:
+    form = legval(2 * X / X[-1] - 1, [1e-6, 2e-6, 3e-6])
+    wanted = [1e-12, 4e-12 / 3, 9e-12 / 5, *10 * [0]]
+    np.testing.assert_allclose(form_shares(form), wanted, rtol=1e-9, atol=1e-24)
 
 
 def test_a_period_keeps_the_heights_and_has_no_step() -> None:

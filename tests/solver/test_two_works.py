@@ -5,36 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import PathError
-from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.loading.path import run_path
-from adhesis.solver.model.control import Control
-from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
+from adhesis import Control, PathError, Problem, Profile, make_method, run_path, single_wave
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.registry import make_method
 from adhesis.solver.sharp.continuation.branch import StableBranch
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.errors import NoState
-from tests.support.scenes import loops_at
+from tests.support.scenes import HALF_SPACE as SOLID
+from tests.support.scenes import loop_of, loops_at, rough
 from tools.hostile import draw
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
-SOLID = HalfSpace(1e6, 0.5)
+WAVE = single_wave(A, PERIOD)
 # A few waves with three patches at most, six jumps and minor crests that are pinned.
 ROUGH = np.zeros(7, complex)
 ROUGH[2:] = 1e-7 * np.array([0.51 - 0.35j, -0.64 + 0.66j, 0.10 - 0.09j, -0.13 - 0.29j, 0.02 - 0.4j])
 
 
 def wave(ratio: float, control: Control | None = None) -> Problem:
-    return Problem(
-        single_wave(A, PERIOD),
-        SOLID,
-        GAMMA,
-        control or Control(),
-        work_of_adhesion_open=ratio * GAMMA,
-    )
+    gamma_open = ratio * GAMMA
+    return Problem(WAVE, SOLID, GAMMA, control or Control(), work_of_adhesion_open=gamma_open)
 
 
 def closed_form(ratio: float, depth: float) -> tuple[float, float]:
@@ -52,8 +41,7 @@ def closed_form(ratio: float, depth: float) -> tuple[float, float]:
 @pytest.mark.parametrize("depth", [0.3, 0.6])
 @pytest.mark.parametrize("ratio", [1.1, 2.0, 4.0])
 def test_loss_of_a_wave_is_the_closed_form(ratio, depth):
-    method = make_method("sharp", wave(ratio), accuracy=1e-4)
-    loop = run_loop(method, max_penetration=depth, load_steps=20)
+    loop = loop_of(wave(ratio), accuracy=1e-4, max_penetration=depth, load_steps=20)
     loss, friction = closed_form(ratio, depth)
     assert loop.loss == pytest.approx(loss, rel=1e-4)
     assert loop.loss_from_drops == pytest.approx(loss, rel=1e-4)
@@ -64,18 +52,16 @@ def test_loss_of_a_wave_is_the_closed_form(ratio, depth):
 
 
 def test_equal_works_of_adhesion_give_the_same_bits_as_one():
-    one = Problem(single_wave(A, PERIOD), SOLID, GAMMA)
+    one = Problem(WAVE, SOLID, GAMMA)
     both = wave(1.0)
     assert both == one
     assert both.work_of_adhesion_open is None
     assert (both.pinning, both.gamma_open) == (0.0, GAMMA)
-    loops = [
-        run_loop(make_method("sharp", p), max_penetration=0.6, load_steps=10) for p in (one, both)
-    ]
-    assert loops[0] == loops[1]
-    assert loops[0].friction == 0.0
-    assert loops[0].edge_friction is None
-    assert "edge_friction" not in loops[0].columns()
+    loop, other = (loop_of(p, max_penetration=0.6, load_steps=10) for p in (one, both))
+    assert loop == other
+    assert loop.friction == 0.0
+    assert loop.edge_friction is None
+    assert "edge_friction" not in loop.columns()
 
 
 @pytest.mark.parametrize("control", [Control(), Control(1e11)])
@@ -108,9 +94,8 @@ def test_a_fold_of_receding_edges_is_not_passed():
 
 def test_a_loop_of_many_patches_closes_its_audit():
     """Most of its gaps lie apart in the tree, and some edges are pinned at most of its states."""
-    profile = self_affine_profile(0.8, period=2e-3, n0=10, ratio=4, seed=3, h_rms=1e-6)
-    problem = Problem(profile, SOLID, 2e-3, work_of_adhesion_open=3e-3)
-    loop = run_loop(make_method("sharp", problem), max_penetration=0.8, load_steps=10)
+    problem = Problem(rough(10, 4, 3), SOLID, 2e-3, work_of_adhesion_open=3e-3)
+    loop = loop_of(problem, max_penetration=0.8, load_steps=10)
     assert loop.patches.max() >= 12
     assert 0.05 * loop.loss < loop.friction < loop.loss
     assert abs(loop.audit_residual) < 1e-3
@@ -119,7 +104,7 @@ def test_a_loop_of_many_patches_closes_its_audit():
 
 def test_friction_only_grows():
     problem = Problem(Profile(PERIOD, ROUGH), SOLID, 1e-3, work_of_adhesion_open=2e-3)
-    (loop,) = loops_at(problem, 1e-4, max_penetration=0.6, load_steps=20)
+    loop = loop_of(problem, accuracy=1e-4, max_penetration=0.6, load_steps=20)
     assert np.all(np.diff(loop.edge_friction) >= 0)
     assert loop.to_dataframe().attrs["units"]["edge_friction"] == "J/m"
     data = loop.to_xarray()
@@ -135,16 +120,14 @@ def test_auto_takes_sharp_for_two_works():
 def test_equal_patches_of_two_works_are_doubted() -> None:
     """Which of them goes first, and when, differs between accuracies by more than the error."""
     equal = replace(wave(3.0), profile=Profile(PERIOD, np.array([0, 0, 0.5 * A], complex)))
-    loops = [
-        run_loop(make_method("sharp", problem), max_penetration=0.8, load_steps=10)
-        for problem in (equal, replace(equal, work_of_adhesion_open=None), wave(3.0))
-    ]
+    problems = (equal, replace(equal, work_of_adhesion_open=None), wave(3.0))
+    loops = [loop_of(problem, max_penetration=0.8, load_steps=10) for problem in problems]
     assert [any("are alike" in text for text in loop.warnings) for loop in loops] == [1, 0, 0]
 
 
 def test_under_a_load_the_solid_falls_off_at_the_largest_tension_of_the_larger_work() -> None:
-    method = make_method("sharp", wave(2.0, Control(0.0)), accuracy=1e-4)
-    loop = run_loop(method, max_stress=2000.0, load_steps=20)
+    problem = wave(2.0, Control(0.0))
+    loop = loop_of(problem, accuracy=1e-4, max_stress=2000.0, load_steps=20)
     opens = SingleWave(A, PERIOD, SOLID.modulus, 2.0 * GAMMA, "arc")
     tension = -opens.mean_stress(np.linspace(1e-3, 0.4, 40_000) * PERIOD).min()
     assert loop.pull_off_stress == pytest.approx(tension, rel=1e-5)
@@ -156,11 +139,8 @@ def test_a_loop_under_a_load_does_not_creep() -> None:
 
     A loop then took tens of thousands of them.
     """
-    profile = self_affine_profile(0.8, period=2e-3, n0=2, ratio=6, seed=3, h_rms=1e-6)
-    control = Control(0.0)
-    problem = Problem(profile, SOLID, 0.002, control, work_of_adhesion_open=0.004)
-    method = make_method("sharp", problem)
-    loop = run_loop(method, max_stress=800.0, load_steps=10)
+    problem = Problem(rough(2, 6, 3), SOLID, 0.002, Control(0.0), work_of_adhesion_open=0.004)
+    loop = loop_of(problem, max_stress=800.0, load_steps=10)
     assert loop.method.newton_steps < 1000
     assert abs(loop.audit_residual) < 1e-4
     assert loop.friction > 0
@@ -209,6 +189,6 @@ def test_a_refusal_names_another_method_only_where_it_takes_the_problem(ratio, m
 
     monkeypatch.setattr(Follower, "run", refuse)
     with pytest.raises(PathError, match="another accuracy") as refused:
-        run_loop(make_method("sharp", wave(ratio)), max_penetration=0.5, load_steps=2)
+        loop_of(wave(ratio), max_penetration=0.5, load_steps=2)
     assert ("or the other method" in str(refused.value)) is (ratio == 1)
     assert "grid" not in str(refused.value)

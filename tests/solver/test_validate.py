@@ -199,7 +199,7 @@ def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, 
 def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     """The whole of ``adhesis validate``; without --slow a part of the long claims.
 
-    On a grid of half as many nodes, whose edges are known half as well. Other α are in
+    On a grid of a quarter as many nodes, whose edges are known a quarter as well. Other α are in
     test_sharp_path.py, controls in test_control_loops.py, audits of rough loops in test_grid.py
     and test_touch.py.
     """
@@ -207,8 +207,8 @@ def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     if not request.config.getoption("--slow"):
         alphas = (0.05, 0.6)
         monkeypatch.setattr(validation, "ALPHAS", alphas)
-        monkeypatch.setattr(validation, "GRIDS", judging.GRIDS[:-1])
-        nodes, standard = judging.GRIDS[-2], judging.STANDARDS["grid"]
+        monkeypatch.setattr(validation, "GRIDS", judging.GRIDS[:-2])
+        nodes, standard = judging.GRIDS[-3], judging.STANDARDS["grid"]
         coarser = replace(standard, nodes=nodes, edge=1 / nodes)
         monkeypatch.setitem(judging.STANDARDS, "grid", coarser)
         elsewhere = (validation.controls, validation.audit)

@@ -5,11 +5,12 @@ import json
 import os
 import re
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.support.processes import ran
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 BROWSER = next(filter(None, map(shutil.which, NAMES)), None)
@@ -21,7 +22,6 @@ needs_browser = pytest.mark.skipif(
 
 def seen_by_browser(page: str, script: str, folder: Path) -> Any:
     """Return what a script at the end of a page hands to ``reportSeen``, as soon as it does."""
-    assert BROWSER is not None
     begin = "const reportSeen = found => { document.getElementById('seen').textContent = "
     probe = (
         f"<pre id='seen'></pre><script>{begin}JSON.stringify(found); }};{script}</script></body>"
@@ -29,16 +29,11 @@ def seen_by_browser(page: str, script: str, folder: Path) -> Any:
     path = folder / "page.html"
     path.write_text(page.replace("</body>", probe), encoding="utf-8")
     sandbox = [] if os.geteuid() else ["--no-sandbox"]  # Chromium has none for root
-    done = subprocess.run(
-        [
-            *(BROWSER, "--headless", *sandbox, "--disable-gpu", f"--user-data-dir={folder}/user"),
-            *("--virtual-time-budget=120000", "--dump-dom", path.as_uri()),
-        ],
-        capture_output=True,
-        text=True,
+    done = ran(
+        *(BROWSER, "--headless", *sandbox, "--disable-gpu", f"--user-data-dir={folder}/user"),
+        *("--virtual-time-budget=120000", "--dump-dom", path.as_uri()),
         check=True,
     )
     found = re.search(r"<pre id=['\"]seen['\"]>(.*?)</pre>", done.stdout, re.DOTALL)
-    assert found is not None
     assert found[1]
     return json.loads(html.unescape(found[1]))

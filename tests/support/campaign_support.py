@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import h5py
@@ -24,6 +24,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.run import launch
 from tests.support.fake_run import fake_engine
 from tests.support.launchers import MPIRUN
+from tests.support.processes import ran
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TESTS = Path(__file__).resolve().parent
@@ -112,17 +113,11 @@ def command(words: Iterable[object], ranks: int = 0, fake: str | None = None) ->
     return [*start, sys.executable, *module, *entry, *map(str, words)]
 
 
-def adhesis(
-    *words: object,
-    ranks: int = 0,
-    fake: str | None = None,
-    cwd: Path | None = None,
-    timeout: float = 150.0,
-) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end; TimeoutExpired if that does not come."""
-    process = start(*words, ranks=ranks, fake=fake, cwd=cwd)
+def adhesis(*words: object, **how: Any) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, started as by ``start``; TimeoutExpired if that does not come."""
+    process = start(*words, **how)
     try:
-        out, errors = process.communicate(timeout=timeout)
+        out, errors = process.communicate(timeout=150.0)
     except BaseException:  # Ctrl-C does not reach a process group of its own
         if process.pid not in hung_launchers():  # which are left to whoever looks for them
             kill_all(process)
@@ -159,14 +154,7 @@ def started(line: Sequence[str | Path], cwd: Path | None = None) -> subprocess.P
 
 
 def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *map(str, words)],
-        env=environment(**extra),
-        capture_output=True,
-        text=True,
-        timeout=150,
-        check=False,
-    )
+    return ran(sys.executable, *words, env=environment(**extra))
 
 
 def ranks_of(launcher: int) -> list[int]:

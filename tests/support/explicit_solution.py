@@ -85,10 +85,15 @@ def _solve(stress, gaps, separation, nodes):
     return c, theta, -sign[:, None] * w / smooth * half[:, None]
 
 
+def between(spans):
+    """Return what lies behind each of the spans of a period of 2π, shape (L, 2)."""
+    return np.stack([spans[:, 1], np.append(spans[1:, 0], spans[0, 0] + 2 * np.pi)], axis=1)
+
+
 def explicit_nodes(profile, gaps, least_nodes=96):
     """Return how many nodes every gap has in :func:`explicit_openings`."""
     widest = float(np.diff(gaps, axis=1).max()) / 2
-    patch = np.append(gaps[1:, 0], gaps[0, 0] + 2 * np.pi) - gaps[:, 1]
+    patch = np.diff(between(gaps), axis=1)[:, 0]
     # a narrow patch beside a wide gap asks for nodes as dense as it is, and 1/sqrt of it suffices
     narrow = float(np.sqrt(widest / patch.min()))
     return int(np.ceil(max(least_nodes, 12 * widest * profile.highest_harmonic, 12 * narrow)))

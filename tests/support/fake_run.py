@@ -16,6 +16,7 @@ import resource
 import signal
 import sys
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -53,6 +54,14 @@ def fake_result(campaign: Campaign, task: Task) -> Row:
     row = {k: v if v.ndim else v.item() for k, v in values.items()}
     errors = {"audit_residual": 1e-4 * row["audit_residual"], "loss_error": 1e-4 * row["loss"]}
     return row | errors  # no loss is doubtful by its own account
+
+
+def write_results(path: Path, campaign: Campaign, rows: Iterable[int], **changes: float) -> None:
+    """Write the results of rows of a campaign's file, some numbers replaced."""
+    tasks = campaign.tasks()
+    with Writer(path) as writer:
+        for row in rows:
+            writer.write_result(row, fake_result(campaign, tasks[row]) | changes)
 
 
 class FakeTask:

@@ -14,43 +14,21 @@ from adhesis.ensemble.results.schema import axis_datasets, kept_rows
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import GAP_EDGES, field_plan
 from adhesis.solver.model.jump import JUMP_KINDS
+from tests.support.campaign_support import campaign_text
 
-CAMPAIGN = """
-[profile]
-period = 6.283185307179586e-3
-n0 = 10
-ratio = {ratio}
-h_rms = 1e-6
-[material]
-young = 1e6
-poisson = 0.5
-[sweep]
-hurst = {hurst}
-work_of_adhesion = {gamma}
-realisations = {realisations}
-seed = 1
-[cycle]
-max_penetration = {max_penetration}
-load_steps = 20
-unloading_until = -2.0
-[output]
-jumps = {jumps}
-field_nodes = 256
-"""
+OF_PAPER = {"period": 6.283185307179586e-3, "n0": 10, "seed": 1}
+PATH = {"load_steps": 20, "unloading_until": -2.0}
 
 
 def text_of(
     hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32, ratio=10, max_penetration=0.9
 ) -> str:
     """The paper's profile, material and path if ``ratio`` is 100; lists are further axes."""
-    return CAMPAIGN.format(
-        hurst=list(hurst),
-        gamma=list(gamma),
-        realisations=realisations,
-        jumps=jumps,
-        ratio=ratio,
-        max_penetration=max_penetration,
-    )
+    values = OF_PAPER | PATH | {"realisations": realisations, "ratio": ratio}
+    values |= {"hurst": list(hurst), "work_of_adhesion": list(gamma)}
+    values |= {"max_penetration": max_penetration, "jumps": f"{jumps}\nfield_nodes = 256"}
+    text = campaign_text(**{key: str(value) for key, value in values.items()})
+    return text.replace('[solver]\nmethod = "grid"\nnodes_per_wave = 16\n\n', "")
 
 
 def campaign(*args, **changes) -> Campaign:
@@ -85,7 +63,6 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "status": np.ones(n, dtype=np.uint8),
         "wall_time": rng.uniform(1, 2, n),
         "cpu_time": rng.uniform(1, 2, n),
-        "rank": np.zeros(n, dtype=np.int32),
         "h_max": h_max,
         "h_rms": np.full(n, 1e-6),
         "m0": np.full(n, 1e-12),
@@ -96,21 +73,15 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "loss_from_drops": drops,
         "loss_small_scale": share * drops,
         "loss_large_scale": (1 - share) * drops,
-        "friction": np.zeros(n),
         "gamma_open": gamma,
         "audit_residual": audit,
         "loss_error": 1e-4 * loss,
-        "zone_error": np.zeros(n),
         "valid_range": 1e-2 * h_max,
         "edge_range": 2e-2 * h_max,
         "touch_range": 3e-2 * h_max,
-        "turn_range": np.full(n, np.inf),
         "largest_interior_tension": gamma / (1e-2 * h_max),
         "interior_tension_position": np.full(n, 0.25 * campaign.profile.period),
         "interior_tension_penetration": np.full(n, 0.1),
-        "opening_strength": np.full(n, np.inf),
-        "openings": np.zeros(n),
-        "barrier": np.zeros(n),
         "races": (np.arange(n) % 7 == 3).astype(np.int32),
         "energy_at_stake": np.where(np.arange(n) % 7 == 3, 0.02 * loss, 0.0),
         "pull_off_penetration": pull_off[:, 0],
@@ -129,6 +100,9 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "unloading_energy": np.where(stuck, -2e-6, 0.0),
         "jump_count": rng.integers(1, slots + 1, n).astype(np.int32),
     }
+    none = ("rank", "friction", "zone_error", "openings", "barrier")
+    out |= {name: np.zeros(n) for name in none}
+    out |= {name: np.full(n, np.inf) for name in ("turn_range", "opening_strength")}
     used = np.arange(slots) < out["jump_count"][:, None]
     kinds = rng.integers(0, len(JUMP_KINDS), (n, slots))
     energy = 10 ** rng.uniform(-8, -3, (n, slots))
@@ -176,10 +150,12 @@ def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
     }
 
 
-def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
-    create(path, campaign, attributes={"adhesis_version": "0.1.0"})
+def write(path: Path, plan: Campaign | str, values: dict[str, np.ndarray] | None = None) -> Path:
+    """Write a results file of a campaign, or of its text; its rows if no other values are given."""
+    plan = parse_campaign(plan) if isinstance(plan, str) else plan
+    create(path, plan, attributes={"adhesis_version": "0.1.0"})
     with h5py.File(path, "r+") as file:
-        for name, value in rows.items():
+        for name, value in (rows(plan) if values is None else values).items():
             file[name][...] = value
     return sign(path)
 
