@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from adhesis.solver._kernels import Adhesion, ProfileAdhesion
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import MIRRORED, Array
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.symmetry import Symmetry
 
 _PLACES = 2 * np.pi * (np.arange(97) + 0.37) / 97  # θ at which a law is looked at
 _STEP = 1e-4  # of the shortest wave: between values whose difference is compared with a slope
 _AGREE = 1e-3  # of the largest w, and per wave number of the largest slope that it may have
 
 
-class Symmetry(NamedTuple):
-    """Number of equal parts of a period, and the axes in θ about which it is its mirror image."""
-
-    parts: int
-    axes: Array
-
-
-ASYMMETRIC = Symmetry(1, np.empty(0))
-
-
-def symmetry_of(problem: Problem, own: Adhesion | None) -> Symmetry:
+def symmetry_of(problem: Problem, own: Adhesion | None, near: float) -> Symmetry:
     """Return the symmetry of a problem, as far as a law of one's own has it, too."""
     parts, axes = problem.equal_parts, problem.profile.q0 * problem.mirror_axes
     if own is None:
-        return Symmetry(parts, axes)
+        return Symmetry(parts, axes, near)
 
     def works(theta: Array) -> Array:
         return np.array([[own.work(at, recedes)[0] for at in theta] for recedes in (False, True)])
@@ -43,7 +32,7 @@ def symmetry_of(problem: Problem, own: Adhesion | None) -> Symmetry:
     shared = [n for n in range(1, parts + 1) if parts % n == 0]
     shared = [n for n in shared if is_same_at(_PLACES + 2 * np.pi / n)]
     mirrored = np.array([is_same_at(2 * axis - _PLACES) for axis in axes], dtype=bool)
-    return Symmetry(max(shared, default=1), axes[mirrored])
+    return Symmetry(max(shared, default=1), axes[mirrored], near)
 
 
 def adhesion_of(problem: Problem, source: StressSource) -> Adhesion:

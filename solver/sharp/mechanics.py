@@ -25,10 +25,10 @@ from adhesis.solver._kernels import (
     solve_field,
 )
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.adhesion import ASYMMETRIC, Symmetry
 from adhesis.solver.sharp.field.gap_field import GapField, check_definite
 from adhesis.solver.sharp.gap.ends import move_edges
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.symmetry import Symmetry
 from adhesis.solver.sharp.tolerances import (
     BY_FIELD,
     DESCENT_HANDS_OVER,
@@ -150,10 +150,10 @@ class EdgeMechanics:
         tolerance: float,
         device: LoadingDevice = FIXED_SEPARATION,
         adhesion: Adhesion | None = None,
-        symmetry: Symmetry = ASYMMETRIC,
+        symmetry: Symmetry | None = None,
     ) -> None:
         self.source, self.critical, self.tolerance = source, critical, tolerance
-        self.symmetry = symmetry
+        self.symmetry = symmetry or Symmetry(1, np.empty(0), 0.0)
         self.adhesion = adhesion or ProfileAdhesion(source.panels)
         self.wave = 2 * np.pi / source.top
         self.newton_tolerance = min(NEWTON_TOLERANCE, BY_FIELD * tolerance) * self.wave
@@ -304,6 +304,10 @@ class EdgeMechanics:
         given.
         """
         reach = max(reach, self.newton_tolerance)
+        if strict and self.symmetry.is_symmetric(gaps):
+            # Beyond a pitchfork Newton's iteration finds the symmetric state all the same, and the
+            # tangents of a response that moved there are not exact enough to show it.
+            self.forget()
         law = self.law_at(gaps if memory is None else memory)
         near = self.response_near(gaps, prescribed)
         if near is None:

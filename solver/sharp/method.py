@@ -48,6 +48,7 @@ from adhesis.solver.sharp.tolerances import (
     LARGEST_WORK_OF_STEP,
     LATE_DROP,
     LEAST_DROP,
+    OTHER_MINIMUM,
     OVERLAP,
     PLACED_BY_PROFILE,
     RANGE_RESOLVED,
@@ -148,7 +149,7 @@ class SharpMethod(Method):
         device = loading_device(problem)
         if adhesion is not None:
             check_adhesion(adhesion, problem, source)
-        symmetry = symmetry_of(problem, adhesion)
+        symmetry = symmetry_of(problem, adhesion, OTHER_MINIMUM * 2 * np.pi / source.top)
         law = adhesion or adhesion_of(problem, source)
         self.edges = EdgeMechanics(source, critical, tolerance, device, law, symmetry)
         self.states = States(problem, self.edges)

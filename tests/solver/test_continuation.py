@@ -27,7 +27,7 @@ class Curve:
     is_load: bool = False
     asked: int = 0
     pins: bool = False
-    source: ClassVar[Any] = SimpleNamespace(is_patterned=False)
+    adhesion: ClassVar[Any] = SimpleNamespace(least=1.0, largest=1.0)
 
     def point(self, d: float) -> Point:
         a = 0.5 + float(np.sqrt(d - FOLD))

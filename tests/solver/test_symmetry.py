@@ -140,6 +140,15 @@ def test_two_equal_parts_that_are_mirrored_lose_the_same_wherever_they_lie(
     np.testing.assert_allclose(losses, losses[0], rtol=1e-4)
 
 
+def test_two_patches_that_are_mirror_images_part_as_soon_as_they_are_a_saddle():
+    """Newton's iteration finds them beyond that, too: a step of 4e-3 h_max led 4e-4 too far."""
+    problem = Problem(Profile(2e-3, np.array([0, 0, 0, 5e-7])), SOFT, 3e-3)
+    coarse, fine = loops_at(problem, 1e-4, 1e-5, max_penetration=0.7, load_steps=10)
+    one, other = (loop.jumps[2] for loop in (coarse, fine))
+    assert (one.kind, one.patches_before) == (other.kind, other.patches_before) == ("vanishing", 2)
+    assert one.separation == pytest.approx(other.separation, abs=2e-5 * problem.profile.h_max)
+
+
 def test_grid_takes_mirror_images_one_after_the_other_too():
     """Two outer crests of one height, which touch at once; the trough between them stays open."""
     profile = Profile(2e-3, np.array([0, 1e-7, -4e-7, -1e-7], dtype=complex))

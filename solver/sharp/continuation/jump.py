@@ -15,7 +15,7 @@ from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
-from adhesis.solver.sharp.tolerances import ENDLESS, OTHER_MINIMUM
+from adhesis.solver.sharp.tolerances import ENDLESS
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Jumps:
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
-        self.symmetry = SymmetryCheck(edges)
+        self.symmetry = edges.symmetry
         self.descents = Descents(edges, states)
         self._first: tuple[float, list[Touch]] | None = None
 
@@ -263,49 +263,3 @@ class Jumps:
             both = (self.states.of_point(point).potential for point in (before, after))
             return not next(both) <= next(both)
         return not self.descents.is_same(after.field.gaps, before.field.gaps)
-
-
-class SymmetryCheck:
-    """Finds symmetric states, and jumps by which one loses its mirror symmetry.
-
-    The mirror image of their end is another end with the same energy: which of the two is reached
-    is a convention (docs/methods.md, rule 7).
-    """
-
-    def __init__(self, edges: EdgeMechanics) -> None:
-        parts, self._axes = edges.symmetry
-        self._near = OTHER_MINIMUM * edges.wave
-        self._turns = [2 * np.pi * n / parts for n in range(1, parts)]
-
-    def is_symmetric(self, gaps: Array) -> bool:
-        """Whether a state is its own mirror image, or consists of equal parts."""
-        return self.are_images(gaps, gaps) or self.are_copies(gaps, gaps)
-
-    def are_copies(self, one: Array, other: Array) -> bool:
-        """Whether two states differ by a turn of some parts."""
-        return one.shape == other.shape and any(
-            self._is_copy(one + turn, other) for turn in self._turns
-        )
-
-    def are_images(self, one: Array, other: Array) -> bool:
-        """Whether two states are mirror images of each other."""
-        return one.shape == other.shape and any(
-            self._is_image(one, other, axis) for axis in self._axes
-        )
-
-    def is_broken(self, before: Array, after: Array) -> bool:
-        """Whether a symmetry of the gaps ``before`` is not one of those ``after``."""
-        return any(
-            self._is_image(before, before, axis) and not self._is_image(after, after, axis)
-            for axis in self._axes
-        )
-
-    def _is_image(self, one: Array, other: Array, axis: float) -> bool:
-        """Whether the image of some gaps about this axis are others."""
-        return self._is_copy(2 * axis - one[:, ::-1], other)
-
-    def _is_copy(self, image: Array, other: Array) -> bool:
-        """Whether gaps lie at the places of others, on the circle."""
-        apart = np.abs((image[:, None] - other[None] + np.pi) % (2 * np.pi) - np.pi)
-        nearest = apart.max(axis=2).min(axis=1, initial=np.inf)
-        return bool((nearest < self._near).all())
