@@ -141,6 +141,8 @@ class EdgeMechanics:
         Narrower patches and gaps are removed; width of the narrowest patch or gap that is put.
     surface : float
         Γ = 2γ q0/E* where adhesion is weakest.
+    symmetry : Symmetry
+        Of profile and adhesion.
     """
 
     def __init__(

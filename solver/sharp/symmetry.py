@@ -49,12 +49,28 @@ class Symmetry:
             for axis in self.axes
         )
 
+    def symmetrised(self, gaps: Array) -> Array:
+        """Return the mean of a symmetric state and its images, which the field's error parts."""
+        images = [gaps + turn for turn in self._turns]
+        images += [2 * axis - gaps[:, ::-1] for axis in self.axes]
+        images = [image for image in images if self._is_copy(image, gaps)]
+        motion = np.zeros_like(gaps)
+        for image in images:
+            apart = _apart(gaps, image)
+            nearest = np.abs(apart).max(axis=2).argmin(axis=1)
+            motion -= apart[np.arange(len(gaps)), nearest]
+        return gaps + motion / (len(images) + 1)
+
     def _is_image(self, one: Array, other: Array, axis: float) -> bool:
         """Whether the image of some gaps about this axis are others."""
         return self._is_copy(2 * axis - one[:, ::-1], other)
 
     def _is_copy(self, image: Array, other: Array) -> bool:
         """Whether gaps lie at the places of others, on the circle."""
-        apart = np.abs((image[:, None] - other[None] + np.pi) % (2 * np.pi) - np.pi)
-        nearest = apart.max(axis=2).min(axis=1, initial=np.inf)
+        nearest = np.abs(_apart(image, other)).max(axis=2).min(axis=1, initial=np.inf)
         return bool((nearest < self._near).all())
+
+
+def _apart(one: Array, other: Array) -> Array:
+    """Compute on the circle how far gaps lie ahead of each of others, shape (gaps, others, 2)."""
+    return np.asarray((one[:, None] - other[None] + np.pi) % (2 * np.pi) - np.pi)

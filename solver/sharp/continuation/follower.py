@@ -311,8 +311,9 @@ class Follower:
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
+            gaps = self.edges.symmetry.symmetrised(saddle.gaps)
             ways = self.jumps.descents.ways_off_saddle(
-                saddle.gaps, fold.d, self.edges.law_at(point.gaps), at_fold=True
+                gaps, fold.d, self.edges.law_at(point.gaps), at_fold=True
             )
             if ways:
                 return ways[0], EventOrders(fold.d, (*ways, moved))
