@@ -9,6 +9,7 @@ what tests, linters and the optional formats of instruments need besides.
 import re
 import tomllib
 from collections.abc import Iterable
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
@@ -20,8 +21,6 @@ BUILD = (
     *("setuptools", "Cython", "pkgconfig", "packaging"),
     *("scikit_build_core", "nanobind", "cmake", "ninja"),
 )
-# The compiler, which set-up installs only where the system has none: else its version stays.
-COMPILER = "ziglang"
 TEST_EXTRAS = ("dev", "instruments")
 
 
@@ -46,15 +45,6 @@ def closure(names: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def compiler() -> dict[str, str]:
-    """Version of the compiler: the installed one, or that of the list."""
-    try:
-        return closure([COMPILER])
-    except PackageNotFoundError:
-        listed = (ROOT / "requirements.lock").read_text().splitlines()
-        return {COMPILER: next(line for line in listed if line.startswith(f"{COMPILER}=="))}
-
-
 def write(path: Path, versions: dict[str, str]) -> None:
     """Replace the lines of a list, keeping what its head says."""
     head = [line for line in path.read_text().splitlines() if line.startswith("#")]
@@ -65,7 +55,12 @@ def main() -> None:
     """Write both."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    runs = closure([*project["dependencies"], *extras["mpi"], *BUILD]) | compiler()
+    runs = closure([*project["dependencies"], *extras["mpi"], *BUILD])
+    # set-up installs a compiler only where the system has none: else its version stays
+    if listed := re.search(r"^ziglang==.*$", (ROOT / "requirements.lock").read_text(), re.M):
+        runs["ziglang"] = listed[0]
+    with suppress(PackageNotFoundError):
+        runs |= closure(["ziglang"])
     tests = closure([text for name in TEST_EXTRAS for text in extras[name]])
     write(ROOT / "requirements.lock", runs)
     write(ROOT / "requirements-test.lock", {k: v for k, v in tests.items() if k not in runs})
