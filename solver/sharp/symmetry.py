@@ -24,7 +24,6 @@ class Symmetry:
     def __init__(self, parts: int, axes: Array, near: float) -> None:
         """``near`` is the largest distance of the edges of equal states, in θ."""
         self.parts, self.axes, self._near = parts, axes, near
-        self._turns = [2 * np.pi * n / parts for n in range(1, parts)]
 
     def is_symmetric(self, gaps: Array) -> bool:
         """Whether a state is its own mirror image, or consists of equal parts."""
@@ -32,28 +31,21 @@ class Symmetry:
 
     def are_copies(self, one: Array, other: Array) -> bool:
         """Whether two states differ by a turn of some parts."""
-        return one.shape == other.shape and any(
-            self._is_copy(one + turn, other) for turn in self._turns
-        )
+        return any(self._are_same(copy, other) for copy in self._copies(one))
 
     def are_images(self, one: Array, other: Array) -> bool:
         """Whether two states are mirror images of each other."""
-        return one.shape == other.shape and any(
-            self._is_image(one, other, axis) for axis in self.axes
-        )
+        return any(self._are_same(image, other) for image in self._images(one))
 
     def is_broken(self, before: Array, after: Array) -> bool:
-        """Whether a symmetry of the gaps ``before`` is not one of those ``after``."""
-        return any(
-            self._is_image(before, before, axis) and not self._is_image(after, after, axis)
-            for axis in self.axes
-        )
+        """Whether a mirror symmetry of the gaps ``before`` is not one of those ``after``."""
+        both = zip(self._images(before), self._images(after), strict=True)
+        return any(self._are_same(a, before) and not self._are_same(b, after) for a, b in both)
 
     def symmetrised(self, gaps: Array) -> Array:
         """Return the mean of a symmetric state and its images, which the field's error parts."""
-        images = [gaps + turn for turn in self._turns]
-        images += [2 * axis - gaps[:, ::-1] for axis in self.axes]
-        images = [image for image in images if self._is_copy(image, gaps)]
+        images = [*self._copies(gaps), *self._images(gaps)]
+        images = [image for image in images if self._are_same(image, gaps)]
         motion = np.zeros_like(gaps)
         for image in images:
             apart = _apart(gaps, image)
@@ -61,13 +53,17 @@ class Symmetry:
             motion -= apart[np.arange(len(gaps)), nearest]
         return gaps + motion / (len(images) + 1)
 
-    def _is_image(self, one: Array, other: Array, axis: float) -> bool:
-        """Whether the image of some gaps about this axis are others."""
-        return self._is_copy(2 * axis - one[:, ::-1], other)
+    def _copies(self, gaps: Array) -> list[Array]:
+        return [gaps + 2 * np.pi * n / self.parts for n in range(1, self.parts)]
 
-    def _is_copy(self, image: Array, other: Array) -> bool:
+    def _images(self, gaps: Array) -> list[Array]:
+        return [2 * axis - gaps[:, ::-1] for axis in self.axes]
+
+    def _are_same(self, one: Array, other: Array) -> bool:
         """Whether gaps lie at the places of others, on the circle."""
-        nearest = np.abs(_apart(image, other)).max(axis=2).min(axis=1, initial=np.inf)
+        if one.shape != other.shape:
+            return False
+        nearest = np.abs(_apart(one, other)).max(axis=2).min(axis=1, initial=np.inf)
         return bool((nearest < self._near).all())
 
 

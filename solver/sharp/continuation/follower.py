@@ -300,7 +300,7 @@ class Follower:
         ends may differ where several modes soften at once.
         """
         point = fold.point
-        if not self.jumps.symmetry.is_symmetric(point.gaps):
+        if not self.edges.symmetry.is_symmetric(point.gaps):
             return point.gaps, self._orders_of_folds(fold)
         rate = np.abs(point.rate)
         fastest = np.flatnonzero(rate >= (1 - EQUAL) * rate.max())
