@@ -29,6 +29,7 @@ run: setup  ## the example campaign on all cores, then its report (CAMPAIGN=file
 
 lint: setup-test  ## ruff, mypy and the contracts of imports
 	$(bin)/ruff check .
+	$(bin)/ruff format --check .
 	$(bin)/mypy
 	$(bin)/lint-imports --no-cache --no-logo
 

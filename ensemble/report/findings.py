@@ -291,7 +291,7 @@ def _limit(data: Aggregate) -> Iterator[str]:
         return
     low, least = min(found)
     opens = data.campaign.material.opens
-    if not opens:  # else patches open from inside where the limit ends
+    if low > 0 and not opens:  # with a strength patches open from inside where the limit ends
         yield (
             f"The zero-range limit holds for ranges of adhesion well below {1e9 * low:.3g} nm: the "
             f"least {ANY_RANGE} of all loops, at {least}."
