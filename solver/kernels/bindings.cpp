@@ -170,8 +170,7 @@ class PythonAdhesion : public Adhesion {
   const IntegralFunction integral_function;
 
   PythonAdhesion(bool pins, double least, double largest, WorkFunction work, IntegralFunction up_to)
-      : Adhesion(pins, least, largest),
-        work_function(std::move(work)),
+      : Adhesion(pins, least, largest), work_function(std::move(work)),
         integral_function(std::move(up_to)) {}
 
   std::pair<double, double> work(double theta, bool recedes) const override {

@@ -20,8 +20,7 @@ bool place_gap(LinearResponse& response, int k) {
   tree.runs[k].interval = nodes.gaps[k];
   tree.runs[k].rank = rule.count;
   const int square = nodes.square[k];
-  return invert_definite(&response.equations.blocks[square], rule.count,
-                         &response.inverse[square]);
+  return invert_definite(&response.equations.blocks[square], rule.count, &response.inverse[square]);
 }
 
 // Move the reference of a gap, placed already, with the potential there; `old` is where it was,
