@@ -147,7 +147,7 @@ std::tuple<Vector, Vector, Vector, Vector> rising(FineOpening fine) {
 
 // ∂(C_e - C_c)/∂n_f between some edges of these gaps. All others follow, but those at their memory.
 Matrix tangent_between(LinearResponse& r, const Vector& ends, const Integers& some,
-                       double prescribed, const EdgeLaw& law, const Model& model) {
+                       double prescribed, const EdgeLaw& law, const FieldModel& model) {
   EdgeStates states = states_at(ends, law);
   for (int e : some) states.held[e] = true;
   hold_edges(r, ends, states);
@@ -201,16 +201,16 @@ void bind_model(nb::module_& m) {
             return out;
           },
           "theta"_a, "Evaluate S at any angles.");
-  nb::class_<Device>(m, "LoadingDevice")
+  nb::class_<LoadingDevice>(m, "LoadingDevice")
       .def(nb::init<double, double>(), "separation_weight"_a, "compliance"_a)
-      .def_ro("separation_weight", &Device::separation_weight)
-      .def_ro("compliance", &Device::compliance);
-  nb::class_<Model>(m, "FieldModel")
-      .def(nb::init<Device, double, std::shared_ptr<const Panels>>(), "device"_a, "digits"_a,
+      .def_ro("separation_weight", &LoadingDevice::separation_weight)
+      .def_ro("compliance", &LoadingDevice::compliance);
+  nb::class_<FieldModel>(m, "FieldModel")
+      .def(nb::init<LoadingDevice, double, std::shared_ptr<const Panels>>(), "device"_a, "digits"_a,
            "panels"_a)
-      .def_ro("device", &Model::device)
-      .def_ro("digits", &Model::digits)
-      .def_ro("panels", &Model::panels);
+      .def_ro("device", &FieldModel::device)
+      .def_ro("digits", &FieldModel::digits)
+      .def_ro("panels", &FieldModel::panels);
   nb::class_<Adhesion>(m, "Adhesion",
                        "Works of adhesion of edges; the contract is in edge_law.hpp.")
       .def_ro("pins", &Adhesion::pins)
@@ -347,7 +347,7 @@ void bind_field(nb::module_& m) {
       "theta"_a, "sine"_a, "cosine"_a, "weight"_a, Unlocked());
   m.def(
       "solve_field",
-      [](const Vector& gaps, double prescribed, const Model& model,
+      [](const Vector& gaps, double prescribed, const FieldModel& model,
          const std::optional<Integers>& orders) {
         Integers own;
         for (const Gap& gap : map_gaps(gaps)) own.push_back(choose_order(gap, model.digits));
@@ -375,7 +375,7 @@ void bind_response(nb::module_& m) {
       .def_ro("pinned_rate", &Equilibrium::pinned_rate)
       .def(
           "solve_field",
-          [](const Equilibrium& e, double prescribed, const Model& model) {
+          [](const Equilibrium& e, double prescribed, const FieldModel& model) {
             return solve_separately(e.ends, e.references, e.orders, e.potential, e.at.pressure,
                                     prescribed, model);
           },
@@ -403,7 +403,7 @@ void bind_response(nb::module_& m) {
       .def("settle", &settle_response, "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked())
       .def(
           "solve",
-          [](LinearResponse& r, double prescribed, const EdgeLaw& law, const Model& model) {
+          [](LinearResponse& r, double prescribed, const EdgeLaw& law, const FieldModel& model) {
             return r.solve(prescribed, law, model.device);
           },
           "prescribed"_a, "law"_a, "model"_a, Unlocked())
@@ -417,7 +417,7 @@ void bind_response(nb::module_& m) {
            "law"_a, "model"_a, Unlocked());
   m.def(
       "set_up_response",
-      [](const Vector& gaps, double prescribed, const EdgeLaw& law, const Model& model) {
+      [](const Vector& gaps, double prescribed, const EdgeLaw& law, const FieldModel& model) {
         return set_up_response(gaps, prescribed, {}, law, model);
       },
       "gaps"_a, "prescribed"_a, "law"_a, "model"_a, Unlocked());

@@ -22,7 +22,7 @@ struct Matrix {
 class HeldEdges {
  public:
   HeldEdges(LinearResponse& response, const Integers& edges, const ResponseSolution& now,
-            const Device& device)
+            const LoadingDevice& device)
       : response_(response), edges_(edges), now_(now), device_(device) {}
 
   // C_e - C_c at the edges, C_c that of edges that advance.
@@ -42,7 +42,7 @@ class HeldEdges {
   LinearResponse& response_;
   const Integers& edges_;
   const ResponseSolution& now_;
-  const Device& device_;
+  const LoadingDevice& device_;
 
   Vector pressure_by_motion(const Vector& closing) const;  // ∂p/∂n_e at the prescribed d
 };

@@ -295,9 +295,9 @@ Vector implicit_step(const Matrix& hessian, const Vector& force, double longest,
 }
 
 Descent descend(LinearResponse& response, Vector ends, const Vector& start, double prescribed,
-                int most_steps, bool equal_speeds, const EdgeLaw& law, const Model& model) {
+                int most_steps, bool equal_speeds, const EdgeLaw& law, const FieldModel& model) {
   const Panels& panels = *model.panels;
-  const Device& device = model.device;
+  const LoadingDevice& device = model.device;
   EdgeLaw loose = law;  // what is nearer than a rest does not count here
   loose.field_error = std::max(law.field_error, law.rest_step);
   Flags runs(ends.size());

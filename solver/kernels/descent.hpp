@@ -35,7 +35,7 @@ struct Descent {
 // equal speeds, for comparison, each edge has the time Δτ in which its own force would move it by
 // the longest step.
 Descent descend(LinearResponse& response, Vector ends, const Vector& start, double prescribed,
-                int most_steps, bool equal_speeds, const EdgeLaw& law, const Model& model);
+                int most_steps, bool equal_speeds, const EdgeLaw& law, const FieldModel& model);
 
 // Take a linearly implicit step, (1/Δτ + H) Δn = force, in which no edge moves further than
 // `longest`.

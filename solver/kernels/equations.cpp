@@ -84,7 +84,8 @@ Equations allocate_equations(const Nodes& nodes) {
           std::vector<EndTerms>(nodes.gap_count())};
 }
 
-WIDE void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations, const Model& model) {
+WIDE void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations,
+                   const FieldModel& model) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   Vector s(m * load_count);

@@ -44,7 +44,7 @@ struct Equations {
 Equations allocate_equations(const Nodes& nodes);
 
 // Fill in nodes, block and loads of gap k, of S alone or also of S'.
-void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations, const Model& model);
+void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations, const FieldModel& model);
 
 // Load on the own gap, and charges, of the singular opening that an edge leaves when it moves;
 // `density` is space for the nodes of the gap.

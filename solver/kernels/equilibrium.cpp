@@ -40,7 +40,7 @@ void renew_gap(LinearResponse& response, int k, const Gap& old, const GaussRule&
 }
 
 // Place the runs anew whose halves have moved; returns whether there is room for their charges.
-bool place_runs_anew(LinearResponse& response, const Flags& changed, const Model& model) {
+bool place_runs_anew(LinearResponse& response, const Flags& changed, const FieldModel& model) {
   Tree& tree = response.tree;
   Flags moved(changed);
   moved.resize(tree.run_count());
@@ -90,8 +90,8 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 }
 
 bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
-                     double pressure, double prescribed, const EdgeLaw& law, const Model& model,
-                     bool raises) {
+                     double pressure, double prescribed, const EdgeLaw& law,
+                     const FieldModel& model, bool raises) {
   const std::vector<Gap> gaps = map_gaps(ends);
   Nodes& nodes = response.nodes;
   const std::vector<Gap> before = nodes.gaps;
@@ -152,7 +152,7 @@ void hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& 
 }
 
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
-                     const EdgeLaw& law, const Model& model) {
+                     const EdgeLaw& law, const FieldModel& model) {
   const double pressure = response.pressure_at(prescribed, model.device);
   if (!move_references(response, ends, states_at(ends, law), pressure, prescribed, law, model))
     return false;
@@ -162,7 +162,7 @@ bool settle_response(LinearResponse& response, const Vector& ends, double prescr
 
 std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed,
                                               Integers orders, const EdgeLaw& law,
-                                              const Model& model) {
+                                              const FieldModel& model) {
   const std::vector<Gap> gaps = map_gaps(ends);
   orders.resize(gaps.size());
   for (size_t k = 0; k < gaps.size(); ++k)
@@ -191,7 +191,7 @@ namespace {
 // Pin edges that come back to their memory, and release those whose opening no longer holds them;
 // returns whether there are any.
 bool pin_edges(LinearResponse& response, Vector& ends, EdgeStates& states,
-               const ResponseSolution& now, const EdgeLaw& law, const Model& model) {
+               const ResponseSolution& now, const EdgeLaw& law, const FieldModel& model) {
   auto& [pinned, recedes] = states;
   const Integers edges = indices(pinned);
   const Vector residual = HeldEdges(response, edges, now, model.device).residual();
@@ -217,7 +217,7 @@ bool pin_edges(LinearResponse& response, Vector& ends, EdgeStates& states,
 
 // Compute where the openings of pinned edges lie between both critical ones, and the rates.
 void share_openings(Equilibrium& out, LinearResponse& response, const Flags& pinned,
-                    const EdgeLaw& law, const Model& model) {
+                    const EdgeLaw& law, const FieldModel& model) {
   const Integers edges = indices(pinned);
   const HeldEdges held(response, edges, out.at, model.device);
   const Vector residual = held.residual(), closing = held.closing_by_pressure();
@@ -234,7 +234,7 @@ void share_openings(Equilibrium& out, LinearResponse& response, const Flags& pin
 }  // namespace
 
 Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed, double reach,
-                             bool strict, const EdgeLaw& law, const Model& model) {
+                             bool strict, const EdgeLaw& law, const FieldModel& model) {
   const int edges = int(ends.size());
   Equilibrium out;
   EdgeStates states = states_at(ends, law, 0);  // one that is predicted to move is not held

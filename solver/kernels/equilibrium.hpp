@@ -33,20 +33,20 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 // gives the potentials. A gap that needs more nodes gets them, where it `raises` orders. Returns
 // false if the edges have no field: then the response serves for no others.
 bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
-                     double pressure, double prescribed, const EdgeLaw& law, const Model& model,
-                     bool raises = true);
+                     double pressure, double prescribed, const EdgeLaw& law,
+                     const FieldModel& model, bool raises = true);
 
 // Hold some edges where they are, and no others, and note which of all recede.
 void hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states);
 
 // Renew the response for a known equilibrium; returns false as move_references does.
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
-                     const EdgeLaw& law, const Model& model);
+                     const EdgeLaw& law, const FieldModel& model);
 
 // Solve the field of these gaps, if they have one, and linearise about it; `least` are the least
 // orders of the gaps, or none.
 std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed, Integers least,
-                                              const EdgeLaw& law, const Model& model);
+                                              const EdgeLaw& law, const FieldModel& model);
 
 struct Equilibrium {
   bool found = false;  // whether one was found within reach, stable if strict
@@ -67,6 +67,6 @@ struct Equilibrium {
 // corrections hardly shrink, the iteration ends. Unless `strict`, edges that are nearly in
 // equilibrium are taken as they are.
 Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double prescribed, double reach,
-                             bool strict, const EdgeLaw& law, const Model& model);
+                             bool strict, const EdgeLaw& law, const FieldModel& model);
 
 }  // namespace adhesis

@@ -70,7 +70,7 @@ Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equat
 }
 
 Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
-                  const Model& model) {
+                  const FieldModel& model) {
   const std::vector<GaussRule>& rules = gauss_rules();
   std::vector<Gap> gaps = map_gaps(ends);
   const int count = int(gaps.size());
@@ -119,7 +119,7 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
 
 Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,
                        const Vector& potential, double pressure, double prescribed,
-                       const Model& model) {
+                       const FieldModel& model) {
   const std::vector<GaussRule>& rules = gauss_rules();
   Field field(model);
   field.nodes = Nodes(map_gaps(ends), orders);

@@ -9,7 +9,7 @@
 namespace adhesis {
 
 struct Field {
-  Model model;
+  FieldModel model;
   Nodes nodes;
   Equations equations;
   Pair solved;                       // (B + G)⁻¹ of S~ and of X; empty if the potential was known
@@ -20,18 +20,18 @@ struct Field {
   Vector scaled_opening;             // f: the openings over sqrt(1-η²)
   Vector opening;                    // C at each edge
 
-  explicit Field(const Model& model) : model(model) {}
+  explicit Field(const FieldModel& model) : model(model) {}
 };
 
 // Solve the field of gaps with these ends.
 Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
-                  const Model& model);
+                  const FieldModel& model);
 
 // Solve every gap by itself in the potential of the others, G = g dθ/dη at the nodes of nearby
 // gaps. The pressure is corrected, so that d has the prescribed value to rounding.
 Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const Integers& orders,
                        const Vector& potential, double pressure, double prescribed,
-                       const Model& model);
+                       const FieldModel& model);
 
 // Evaluate C = sqrt(2 dη/dθ) f(±1) at every gap end, less the terms of higher modes if asked for.
 Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equations,

@@ -39,12 +39,12 @@ struct Panels {
 };
 
 // d = separation_weight q0 s - compliance p is prescribed.
-struct Device {
+struct LoadingDevice {
   double separation_weight, compliance;
 };
 
-struct Model {
-  Device device;
+struct FieldModel {
+  LoadingDevice device;
   double digits;  // -ln of the relative accuracy of the field
   std::shared_ptr<const Panels> panels;
 };

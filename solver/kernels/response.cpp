@@ -231,7 +231,7 @@ void LinearResponse::factor_runs() {
 }
 
 ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
-                                       const Device& device) {
+                                       const LoadingDevice& device) {
   const int count = gap_count(), n = nodes.size();
   factor_runs();
   Pair motion = {Vector(2 * count), Vector(2 * count)};
@@ -267,7 +267,7 @@ ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
 }
 
 void LinearResponse::update_softness(const Pair& motion, double by_pressure, const EdgeLaw& law,
-                                     const Device& device) {
+                                     const LoadingDevice& device) {
   // the compliance with which edges follow their openings, over that of their gap by itself or by
   // roughness of the shortest wave, at the prescribed d: edges by p, times how much more p changes
   // than with all edges held. Modes that p does not excite, as of symmetric states, show in how
@@ -293,7 +293,7 @@ void LinearResponse::update_softness(const Pair& motion, double by_pressure, con
   }
 }
 
-double LinearResponse::pressure_at(double prescribed, const Device& device) const {
+double LinearResponse::pressure_at(double prescribed, const LoadingDevice& device) const {
   const double by_separation = device.separation_weight * mean[0];
   return (2 * pi * prescribed - by_separation) / prescribed_by_pressure(device);
 }

@@ -84,15 +84,15 @@ struct LinearResponse {
   void linearise_in_current_potential(int k, double pressure, const EdgeLaw& law);
 
   // Solve for all edges, with d prescribed.
-  ResponseSolution solve(double prescribed, const EdgeLaw& law, const Device& device);
+  ResponseSolution solve(double prescribed, const EdgeLaw& law, const LoadingDevice& device);
 
   // 2π ∂d/∂p, the edges following, in the last solution.
-  double prescribed_by_pressure(const Device& device) const {
+  double prescribed_by_pressure(const LoadingDevice& device) const {
     return device.separation_weight * mean[1] - 2 * pi * device.compliance;
   }
 
   // p with d prescribed, by the mean openings of the last solution.
-  double pressure_at(double prescribed, const Device& device) const;
+  double pressure_at(double prescribed, const LoadingDevice& device) const;
 
   // Potentials of the last solution at p, at the nodes of all gaps.
   Vector potential_at(double pressure) const;
@@ -108,7 +108,7 @@ struct LinearResponse {
   void factor_runs();
 
   void update_softness(const Pair& motion, double by_pressure, const EdgeLaw& law,
-                       const Device& device);
+                       const LoadingDevice& device);
 };
 
 }  // namespace adhesis
