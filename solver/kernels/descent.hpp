@@ -5,8 +5,7 @@
 // stable and follow; of the held ones the tangent is condensed. With it their flow is integrated
 // through a model of their openings, over several shortest waves where they run, and over a
 // fraction of one near equilibria and saddles, where a gap closes or a patch vanishes. The field at
-// the end of each step shows how wrong the model was, unless a step has led to gaps that need more
-// nodes.
+// the end of each step shows how wrong the model was.
 #pragma once
 
 #include "edge_model.hpp"
