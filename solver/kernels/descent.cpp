@@ -34,7 +34,8 @@ bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolu
   return weakest >= 0;
 }
 
-// Let edges run that are out of balance in their references; returns whether they are more.
+// Let edges run that are out of balance in their references, if these are in a known potential;
+// returns whether they are more.
 bool run_unbalanced(Flags& runs, const LinearResponse& response, const EdgeLaw& law) {
   if (law.critical == 0) return false;
   bool more = false;
@@ -42,6 +43,8 @@ bool run_unbalanced(Flags& runs, const LinearResponse& response, const EdgeLaw& 
     const Edge& edge = response.edges[e];
     const bool pinned = law.pins() && edge.held;
     const double residual = edge.imbalance(e % 2).value;
+    const auto& displaced = response.displaced;
+    if (std::binary_search(displaced.begin(), displaced.end(), e / 2)) continue;
     if (std::abs(residual) > UNBALANCED * law.critical && !pinned && !runs[e])
       runs[e] = more = true;
   }
@@ -298,8 +301,8 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
                 int most_steps, bool equal_speeds, const EdgeLaw& law, const FieldModel& model) {
   const Panels& panels = *model.panels;
   const LoadingDevice& device = model.device;
-  EdgeLaw loose = law;  // what is nearer than a rest does not count here
-  loose.field_error = std::max(law.field_error, law.rest_step);
+  EdgeLaw loose = law;  // references need not be more exact than a rest
+  if (law.critical > 0) loose.field_error = std::max(law.field_error, law.rest_step);
   Flags runs(ends.size());
   Descent out;
   double reach = FIRST_REACH;  // of the next long step, in longest steps
@@ -340,9 +343,7 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
     const Vector residual = condensed.residual();
     if (judges) {
       judges = is_first = false;
-      Vector at_end;
-      for (int e : modelled)
-        at_end.push_back(residual[std::lower_bound(edges.begin(), edges.end(), e) - edges.begin()]);
+      const Vector at_end = HeldEdges(response, modelled, now, device).residual();
       const double error = model_error(flow, at_end, modelled, ends, law);
       const double length = largest(flow.motion) / law.longest_step;
       reach = std::max(next_reach(reach, length, error), MODEL_SHORT_STEP);
@@ -353,7 +354,8 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       }
     }
     const bool none = law.critical > 0 && out.steps > 1 && indices(runs).empty();
-    bool more = (none || !now.stable) && run_weakest(runs, response, now), is_cut = false;
+    bool more = run_unbalanced(runs, response, law), is_cut = false;
+    more = more || ((none || !now.stable) && run_weakest(runs, response, now));
     if (!(now.stable || more)) {
       out.event = DescentEvent::no_field;
       break;

@@ -1,9 +1,9 @@
 // References of a linear response that move with the edges, and equilibria by Newton's iteration.
 //
 // A gap whose edge leaves its reference is linearised anew where it is now, in the potential of the
-// last solution, and the runs of the tree that hold the gap are computed anew. So a state next to a
-// known one costs the changed gaps and one pass through the tree. All edges are in equilibrium
-// where none is outdated any more.
+// last solution or, if it has moved far, of the next, and the runs of the tree that hold the gap
+// are computed anew. So a state next to a known one costs the changed gaps and one pass through the
+// tree. All edges are in equilibrium where none is outdated any more.
 //
 // Where a patch comes or goes the response is set up anew: taking over the other gaps saves time
 // beyond some 150 of them only. It is, too, where a gap or run needs more nodes than there is room
@@ -43,10 +43,11 @@ void hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& 
 bool settle_response(LinearResponse& response, const Vector& ends, double prescribed,
                      const EdgeLaw& law, const FieldModel& model);
 
-// Solve the field of these gaps, if they have one, and linearise about it; `least` are the least
-// orders of the gaps, or none.
-std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed, Integers least,
-                                              const EdgeLaw& law, const FieldModel& model);
+// Solve these gaps with their edges held, if they have a field, and linearise there; `orders` are
+// the least orders of their rules, or none.
+std::optional<LinearResponse> set_up_response(const Vector& ends, double prescribed,
+                                              Integers orders, const EdgeLaw& law,
+                                              const FieldModel& model);
 
 struct Equilibrium {
   bool found = false;  // whether one was found within reach, stable if strict

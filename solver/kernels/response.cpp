@@ -16,14 +16,10 @@ struct Space {
   std::array<Vector, 2> singular;  // charges of both ends' openings
   Vector near, near_slope, smooth, density;
 
-  // Begin anew, for as many nodes.
-  void begin(int m) {
+  explicit Space(int m) : near(m), near_slope(m), smooth(m), density(m) {
     for (Vector& column : loads) column.resize(m);
     for (Vector& column : solved) column.resize(m);
     for (Vector& column : singular) column.resize(m);
-    for (Vector* column : {&smooth, &density}) column->resize(m);
-    near.assign(m, 0);
-    near_slope.assign(m, 0);
   }
 };
 
@@ -95,8 +91,7 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   const double* own = &inverse[nodes.square[k]];
-  thread_local Space space;  // kept, as gaps of many sizes follow each other
-  space.begin(m);
+  Space space(m);
   load_gap(*this, k, rule, space);
   for (int c = 0; c < columns; ++c)
     for (int i = 0; i < m; ++i) space.solved[c][i] = dot(own + i * m, space.loads[c].data(), m);

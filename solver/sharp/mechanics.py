@@ -232,10 +232,10 @@ class EdgeMechanics:
             self._response = set_up_response(gaps, prescribed, law, self.model)
         return self._response
 
-    def response_at(self, gaps: Array, prescribed: float) -> LinearResponse | None:
+    def response_at(self, gaps: Array, prescribed: float, law: EdgeLaw) -> LinearResponse | None:
         """Return the response about these gaps; None if they have no field."""
         response = self.response_near(gaps, prescribed)
-        if response is None or response.settle(gaps, prescribed, self.law_at(gaps), self.model):
+        if response is None or response.settle(gaps, prescribed, law, self.model):
             return response
         self.forget()
         return None
@@ -306,7 +306,7 @@ class EdgeMechanics:
         given.
         """
         reach = max(reach, self.newton_tolerance)
-        if strict and self.symmetry.is_symmetric(gaps):
+        if strict and self.critical > 0 and self.symmetry.is_symmetric(gaps):
             # Beyond a pitchfork Newton's iteration finds the symmetric state all the same, and the
             # tangents of a response that moved there are not exact enough to show it.
             self.forget()

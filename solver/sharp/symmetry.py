@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
@@ -46,27 +48,28 @@ class Symmetry:
         """Return the mean of a symmetric state and its images, which the field's error parts."""
         images = [*self._copies(gaps), *self._images(gaps)]
         images = [image for image in images if self._are_same(image, gaps)]
-        motion = np.zeros_like(gaps)
-        for image in images:
-            apart = _apart(gaps, image)
-            nearest = np.abs(apart).max(axis=2).argmin(axis=1)
-            motion -= apart[np.arange(len(gaps)), nearest]
-        return gaps + motion / (len(images) + 1)
+        motion = sum((_apart(gaps, image) for image in images), start=np.zeros_like(gaps))
+        return np.asarray(gaps - motion / (len(images) + 1))
 
-    def _copies(self, gaps: Array) -> list[Array]:
-        return [gaps + 2 * np.pi * n / self.parts for n in range(1, self.parts)]
+    def _copies(self, gaps: Array) -> Iterator[Array]:
+        return (gaps + 2 * np.pi * n / self.parts for n in range(1, self.parts))
 
-    def _images(self, gaps: Array) -> list[Array]:
-        return [2 * axis - gaps[:, ::-1] for axis in self.axes]
+    def _images(self, gaps: Array) -> Iterator[Array]:
+        return (2 * axis - gaps[:, ::-1] for axis in self.axes)
 
     def _are_same(self, one: Array, other: Array) -> bool:
         """Whether gaps lie at the places of others, on the circle."""
-        if one.shape != other.shape:
-            return False
-        nearest = np.abs(_apart(one, other)).max(axis=2).min(axis=1, initial=np.inf)
-        return bool((nearest < self._near).all())
+        return one.shape == other.shape and bool((np.abs(_apart(one, other)) < self._near).all())
 
 
 def _apart(one: Array, other: Array) -> Array:
-    """Compute on the circle how far gaps lie ahead of each of others, shape (gaps, others, 2)."""
-    return np.asarray((one[:, None] - other[None] + np.pi) % (2 * np.pi) - np.pi)
+    """Compute on the circle how far gaps lie ahead of the nearest of others, shape (L, 2)."""
+    if not len(one):
+        return one
+    place = other[:, 0] % (2 * np.pi)
+    order = np.argsort(place)
+    after = np.searchsorted(place[order], one[:, 0] % (2 * np.pi))
+    beside = other[order[[after - 1, after % len(other)]]]
+    apart = (one - beside + np.pi) % (2 * np.pi) - np.pi
+    nearest = np.abs(apart).max(axis=2).argmin(axis=0)
+    return np.asarray(apart[nearest, np.arange(len(one))])

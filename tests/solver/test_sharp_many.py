@@ -153,7 +153,7 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     anew = edges.equilibrium(point.gaps, d, edges.wave)
     moved = point.gaps.copy()
     moved[2::5] += motion * edges.wave * np.array([-0.5, 1.0])
-    assert edges.response_at(moved, d) is not None
+    assert edges.response_at(moved, d, edges.law) is not None
     back = edges.equilibrium(point.gaps, d, edges.wave)
     assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.field_error
     assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
@@ -173,7 +173,7 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         edges.forget()
         anew = edges.equilibrium(wanted, d, edges.wave)
         edges.forget()
-        edges.response_at(known, d)
+        edges.response_at(known, d, edges.law)
         again = edges.equilibrium(wanted, d, edges.wave)
         assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.field_error
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()

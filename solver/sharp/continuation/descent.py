@@ -181,7 +181,7 @@ class Descents:
         both, half the step is tried: just beyond a pitchfork the minima beside the saddle are near.
         """
         edges = self._edges
-        near, free = edges.response_at(gaps, prescribed), law.free_edges(gaps)
+        near, free = edges.response_at(gaps, prescribed, law), law.free_edges(gaps)
         if near is None or edges.critical == 0 or len(free) == 0:
             return []
         if not at_fold and near.solve(prescribed, law, edges.model).stable:

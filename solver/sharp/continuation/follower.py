@@ -311,7 +311,8 @@ class Follower:
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
-            gaps = self.edges.symmetry.symmetrised(saddle.gaps)
+            # edges that are pinned keep their places
+            gaps = saddle.gaps if self.edges.pins else self.edges.symmetry.symmetrised(saddle.gaps)
             ways = self.jumps.descents.ways_off_saddle(
                 gaps, fold.d, self.edges.law_at(point.gaps), at_fold=True
             )
