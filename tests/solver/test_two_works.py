@@ -10,6 +10,7 @@ from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.branch import StableBranch
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE as SOLID
 from tests.support.scenes import loop_of, loops_at, rough
 from tools.hostile import draw
@@ -36,6 +37,18 @@ def closed_form(ratio: float, depth: float) -> tuple[float, float]:
     gained = closes.energy(closes.half_width(A))
     lost = opens.energy(opens.fold_half_width)
     return float((lost - gained + friction) / PERIOD), float(friction / PERIOD)
+
+
+@pytest.mark.parametrize(("half_width", "ways"), [(0.05, 2), (0.5, 0)], ids=["saddle", "minimum"])
+def test_a_saddle_is_left_by_edges_that_are_not_pinned(half_width, ways):
+    """One wave, about its crest: states narrower than that of the fold are not stable."""
+    method = SharpMethod(wave(2.0))
+    edges = method.edges
+    gaps, memory = (np.array([[a, 2 * np.pi - a]]) for a in (half_width, 0.9 * half_width))
+    law = edges.law_at(memory)
+    here, there = (edges.solution(gaps, d).opening for d in (0.0, 1e-3))
+    d = 1e-3 * ((law.critical_of(gaps, here) - here) / (there - here))[0]
+    assert len(method.jumps.descents.ways_off_saddle(gaps, d, law)) == ways
 
 
 @pytest.mark.parametrize("depth", [0.3, 0.6])
