@@ -231,7 +231,7 @@ def read_trace(
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
         row = None if row is None else checks.whole(parameter("row"), row, _ROW)
         channel = None if channel is None else checks.whole(parameter("channel"), channel, _ROW)
-    in_memory = _table_of(source, columns if named else None)
+    in_memory = _table_of(source, columns, named)
     if in_memory is not None:
         _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
         name, table = in_memory
@@ -321,26 +321,35 @@ def _refuse_units(name: str, values: Any) -> None:
         entries = list(itertools.chain.from_iterable(lists))
 
 
-def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Table] | None:
-    """Return name and columns of an array or a DataFrame; None for any other source."""
+def _table_of(
+    source: Any, wanted: Sequence[int | str] | None, named: bool
+) -> tuple[str, Table] | None:
+    """Return name and columns of an array or a DataFrame; None for any other source.
+
+    Of a DataFrame only those ``wanted``, if they are ``named``.
+    """
     if isinstance(source, np.ndarray | list | tuple):
         return "array", _columns_of("array", _numbers("array", source))
     if not hasattr(source, "iloc"):  # which a DataFrame and a Series have
         return None
     if hasattr(source, "to_frame"):  # a Series is a column
         source = source.to_frame()
-    if names is not None:
-        missing = [name for name in names if name not in source.columns]
+    if named and wanted is not None:
+        missing = [name for name in wanted if name not in source.columns]
         if missing:
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
-        source = source[list(names)]
-    apart = np.diff(source.index) if source.index.dtype.kind in "iuf" else np.zeros(0)
-    if len(source.columns) == 1 and not np.allclose(apart, apart[:1], atol=0):
-        raise InputError(
-            "the index of the table leaves rows out, or has another order, and the heights have no "
-            "positions: put the rows in with NaN (reindex), or number them anew (reset_index)"
-        )
+        source = source[list(wanted)]
+    has_one = len(source.columns if wanted is None else wanted) == 1
+    if has_one and source.index.dtype.kind in "iu" and len(source) > 1:
+        apart = np.diff(source.index.to_numpy(float, na_value=np.nan))
+        sizes = np.abs(apart)
+        if np.ptp(np.sign(apart)) or sizes.max() >= 1.5 * sizes.min() > 0:
+            raise InputError(
+                "the index of the table leaves rows out, or has another order, and the heights "
+                "have no positions: put the rows in with NaN (reindex), or number them anew "
+                "(reset_index(drop=True))"
+            )
     units = source.attrs.get("units", {})
     if not isinstance(units, Mapping):
         raise InputError(
