@@ -406,11 +406,13 @@ def _from_table(
     lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
         columns, names, lines = _row_of_map(name, table, row, notes), (), None
+        places = table.lines[: row + 1]
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
         columns, lines = _scan_line(name, columns, lines, row, notes)
+        places = lines
     if len(columns) == 1:
-        _check_empty_rows(name, table.lines if lines is None else lines, notes)
+        _refuse_uneven_rows(name, places, row is None and len(table.filled) > 1)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -461,6 +463,8 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
+    if len(columns) == 1 and (left_out := int(np.sum(np.diff(places) - 1))):
+        notes.append(f"{counted(left_out, 'empty row')} left out")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
@@ -528,18 +532,18 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     return table.columns[list(table.filled), row].reshape(1, -1)
 
 
-def _check_empty_rows(name: str, lines: Array, notes: list[str]) -> None:
-    """Refuse empty rows here and there between rows whose places are known by their order alone."""
-    empty = np.diff(lines) - 1
-    if not empty.any():
-        return
-    if empty.min() == empty.max():
-        notes.append(f"{counted(int(empty.sum()), 'empty row')} left out")
-    else:
-        line = lines[np.argmax(empty > empty.min())] + 1
+def _refuse_uneven_rows(name: str, lines: Array, has_more: bool) -> None:
+    """Refuse empty lines here and there between rows that have their places by their order."""
+    apart = np.diff(lines)
+    usual = np.bincount(apart, minlength=1).argmax()
+    odd = np.flatnonzero(apart != usual)
+    if odd.size:
+        line = lines[odd[0]] + min(usual, apart[odd[0]])
+        or_else = f", or give {parameter('columns')} X,Z, if one has the positions"
         raise InputError(
-            f"line {line} of {name} has empty fields alone, and the rows have no positions: write "
-            "NaN into its fields if it is one of them, or else remove it"
+            f"the rows of {name} have no positions, and empty lines divide them unevenly at "
+            f"{counted(odd.size, 'place')}, the first on line {line}: write NaN into the fields of "
+            f"those that are rows, and remove the others{or_else if has_more else ''}"
         )
 
 
