@@ -47,7 +47,7 @@ class Batches:
         for row, task in enumerate(tasks):
             self._cells.setdefault(task.cell, _Cell([])).rows.append(row)
         for row, value in values.items():
-            self._cells[tasks[row].cell].values[tasks[row].realisation] = value
+            self._keep(row, value)
         for cell in self._cells.values():
             self._advance(cell)
 
@@ -86,12 +86,18 @@ class Batches:
         """
         cell = self._cells[self._tasks[row].cell]
         before = cell.asked
-        cell.values[self._tasks[row].realisation] = value
+        self._keep(row, value)
         if cell.full:
             return [], []
         self._advance(cell)
         further = cell.missing(before, cell.asked)
         return further, cell.missing(0, len(cell.rows)) if cell.full else []
+
+    def _keep(self, row: int, value: float) -> None:
+        task = self._tasks[row]
+        # Without adhesion nothing is lost: the value is rounding, or NaN.
+        known = value if task.work_of_adhesion > 0 else 0.0 * value
+        self._cells[task.cell].values[task.realisation] = known
 
     def _advance(self, cell: _Cell) -> None:
         """Ask for batches until one is not complete, or the cell has enough."""
