@@ -343,7 +343,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
-    "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "delimiter are both"),
+    "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "are both .*quote"),
+    "decimal commas that are delimiters": (
+        ["x (um),z (um)", *(f"{k},{k % 7}" for k in range(99))],
+        {"decimal": ",", "unit": "um", "step": STEP},
+        "commas are delimiters: leave decimal out",
+    ),
     "decimal commas between commas": (
         [f"{x},{z}".replace(".", ",") for x, z in PAIRS],
         {"decimal": ",", "unit": "um"},

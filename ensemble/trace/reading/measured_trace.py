@@ -324,10 +324,7 @@ def _refuse_units(name: str, values: Any) -> None:
 def _table_of(
     source: Any, wanted: Sequence[int | str] | None, named: bool
 ) -> tuple[str, Table] | None:
-    """Return name and columns of an array or a DataFrame; None for any other source.
-
-    Of a DataFrame only those ``wanted``, if they are ``named``.
-    """
+    """Return name and columns of an array or a DataFrame; None for any other source."""
     if isinstance(source, np.ndarray | list | tuple):
         return "array", _columns_of("array", _numbers("array", source))
     if not hasattr(source, "iloc"):  # which a DataFrame and a Series have

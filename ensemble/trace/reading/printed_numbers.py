@@ -128,7 +128,8 @@ def find_form(
     is_quoted = any('"' in line for line in sample)
     forms = [form for form in product(signs, decimal or ".,") if is_quoted or form[0] != form[1]]
     if not forms:
-        raise InputError(f"{parameter('decimal')} and {parameter('delimiter')} are both ','")
+        both = f"{parameter('decimal')} and {parameter('delimiter')}"
+        raise InputError(f"{both} are both ',': leave one of them out, or quote the fields")
     for form in forms:
         rows = [[value(field, form[1]) for field in split(line, form[0])] for line in sample]
         whole = [tuple(map(repr, row)) for row in rows if None not in row]
@@ -136,6 +137,12 @@ def find_form(
     best = max(read, key=lambda form: read[form][:2])
     most = read[best][0]
     others = [form for form in read if read[form][0] == most and read[form][2] != read[best][2]]
+    is_open = delimiter is None and best == (" ", ",")
+    if is_open and decimal == "," and _one_comma(source, sample) == (",", "."):
+        raise InputError(
+            f"{source} has rows such as {shown_line(sample[0])}, whose commas are delimiters: "
+            f"leave {parameter('decimal')} out"
+        )
     if most and others and best[0] in ", ":
         return _one_comma(source, sample) or _refuse_two_ways(source, sample[0])
     if decimal is None and best[0] == "," and all(_PAIR.fullmatch(line.strip()) for line in sample):
