@@ -340,8 +340,7 @@ def _table_of(
     has_one = len(source.columns if wanted is None else wanted) == 1
     if has_one and source.index.dtype.kind in "iu" and len(source) > 1:
         apart = np.diff(source.index.to_numpy(float, na_value=np.nan))
-        sizes = np.abs(apart)
-        if np.ptp(np.sign(apart)) or sizes.max() >= 1.5 * sizes.min() > 0:
+        if np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0:
             raise InputError(
                 "the index of the table leaves rows out, or has another order, and the heights "
                 "have no positions: put the rows in with NaN (reindex), or number them anew "
@@ -409,7 +408,7 @@ def _from_table(
         columns, lines = _scan_line(name, columns, lines, row, notes)
         places = lines
     if len(columns) == 1:
-        _refuse_uneven_rows(name, places, row is None and len(table.filled) > 1)
+        _refuse_uneven_rows(name, places)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -423,6 +422,8 @@ def _from_table(
         if given is not None:
             columns, step = columns[1:], given
             notes.append("the first column counts the points")
+    if len(columns) == 1 and (left_out := int(np.sum(np.diff(places) - 1))):
+        notes.append(f"{counted(left_out, 'empty row')} left out")
     (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
     heights = columns[-1] * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
@@ -460,8 +461,6 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
-    if len(columns) == 1 and (left_out := int(np.sum(np.diff(places) - 1))):
-        notes.append(f"{counted(left_out, 'empty row')} left out")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
@@ -529,18 +528,17 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     return table.columns[list(table.filled), row].reshape(1, -1)
 
 
-def _refuse_uneven_rows(name: str, lines: Array, has_more: bool) -> None:
+def _refuse_uneven_rows(name: str, lines: Array) -> None:
     """Refuse empty lines here and there between rows that have their places by their order."""
     apart = np.diff(lines)
     usual = np.bincount(apart, minlength=1).argmax()
     odd = np.flatnonzero(apart != usual)
     if odd.size:
         line = lines[odd[0]] + min(usual, apart[odd[0]])
-        or_else = f", or give {parameter('columns')} X,Z, if one has the positions"
         raise InputError(
             f"the rows of {name} have no positions, and empty lines divide them unevenly at "
-            f"{counted(odd.size, 'place')}, the first on line {line}: write NaN into the fields of "
-            f"those that are rows, and remove the others{or_else if has_more else ''}"
+            f"{counted(odd.size, 'place')}, the first on line {line}: write NaN where one is a "
+            f"row, remove the others, or give {parameter('columns')} X,Z, if there are positions"
         )
 
 
