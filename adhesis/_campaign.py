@@ -13,7 +13,7 @@ from decimal import Decimal
 from html import escape
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from adhesis.solver import checks
 
@@ -247,8 +247,10 @@ def _key(name: object) -> str:
 
 
 def _value(where: str, value: Any, depth: int = 0) -> str:
-    # Numbers and arrays of NumPy, but not those that carry a unit, which would be lost.
-    if hasattr(value, "tolist") and not checks.carries_unit(value):
+    rule = "a number, a text, true or false, or a list of these"
+    if checks.carries_unit(value):
+        _refuse(where, value, f"{rule}, and carry no unit, which would be lost")
+    if hasattr(value, "tolist"):  # a number or an array of NumPy
         value = value.tolist()
     if isinstance(value, bool):
         return str(value).lower()
@@ -259,11 +261,14 @@ def _value(where: str, value: Any, depth: int = 0) -> str:
             return float.__repr__(float(value))
     if isinstance(value, str):
         return json.dumps(str(value), ensure_ascii=False)
-    rule = "a number, a text, true or false, or a list of these"
     if isinstance(value, list | tuple):
         if depth <= _DEEPEST:
             return f"[{', '.join(_value(where, entry, depth + 1) for entry in value)}]"
         rule = "a value or a list of values, and no list in which lists are nested so deep"
+    _refuse(where, value, rule)
+
+
+def _refuse(where: str, value: object, rule: str) -> NoReturn:
     from adhesis.ensemble.errors import InputError
 
     raise InputError(f"campaign: {where} is {checks.shown(value)}: it must be {rule}")

@@ -10,7 +10,7 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.precision import Precision
+from adhesis.ensemble.campaign.precision import Precision, precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import name_at
 from adhesis.ensemble.errors import InputError
@@ -128,8 +128,9 @@ class Cell:
         stop = self.campaign.stop
         if stop.relative_error is None:
             return None
-        known = self.estimates[stop.quantity]
-        return Precision(stop.quantity, stop.relative_error, known, not self.pending)
+        # Without adhesion nothing is lost: the values are rounding.
+        values = self.values[stop.quantity] if self.work_of_adhesion > 0 else np.zeros(self.done)
+        return precision(values, stop.relative_error, stop.quantity, finished=not self.pending)
 
 
 def doubtful_loops(cells: Iterable[Cell]) -> list[tuple[Cell, int]]:

@@ -27,8 +27,6 @@ _CLOSURE_FACTOR, _MIN_POINTS = 3.0, 8
 # Steps that differ by less than this share of the largest one are a straight line, which is taken
 # as a saw of one tooth.
 _STRAIGHT = 1e-3
-# Heights that differ by less than this share of their range are equal, but for the last bits.
-_SAME = 1e-9
 
 
 def read_heights(
@@ -138,16 +136,11 @@ def heights_warning(heights: Array, name: str) -> str | None:
             f"{name} holds {heights.size} heights only: fewer than {_MIN_POINTS} make a profile of "
             "a few waves, so check the file"
         )
-    steps = np.diff(heights)
-    if abs(heights[-1] - heights[0]) <= _SAME * np.ptp(heights) < abs(steps[0]):
-        return (
-            f"the last height of {name} equals its first: remove it if it is the end point of the "
-            "period, for which the first one stands"
-        )
     # A median of three keeps edges and removes single spikes, which would hide the jump.
     smoothed = np.median([np.roll(heights, k) for k in (1, 0, -1)], axis=0)
     largest = float(np.abs(np.diff(smoothed)).max())
     jump = abs(float(smoothed[0] - smoothed[-1]))
+    steps = np.diff(heights)
     is_line = np.ptp(steps) <= _STRAIGHT * np.abs(steps).max()
     if is_line or not jump > _CLOSURE_FACTOR * largest:
         return None

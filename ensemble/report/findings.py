@@ -44,7 +44,7 @@ def verdict(data: Aggregate) -> list[str]:
     """
     of_loss = replace(data, cells=tuple(cell for cell in data.cells if cell.work_of_adhesion > 0))
     found = [of(of_loss) for of in (_outcome, _statistical, _numerical) if of_loss.done]
-    rest = len(of_loss.cells) < len(data.cells)
+    rest = of_loss.done < data.done
     return [*found, "Without adhesion (γ = 0) nothing is lost."] if rest else found
 
 

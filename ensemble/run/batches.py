@@ -47,7 +47,7 @@ class Batches:
         for row, task in enumerate(tasks):
             self._cells.setdefault(task.cell, _Cell([])).rows.append(row)
         for row, value in values.items():
-            self._cells[tasks[row].cell].values[tasks[row].realisation] = value
+            self._keep(row, value)
         for cell in self._cells.values():
             self._advance(cell)
 
@@ -84,14 +84,20 @@ class Batches:
         Returns the rows of the cell's next batch, if this row has completed one, and those that
         need not be computed, if the cell now has enough.
         """
-        cell = self._cells[self._tasks[row].cell]
+        cell = self._keep(row, value)
         before = cell.asked
-        cell.values[self._tasks[row].realisation] = value
         if cell.full:
             return [], []
         self._advance(cell)
         further = cell.missing(before, cell.asked)
         return further, cell.missing(0, len(cell.rows)) if cell.full else []
+
+    def _keep(self, row: int, value: float) -> _Cell:
+        task = self._tasks[row]
+        cell = self._cells[task.cell]
+        # Without adhesion nothing is lost: the value is rounding, or NaN.
+        cell.values[task.realisation] = value if task.work_of_adhesion > 0 else 0.0 * value
+        return cell
 
     def _advance(self, cell: _Cell) -> None:
         """Ask for batches until one is not complete, or the cell has enough."""

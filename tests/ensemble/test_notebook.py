@@ -48,7 +48,7 @@ from adhesis.solver import checks, views
 from adhesis.solver.loading import loop_result
 from tests.support.campaign_support import campaign_text
 from tests.support.exact_wave import ExactWave
-from tests.support.wrong_values import WithUnit
+from tests.support.wrong_values import FloatWithUnit, WithUnit
 
 WAVE = single_wave(1e-6, 1e-3)
 
@@ -339,7 +339,7 @@ def test_a_value_that_no_key_has_is_refused_in_one_sentence(values):
 
 
 @pytest.mark.parametrize(
-    "value", [None, 1j, Fraction(10**400), {0.5}, np.array(0.5).view(WithUnit)]
+    "value", [None, 1j, Fraction(10**400), {0.5}, np.array(0.5).view(WithUnit), FloatWithUnit(0.5)]
 )
 def test_a_value_that_no_file_has_is_quoted_as_what_it_is(value):
     with pytest.raises(InputError, match="poisson is ") as error:

@@ -236,6 +236,16 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity,
     assert precision_lines(summary.precisions)[1] in again.stderr.splitlines()
 
 
+def test_a_cell_without_adhesion_has_enough_with_the_least_number(tmp_path):
+    path, out = tmp_path / "c.toml", tmp_path / "r.h5"
+    path.write_text(text(0.01).replace("[0.04]", "[0.0, 0.04]"))
+    summary = run(path, out)
+    for group, (_, known) in zip(read_status(out)["groups"], summary.precisions, strict=True):
+        is_lossless = group["work_of_adhesion"] == 0
+        assert group["met"] is known.met is is_lossless
+        assert group["done"] == (fewest(looks(8, 4, 80)) if is_lossless else 80)
+
+
 def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path, finished):
     earlier, first = finished
     path, out, whole = tmp_path / "c.toml", tmp_path / "r.h5", tmp_path / "w.h5"

@@ -57,7 +57,7 @@ class Cluster:
     env: dict[str, str]
 
     def call(self, *command: str | Path, cwd: Path | None = None) -> str:
-        done = ran(*command, env=self.env, cwd=cwd)
+        done = ran(*command, env=self.env, cwd=cwd, timeout=None)
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
         return done.stdout
 
@@ -202,7 +202,7 @@ class Job:
 
     def again(self, *words: str) -> Job:
         words = ("sbatch", "--parsable", "--ntasks=2", str(SCRIPT), "study.toml", *words)
-        done = ran(*words, env=self.env, cwd=self.folder)
+        done = ran(*words, env=self.env, cwd=self.folder, timeout=None)
         assert done.returncode == 0, done.stderr
         return Job(self.cluster, self.folder, done.stdout.strip(), self.env)
 
@@ -262,7 +262,7 @@ exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
         env |= {"STAGING": staging and str(folder / staging)}
         if not words[0].startswith("/"):
             words = ("sbatch", "--parsable", *words, str(SCRIPT), "study.toml")
-        done = ran(*words, env=env, cwd=folder)
+        done = ran(*words, env=env, cwd=folder, timeout=None)
         assert done.returncode == 0, done.stderr
         numbers = re.findall(r"\d+", done.stdout)
         return Job(cluster, folder, numbers[-1], env)

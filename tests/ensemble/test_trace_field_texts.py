@@ -170,15 +170,24 @@ def test_a_row_of_words_for_missing_numbers_keeps_its_place(tmp_path: Path) -> N
     assert np.array_equal(np.delete(trace.heights, 50), np.delete(Z, 50))
     rows[51] = ";;"
     assert read_trace(put(tmp_path / "t.csv", rows), columns=[2, 3]).points == N
-    with pytest.raises(InputError, match=r"line 52 .* empty fields alone, .* write NaN"):
+    with pytest.raises(InputError, match=r"empty lines .* 1 place, .* line 52: .* columns X,Z"):
         read_trace(tmp_path / "t.csv", columns=[3], step=STEP)
     of_map = [" ".join(ZS[k : k + 40]) for k in range(0, 400, 40)]
     of_map[2] = " ".join(["nan"] * 40)
     trace = read_trace(put(tmp_path / "t.txt", of_map), row=3, unit="um", step=STEP)
     assert np.array_equal(trace.heights, Z[120:160])
     of_map[2] = ""
-    with pytest.raises(InputError, match=r"line 3 .* empty fields alone, .* write NaN"):
-        read_trace(put(tmp_path / "t.txt", of_map), row=3, unit="um", step=STEP)
+    put(tmp_path / "t.txt", of_map)
+    with pytest.raises(InputError, match=r"empty lines .* on line 3: write NaN.* the others"):
+        read_trace(tmp_path / "t.txt", row=3, unit="um", step=STEP)
+    trace = read_trace(tmp_path / "t.txt", row=1, unit="um", step=STEP)
+    assert np.array_equal(trace.heights, Z[40:80])
+    counted = ["#;z (um)", *(f"{k};{z}" for k, z in enumerate(ZS))]
+    trace = read_trace(put(tmp_path / "t.csv", [*counted[:9], "", *counted[9:]]), step=STEP)
+    assert "1 empty row left out" in trace.notes
+    double = "\n\n".join([*counted[:50], ";", *counted[51:]])
+    with pytest.raises(InputError, match=r"unevenly at 1 place, the first on line 101"):
+        read_trace(put(tmp_path / "t.csv", double), columns=[2], step=STEP)
     flagged = ["x (um),z (um),valid", *(f"{row},{int(k != 40)}" for k, row in enumerate(TWO))]
     flagged[11] = flagged[11][:-1]  # one row has no flag
     trace = read_trace(put(tmp_path / "t.csv", flagged), columns=[1, 2])
@@ -334,7 +343,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
-    "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "delimiter are both"),
+    "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "the decimal sign: omit"),
+    "decimal commas that are delimiters": (
+        ["x (um),z (um)", *(f"{k},{k % 7}" for k in range(99))],
+        {"decimal": ",", "unit": "um", "step": STEP},
+        "commas can be .*: leave out decimal",
+    ),
     "decimal commas between commas": (
         [f"{x},{z}".replace(".", ",") for x, z in PAIRS],
         {"decimal": ",", "unit": "um"},

@@ -137,6 +137,7 @@ TEXT = "\n".join([UM, *rows(";", ",")])
 BOTH = np.column_stack([1e6 * X, 1e6 * Z])
 FRAME = pd.DataFrame({"x (mm)": 1e3 * X, "z (um)": 1e6 * Z, "more": 0.0})
 NAMED = FRAME.set_axis(["x", "z", "more"], axis=1)
+HEIGHTS = FRAME["z (um)"]
 WITH_UNITS = NAMED[["x", "z"]].copy()
 WITH_UNITS.attrs["units"] = {"x": "mm", "z": "um"}
 IN_MEMORY: dict[str, tuple[Callable[[], object], dict[str, object]]] = {
@@ -153,7 +154,13 @@ IN_MEMORY: dict[str, tuple[Callable[[], object], dict[str, object]]] = {
     "table, columns by name": (lambda: FRAME, {"columns": ["x (mm)", "z (um)"]}),
     "table, columns by number": (lambda: FRAME, {"columns": [1, 2]}),
     "table with units beside": (lambda: WITH_UNITS, {}),
-    "one column of a table": (lambda: FRAME["z (um)"], {"step": STEP}),
+    "one column of a table": (lambda: HEIGHTS, {"step": STEP}),
+    "positions as index": (lambda: HEIGHTS.set_axis(X), {"step": STEP}),
+    "rounded positions": (lambda: HEIGHTS.set_axis((1e10 * X / 3).round()), {"step": STEP}),
+    "whole positions": (lambda: HEIGHTS.set_axis((1e9 * X / 3).astype(int)), {"step": STEP}),
+    "slice": (lambda: pd.concat([HEIGHTS, HEIGHTS], ignore_index=True)[N:], {"step": STEP}),
+    "every second row": (lambda: HEIGHTS.repeat(2).reset_index(drop=True)[::2], {"step": STEP}),
+    "reversed order": (lambda: HEIGHTS[::-1].reset_index(drop=True)[::-1], {"step": STEP}),
 }
 
 
@@ -205,7 +212,15 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "words": (WORDS, {"columns": [1, 2]}, InputError, "the table holds more than numbers"),
     "complex": (1j * Z, {"step": STEP}, InputError, "array holds complex128"),
     "a unit of its own": (BOTH.view(WithUnit), {"unit": "mm"}, TypeError, "array carries a unit"),
-    "rows left out": (FRAME["z (um)"].drop(9), {"step": STEP}, InputError, "index .* leaves rows"),
+    "rows left out": (HEIGHTS.drop(9), {"step": STEP}, InputError, r"leaves rows .*\(drop=True\)"),
+    "by number": (
+        FRAME.drop(9),
+        {"columns": [2], "step": STEP},
+        InputError,
+        "index .* leaves rows",
+    ),
+    "by name": (FRAME.drop(9), {"columns": ["z (um)"], "step": STEP}, InputError, "leaves rows"),
+    "another order": (HEIGHTS.sort_values(), {"step": STEP}, InputError, "another order"),
     "units in a list": (list(BOTH.T.view(WithUnit)), {"unit": "mm"}, TypeError, "array carries a"),
     "a map": (np.zeros((99, 98)), {}, InputError, "array holds 99 × 98 numbers"),
     "a row": (BOTH, {"row": 1}, InputError, "row belongs to files"),

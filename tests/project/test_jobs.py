@@ -58,7 +58,7 @@ class Cluster:
     env: dict[str, str]
 
     def run(self, *command: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
-        return ran(*command, cwd=self.folder, env=self.env | env)
+        return ran(*command, cwd=self.folder, env=self.env | env, timeout=None)
 
     def calls(self, program: str) -> list[list[str]]:
         path = self.folder / "calls"
@@ -321,7 +321,7 @@ def test_pbs_job_tells_the_run_its_time_and_submits_the_report(cluster: Cluster)
     assert job["l"] == "select=1:ncpus=1 walltime=1:00:00"
     assert (job["-q"], job["-A"], job["-P"]) == ("small", "ab12", "rough")
     (cluster.folder / "job").write_text(job["script"])
-    ran("bash", cluster.folder / "job", env=cluster.env, cwd="/", check=True)
+    ran("bash", cluster.folder / "job", env=cluster.env, cwd="/", check=True, timeout=None)
     assert cluster.calls("adhesis")[-1] == ["report", "study.h5", "--to", "study"]
 
 
@@ -343,7 +343,7 @@ def test_pbs_job_submits_a_continuation_with_all_that_it_was_given(cluster: Clus
         kept = {key: value for key, value in cluster.env.items() if key != "ADHESIS"}
         given = {k: v for k, v in pbs_variables(cluster).items() if k.startswith(("PBS", "Q"))}
         given |= {"CODE": "137", "PBS_O_QUEUE": "route"}
-        done = ran("bash", cluster.folder / "job", env=kept | given, cwd="/")
+        done = ran("bash", cluster.folder / "job", env=kept | given, cwd="/", timeout=None)
         assert done.returncode == 137, done.stderr
         assert f"start {restart + 1}" in done.stdout
         runs = [words for words in cluster.calls("adhesis") if words[0] == "run"]

@@ -33,6 +33,7 @@ def seen_by_browser(page: str, script: str, folder: Path) -> Any:
         *(BROWSER, "--headless", *sandbox, "--disable-gpu", f"--user-data-dir={folder}/user"),
         *("--virtual-time-budget=120000", "--dump-dom", path.as_uri()),
         check=True,
+        timeout=None,
     )
     found = re.search(r"<pre id=['\"]seen['\"]>(.*?)</pre>", done.stdout, re.DOTALL)
     assert found[1]

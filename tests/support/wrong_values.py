@@ -1,4 +1,4 @@
-"""Numbers that break a rule, made from its bounds; an array that is more than numbers."""
+"""Numbers that break a rule, made from its bounds; numbers with units."""
 
 import math
 from collections.abc import Iterator
@@ -10,6 +10,12 @@ from adhesis.solver.checks import Bounds
 
 class WithUnit(np.ndarray):
     """An array with a unit, as unyt and astropy have them."""
+
+    units = "um"
+
+
+class FloatWithUnit(float):
+    """A number with a unit."""
 
     units = "um"
 

@@ -231,7 +231,7 @@ def read_trace(
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
         row = None if row is None else checks.whole(parameter("row"), row, _ROW)
         channel = None if channel is None else checks.whole(parameter("channel"), channel, _ROW)
-    in_memory = _table_of(source, columns if named else None)
+    in_memory = _table_of(source, columns, named)
     if in_memory is not None:
         _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
         name, table = in_memory
@@ -321,7 +321,9 @@ def _refuse_units(name: str, values: Any) -> None:
         entries = list(itertools.chain.from_iterable(lists))
 
 
-def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Table] | None:
+def _table_of(
+    source: Any, wanted: Sequence[int | str] | None, named: bool
+) -> tuple[str, Table] | None:
     """Return name and columns of an array or a DataFrame; None for any other source."""
     if isinstance(source, np.ndarray | list | tuple):
         return "array", _columns_of("array", _numbers("array", source))
@@ -329,18 +331,21 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
         return None
     if hasattr(source, "to_frame"):  # a Series is a column
         source = source.to_frame()
-    if names is not None:
-        missing = [name for name in names if name not in source.columns]
+    if named and wanted is not None:
+        missing = [name for name in wanted if name not in source.columns]
         if missing:
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
-        source = source[list(names)]
-    apart = np.diff(source.index) if source.index.dtype.kind in "iuf" else np.zeros(0)
-    if len(source.columns) == 1 and not np.allclose(apart, apart[:1], atol=0):
-        raise InputError(
-            "the index of the table leaves rows out, or has another order, and the heights have no "
-            "positions: put the rows in with NaN (reindex), or number them anew (reset_index)"
-        )
+        source = source[list(wanted)]
+    has_one = len(source.columns if wanted is None else wanted) == 1
+    if has_one and source.index.dtype.kind in "iu" and len(source) > 1:
+        apart = np.diff(source.index.to_numpy(float, na_value=np.nan))
+        if np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0:
+            raise InputError(
+                "the index of the table leaves rows out, or has another order, and the heights "
+                "have no positions: put the rows in with NaN (reindex), or number them anew "
+                "(reset_index(drop=True))"
+            )
     units = source.attrs.get("units", {})
     if not isinstance(units, Mapping):
         raise InputError(
@@ -397,11 +402,13 @@ def _from_table(
     lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
         columns, names, lines = _row_of_map(name, table, row, notes), (), None
+        places = table.lines[: row + 1]
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
         columns, lines = _scan_line(name, columns, lines, row, notes)
+        places = lines
     if len(columns) == 1:
-        _check_empty_rows(name, table.lines if lines is None else lines, notes)
+        _refuse_uneven_rows(name, places)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -415,6 +422,8 @@ def _from_table(
         if given is not None:
             columns, step = columns[1:], given
             notes.append("the first column counts the points")
+    if len(columns) == 1 and (left_out := int(np.sum(np.diff(places) - 1))):
+        notes.append(f"{counted(left_out, 'empty row')} left out")
     (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
     heights = columns[-1] * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
@@ -519,18 +528,17 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     return table.columns[list(table.filled), row].reshape(1, -1)
 
 
-def _check_empty_rows(name: str, lines: Array, notes: list[str]) -> None:
-    """Refuse empty rows here and there between rows whose places are known by their order alone."""
-    empty = np.diff(lines) - 1
-    if not empty.any():
-        return
-    if empty.min() == empty.max():
-        notes.append(f"{counted(int(empty.sum()), 'empty row')} left out")
-    else:
-        line = lines[np.argmax(empty > empty.min())] + 1
+def _refuse_uneven_rows(name: str, lines: Array) -> None:
+    """Refuse empty lines here and there between rows that have their places by their order."""
+    apart = np.diff(lines)
+    usual = np.bincount(apart, minlength=1).argmax()
+    odd = np.flatnonzero(apart != usual)
+    if odd.size:
+        line = lines[odd[0]] + min(usual, apart[odd[0]])
         raise InputError(
-            f"line {line} of {name} has empty fields alone, and the rows have no positions: write "
-            "NaN into its fields if it is one of them, or else remove it"
+            f"the rows of {name} have no positions, and empty lines divide them unevenly at "
+            f"{counted(odd.size, 'place')}, the first on line {line}: write NaN where one is a "
+            f"row, remove the others, or give {parameter('columns')} X,Z, if there are positions"
         )
 
 

@@ -128,7 +128,7 @@ def find_form(
     is_quoted = any('"' in line for line in sample)
     forms = [form for form in product(signs, decimal or ".,") if is_quoted or form[0] != form[1]]
     if not forms:
-        raise InputError(f"{parameter('decimal')} and {parameter('delimiter')} are both ','")
+        raise InputError(f"{parameter('delimiter')} is the decimal sign: omit it, or quote fields")
     for form in forms:
         rows = [[value(field, form[1]) for field in split(line, form[0])] for line in sample]
         whole = [tuple(map(repr, row)) for row in rows if None not in row]
@@ -136,21 +136,23 @@ def find_form(
     best = max(read, key=lambda form: read[form][:2])
     most = read[best][0]
     others = [form for form in read if read[form][0] == most and read[form][2] != read[best][2]]
+    if decimal == "," and best[0] == " " and not delimiter and _one_comma(sample) == (",", "."):
+        _refuse_two_ways(source, sample[0], "leave out")
     if most and others and best[0] in ", ":
-        return _one_comma(source, sample) or _refuse_two_ways(source, sample[0])
+        return _one_comma(sample) or _refuse_two_ways(source, sample[0])
     if decimal is None and best[0] == "," and all(_PAIR.fullmatch(line.strip()) for line in sample):
         _refuse_two_ways(source, sample[0])
     return best
 
 
-def _refuse_two_ways(source: Source, line: str) -> NoReturn:
+def _refuse_two_ways(source: Source, line: str, mend: str = "give") -> NoReturn:
     raise InputError(
         f"{source} has rows such as {shown_line(line)}, whose commas can be decimal signs or "
-        f"delimiters: give {parameter('decimal')}"
+        f"delimiters: {mend} {parameter('decimal')}"
     )
 
 
-def _one_comma(source: Source, lines: Sequence[str]) -> tuple[str, str] | None:
+def _one_comma(lines: Sequence[str]) -> tuple[str, str] | None:
     """Tell "12,345" as a decimal number from two whole ones; None if it may be either."""
     halves = [line.split(",") for line in lines if line.count(",") == 1]
     if any(" " in half.strip() for line in halves for half in line):

@@ -136,8 +136,8 @@ class Source:
             raise InputError(f"{self} is empty")
         for magic, (what, program) in _NO_TRACES.items():
             if begin.startswith(magic):
-                mend = "export the heights as text"
-                mend = f"unpack it first ({program} {shlex.quote(str(self))})" if program else mend
+                command = f" ({program} {shlex.quote(str(self))})" if self.content is None else ""
+                mend = f"unpack it first{command}" if program else "export the heights as text"
                 raise InputError(f"{self} is {what}: {mend}")
         return begin
 
