@@ -96,11 +96,6 @@ def test_names_of_positions_and_heights_have_units_in_many_languages(names, tmp_
         assert_right(read(tmp_path, [head, *rows("\t", decimal, 1e3, 1e6, ".7f")]))
 
 
-def test_units_by_option(tmp_path: Path) -> None:
-    assert_right(read(tmp_path, rows(" ", "."), unit="um"))
-    assert_right(read(tmp_path, rows(",", ".", 1e3, 1e9, ".7f"), unit="mm,nm"))
-
-
 def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path) -> None:
     heights = [f"{z * 1e6:.6f}" for z in Z]
     assert_right(read(tmp_path, ["Height (µm)", *heights], step=STEP))
@@ -110,20 +105,6 @@ def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path)
     assert_right(read(tmp_path, ["Schrittweite: 0,5 µm", "Höhe (µm)", *commas]))
     with pytest.raises(InputError, match="give step"):
         read(tmp_path, ["Height (µm)", *heights])
-
-
-def test_columns_are_chosen_where_there_are_more(tmp_path: Path) -> None:
-    lines = [f"{k},{row}" for k, row in enumerate(rows(",", "."))]
-    with pytest.raises(InputError, match=r"3 columns: give columns X,Z"):
-        read(tmp_path, ["n,x (um),z (um)", *lines])
-    assert_right(read(tmp_path, ["n,x (um),z (um)", *lines], columns=(2, 3)))
-
-
-def test_npy_of_one_column_and_of_two(tmp_path: Path) -> None:
-    np.save(tmp_path / "a.npy", np.column_stack([X, Z]))
-    assert_right(read_trace(tmp_path / "a.npy"))
-    np.save(tmp_path / "b.npy", 1e6 * Z)
-    assert_right(read_trace(tmp_path / "b.npy", unit="um", step=STEP))
 
 
 def npy(array: np.ndarray) -> io.BytesIO:
@@ -144,6 +125,7 @@ IN_MEMORY: dict[str, tuple[Callable[[], object], dict[str, object]]] = {
     "stream of text": (lambda: io.StringIO(TEXT), {}),
     "stream of bytes": (lambda: io.BytesIO(TEXT.encode("latin-1")), {}),
     "stream of an array": (lambda: npy(BOTH), {"unit": "um"}),
+    "stream of an array of heights": (lambda: npy(1e6 * Z), {"unit": "um", "step": STEP}),
     "array": (lambda: BOTH, {"unit": "um"}),
     "array of two rows": (lambda: BOTH.T, {"unit": "um"}),
     "array in metres": (lambda: np.column_stack([X, Z]), {}),
@@ -310,49 +292,3 @@ def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
     assert any("unequal steps" in note for note in trace.notes)
     even = np.linspace(uneven[0], uneven[-1], N)
     np.testing.assert_allclose(trace.heights, 1e-7 * np.sin(2 * np.pi * even / 20e-6), atol=1e-9)
-
-
-SPIKED = [*rows(" ", ".")[:60], "25.0 0.1", *rows(" ", ".")[60:]]
-REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
-    "no unit": (rows(" ", "."), {}, "states no unit.*give unit, as in um"),
-    "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "states no unit"),
-    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit is mm for the pos"),
-    "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* is no map, as"),
-    "two rows": ([UM, "1;2", "2;3"], {}, "holds 2 rows of numbers"),
-    "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
-    "kilometres": ([UM.replace("µm", "m"), *rows(";", ".")], {}, "m long: is its unit right"),
-    "heights in mm, positions in µm": (rows(" ", "."), {"unit": "um,mm"}, "in the same unit"),
-    "words within": ([UM, *rows(";", ".")[:50], "pause", *rows(";", ".")[50:]], {}, "line 52 of"),
-    "turning back": (SPIKED, {"unit": "um"}, "positions turn back at line 61"),
-    "twice the same place": (
-        ["x (um) z (um)", "0.0 1.0", "0.0 1.0", *rows(" ", ".")[1:]],
-        {"unit": "um"},
-        "stand still",
-    ),
-    "unequal steps": (
-        [f"{k**1.5:.4f} {z * 1e6:.5f}" for k, z in enumerate(Z)],
-        {"unit": "um"},
-        "steps of the positions are unequal",
-    ),
-    "no position": (
-        [UM, *rows(";", ".")[:9], ";1.0", *rows(";", ".")[9:]],
-        {},
-        "line 11.*no posit",
-    ),
-    "points of thousands": (
-        [f"1.{k:03d},5;0,1" for k in range(99)],
-        {"unit": "um"},
-        "line 1 .* has '1.000,5', which is no number",
-    ),
-    "one number or two": ([f"{k % 7},{k % 3}" for k in range(99)], {"unit": "um"}, "give decimal"),
-    "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),
-    "flat": ([f"{k} 1.0" for k in range(99)], {"unit": "um"}, "flat trace has no loss"),
-}
-
-
-@pytest.mark.parametrize("kind", REFUSED)
-def test_what_is_in_doubt_is_refused_in_one_sentence(kind: str, tmp_path: Path) -> None:
-    lines, options, words = REFUSED[kind]
-    with pytest.raises(InputError, match=words) as refusal:
-        read(tmp_path, lines, **options)
-    assert "\n" not in str(refusal.value)
