@@ -10,7 +10,17 @@ from threading import Barrier
 import numpy as np
 import pytest
 
-from adhesis import Control, Problem, make_method, run_loop, run_loops, run_path, single_wave
+from adhesis import (
+    ContactState,
+    Control,
+    LoopResult,
+    Problem,
+    make_method,
+    run_loop,
+    run_loops,
+    run_path,
+    single_wave,
+)
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.sharp.continuation.descent import Descents
 from adhesis.solver.sharp.errors import NoState
@@ -75,6 +85,72 @@ def test_adhesion_of_every_accepted_strength_ends_in_an_audited_loss(share):
     loop = loop_of(wave_problem(share), max_penetration=0.5, load_steps=1)
     assert abs(loop.audit_residual) < 1e-3
     assert loop.loss_error < 1e-3 * loop.loss
+
+
+AUDIT = {"sharp": 1e-3, "grid": 5e-3}
+
+
+def loop_by(name: str, gamma: float, depth: float = 0.9, **profile: float) -> LoopResult:
+    """Run a rough loop at the accuracy at which both methods take about as long."""
+    rough_profile = rough(**{"n0": 2, "ratio": 6, "seed": 4, "period": 1e-3} | profile)
+    accuracy = 1e-2 if name == "grid" else 1e-3
+    problem = Problem(rough_profile, HALF_SPACE, gamma)
+    return loop_of(problem, name, accuracy=accuracy, max_penetration=depth, load_steps=10)
+
+
+@pytest.mark.parametrize(("name", "rounding"), [("sharp", 1e-12), ("grid", 1e-8)])
+def test_no_loss_without_adhesion(name, rounding):
+    """γ = 0: the state is unique, the way back is the way there, and nothing jumps."""
+    result = loop_by(name, 0.0)
+    assert result.jumps == ()
+    assert abs(result.loss_dimensionless) < rounding
+    assert result.pull_off_penetration == pytest.approx(0.0, abs=1e-12)
+    assert result.mean_stress.min() > -1e-3 * result.mean_stress.max()
+    assert result.interior is None
+    assert result.valid_range == result.turn_range == np.inf
+    assert result.warnings == ()
+    assert result.patches.max() > 3
+
+
+@pytest.mark.parametrize("name", ["sharp", "grid"])
+def test_first_touch_may_run_to_almost_full_contact(name):
+    """Strong adhesion: one jump closes all but the last gap, which stays as the mean gap is s."""
+    result = loop_by(name, 5.0, 0.5)
+    assert result.jumps[0].kind == "snap-in"
+    assert result.jumps[0].contact_after > 0.85
+    assert result.contact_fraction.max() < 1
+    assert abs(result.audit_residual) < AUDIT[name]
+    assert result.patches[-1] == 0
+
+
+@pytest.mark.parametrize("name", ["sharp", "grid"])
+@pytest.mark.parametrize("hurst", [0.05, 0.999])
+def test_any_hurst_exponent_gives_an_audited_loop(name, hurst):
+    result = loop_by(name, 0.01, hurst=hurst)
+    assert result.loss > 0
+    assert abs(result.audit_residual) < AUDIT[name]
+
+
+@pytest.mark.parametrize(("name", "near"), [("sharp", 1e-5), ("grid", 1e-2)])
+def test_partial_loops_close(name, near):
+    """Unload half-way from a state that a jump reached, reload: the same state returns."""
+    problem = Problem(rough(2, 6, 4, period=1e-3), HALF_SPACE, 0.005)
+    method = make_method(name, problem, accuracy=1e-2 if name == "grid" else 1e-3)
+    h_max = problem.profile.h_max
+
+    def go(state: ContactState, *penetrations: float) -> ContactState:
+        for penetration in penetrations:
+            state = method.follow(state, h_max * (1 - penetration)).states[-1]
+        return state
+
+    turned = go(method.detached(h_max), 0.0, 0.3, 0.6)
+    once = go(turned, 0.2, 0.6)
+    assert once.energy <= turned.energy + 1e-9 * abs(turned.energy)
+    again = go(once, 0.2, 0.6)
+    assert again.mean_stress == pytest.approx(once.mean_stress, rel=near)
+    assert again.patches == once.patches
+    # a state is immutable: following from it once more gives the same bits
+    assert go(turned, 0.2, 0.6).mean_stress == once.mean_stress
 
 
 def test_no_adhesion_at_all_is_accepted_whatever_the_modulus():

@@ -109,14 +109,6 @@ def test_first_touch_is_a_jump_at_the_highest_crest():
     assert [s.patches for s in path.states[:2]] == [0, 1]
 
 
-def test_strong_adhesion_runs_to_nearly_full_contact_at_first_touch_but_never_closes():
-    result = run_loop(wave_method(10.0, nodes=512), max_penetration=0.5, load_steps=4)
-    assert result.contact_fraction[2] > 0.85  # after the first jump
-    assert result.contact_fraction.max() < 1
-    assert abs(result.audit_residual) < 5e-3
-    assert result.patches[-1] == 0
-
-
 def test_two_equal_maxima_touch_together_and_leave_as_in_sharp():
     """Apart they are unstable before both could leave together: one of them leads."""
     two = Profile(PERIOD, np.array([0, 0, AMPLITUDE / 2], dtype=complex))
@@ -127,38 +119,6 @@ def test_two_equal_maxima_touch_together_and_leave_as_in_sharp():
     for result in (grid, sharp):
         assert [(j.patches_before, j.patches_after) for j in result.jumps] == steps
     assert grid.loss == pytest.approx(sharp.loss, rel=5e-3)
-
-
-def test_partial_loop_closes_and_reload_returns_to_the_same_state():
-    method = grid_of(Problem(rough_profile(), HALF_SPACE, 2e-3), nodes=512)
-    h_max = method.problem.profile.h_max
-
-    def go(state: ContactState, s: float) -> ContactState:
-        return method.follow(state, s * h_max).states[-1]
-
-    deep = go(method.detached(h_max), 0.3)
-    half = go(deep, 0.7)
-    again = go(go(half, 0.3), 0.7)
-    # Return-point memory: the second visit closes the partial loop.
-    assert again.mean_stress == pytest.approx(half.mean_stress, rel=1e-2)
-    assert again.patches == half.patches
-    # The state is immutable: following from it once more gives the same bits.
-    assert go(deep, 0.7).mean_stress == half.mean_stress
-
-
-def test_without_adhesion_a_rough_loop_is_reversible():
-    result = rough_loop(rough_profile(), gamma=0.0)
-    assert result.jumps == ()
-    assert abs(result.loss_dimensionless) < 1e-8
-    assert result.patches.max() > 3
-
-
-@pytest.mark.parametrize("hurst", [0.05, 0.97])
-def test_any_hurst_exponent_gives_an_audited_loop(hurst):
-    profile = rough(1, 6, 1, hurst=hurst, period=1e-3, h_rms=1e-7)
-    result = rough_loop(profile, nodes=256)
-    assert result.loss > 0
-    assert abs(result.audit_residual) < 5e-3
 
 
 def test_number_of_nodes():

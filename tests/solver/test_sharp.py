@@ -51,33 +51,6 @@ def test_touching_is_looked_for_before_a_branch_ends():
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
 
 
-def test_no_loss_without_adhesion():
-    """γ = 0: the state is unique, the way back is the way there, and nothing jumps."""
-    result = loop(rough(), 0.0)
-    assert result.jumps == ()
-    assert abs(result.loss_dimensionless) < 1e-12
-    assert result.pull_off_penetration == pytest.approx(0.0, abs=1e-12)
-    assert result.mean_stress.min() > -1e-3 * result.mean_stress.max()
-    assert result.interior is None
-    assert result.valid_range == result.turn_range == np.inf
-    assert result.warnings == ()
-
-
-def test_first_touch_may_run_to_almost_full_contact():
-    """Strong adhesion: one jump closes all but the last gap, which stays as the mean gap is s."""
-    result = loop(rough(), 5.0, max_penetration=0.5, load_steps=5)
-    assert result.jumps[0].kind == "snap-in"
-    assert result.jumps[0].contact_after > 0.85
-    assert result.contact_fraction.max() < 1
-    assert abs(result.audit_residual) < 1e-3
-
-
-def test_a_hurst_exponent_next_to_1():
-    result = loop(rough(hurst=0.999), 0.01)
-    assert abs(result.audit_residual) < 1e-3
-    assert result.loss > 0
-
-
 def test_ten_thousand_waves():
     """Wave numbers 10 … 10,000: the field needs no more modes than before."""
     profile = of_paper(1, ratio=1000)
@@ -100,22 +73,6 @@ def test_hundreds_of_patches_appear_and_grow(waves, penetration):
     y = np.sin(np.pi * state.contact_fraction / 2) ** 2
     p_star = np.pi * HALF_SPACE.modulus * profile.h_max * waves / PERIOD
     assert state.mean_stress == pytest.approx(p_star * y, rel=1e-4)
-
-
-def test_partial_loops_close():
-    """Unload half-way from a state that a jump reached, reload: the same state returns."""
-    profile = rough(4)
-    method = make_method("sharp", Problem(profile, HALF_SPACE, 0.005))
-
-    def go(state, *penetrations):
-        for penetration in penetrations:
-            state = method.follow(state, profile.h_max * (1 - penetration)).states[-1]
-        return state
-
-    turned = go(method.detached(profile.h_max), 0.0, 0.3, 0.6)
-    once = go(turned, 0.2, 0.6)
-    assert once.energy <= turned.energy + 1e-9 * abs(turned.energy)
-    assert go(once, 0.2, 0.6).mean_stress == pytest.approx(once.mean_stress, rel=1e-5)
 
 
 def test_settling_at_the_same_separation_returns_the_state():
