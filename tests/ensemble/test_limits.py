@@ -27,6 +27,7 @@ WORDS: dict[str, tuple[object, ...]] = {
     "run": ("{}/c.toml", "--out", "r.h5"),
     "status": ("{}/r.h5",),
     "loop": (*LOOP, *MATERIAL, "--accuracy", "0.1", "--quiet", "--json", "l.json"),
+    "report": ("{}/r.h5", "--to", "report"),
     "bench": ("--quick", "--to", "bench"),
     "doctor": (),
 }
@@ -36,7 +37,7 @@ CASES = [
     (limit, value, name)
     for limit, value, names in (
         *(("n", 5, "run doctor"), ("n", 16, "status")),
-        *(("v", 600_000, "loop"), ("f", 0, "new run loop"), ("f", 50, "run")),
+        *(("v", 600_000, "loop"), ("f", 0, "new run loop"), ("f", 50, "run report")),
         *(("u", 1, "run bench doctor"), ("u", 8, "status")),
     )
     for name in names.split()

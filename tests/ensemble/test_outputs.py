@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import resource
 from collections.abc import Callable
 from pathlib import Path
@@ -15,10 +14,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json, write_new
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.single_wave import SingleWave
-from tests.support.processes import ran
-from tests.support.synthetic_results import campaign, write
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9
 GAMMA = SingleWave.with_alpha(0.2, AMPLITUDE, PERIOD, 1e6 / 0.75).work_of_adhesion
@@ -177,28 +173,6 @@ def test_older_files_of_the_writers_own_names_are_removed(tmp_path: Path) -> Non
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
         **{"a": "new", "notes": "old"}
     }
-
-
-def test_a_report_on_a_full_disk_ends_in_one_sentence_and_leaves_the_old_one(ask: Ask) -> None:
-    write(Path("r.h5"), campaign(hurst=(0.8,), gamma=(0.01,), realisations=2))
-    Path("out").mkdir()
-    Path("out/losses.csv").write_text("old")
-    # files may not grow beyond this, which HDF5 and matplotlib meet as they meet a full disk
-    code = (
-        "import resource, sys; from adhesis.ensemble.command.main import main; "
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY)); "
-        "sys.exit(main(['report', 'r.h5', '--to', 'out']))"
-    )
-    done = ran(*python("-c", code), env=python_environment())
-    assert done.returncode == 74, done.stderr
-    lines = done.stderr.splitlines()
-    progress = re.compile(r"adhesis report: .+  [\d.]+ s")  # on a busy machine
-    assert [line for line in lines if not progress.fullmatch(line)] == [
-        "adhesis report: the report in out could not be written (File too large)"
-    ]
-    assert [(path.name, path.read_text()) for path in Path("out").iterdir()] == [
-        ("losses.csv", "old")
-    ]
 
 
 def test_a_terminal_that_nobody_reads_is_refused() -> None:

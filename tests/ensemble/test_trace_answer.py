@@ -211,24 +211,21 @@ def test_the_command_passes_what_is_given(words, control, turns, pattern, tmp_pa
     assert turns is None or given[0].turning_points == turns
 
 
-def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
-    cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3, Control(1e9))
-    plan = make_plan(prepared(), cycle, quick=True, processes=0)
-    assert {job.cycle.control.stiffness for job in plan.jobs} == {1e9}
-    assert cycle.turn(0.3) == "u_tot/h_max = 0.3 of a stiffness of 1e+09 Pa/m"
-
-
 @pytest.mark.parametrize(
-    ("control", "at_preload", "turn", "label"),
+    ("control", "at_preload", "turn", "said", "label"),
     [
-        (Control(), False, 0.3, r"$\Delta/h_{\max}$"),
-        (Control(1e9), False, 0.3, r"$u_\mathrm{tot}/h_{\max}$"),
-        (Control(0.0), False, 2e4, r"$\bar p$ (kPa)"),
-        (Control(), True, 2e4, "preload (kPa)"),
+        (Control(), False, 0.3, "Δ/h_max = 0.3", r"$\Delta/h_{\max}$"),
+        (
+            *(Control(1e9), False, 0.3, "u_tot/h_max = 0.3 of a stiffness of 1e+09 Pa/m"),
+            r"$u_\mathrm{tot}/h_{\max}$",
+        ),
+        (Control(0.0), False, 2e4, "p̄ = 20 kPa", r"$\bar p$ (kPa)"),
+        (Control(), True, 2e4, "a preload of 20 kPa at a fixed separation", "preload (kPa)"),
     ],
 )
-def test_the_figure_of_the_tables_says_what_turning_points_are(control, at_preload, turn, label):
+def test_text_and_figure_say_what_turning_points_are(control, at_preload, turn, said, label):
     cycle = make_cycle(HALF_SPACE, 0.04, turn, 4, "auto", 1e-3, control, at_preload=at_preload)
+    assert cycle.turn(turn) == said
     numbers = dict.fromkeys(QUANTITIES, 0.5)
     found: Any = SimpleNamespace(
         cycle=cycle,

@@ -81,12 +81,6 @@ def test_half_a_file_is_one_sentence_and_code_2(name, tmp_path, capsys):
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
-def test_units_of_texts_do_not_belong_to_instruments(tmp_path: Path) -> None:
-    instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
-    with pytest.raises(InputError, match="unit belongs to texts"):
-        read_trace(tmp_path / "a.qep", unit="um")
-
-
 def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
     monkeypatch.setattr(read, "available", lambda: False)
