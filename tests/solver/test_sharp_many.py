@@ -16,7 +16,7 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import FIXED_SEPARATION, EdgeMechanics, Point
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
-from tests.support.scenes import HALF_SPACE, loops_at, of_paper, rough
+from tests.support.scenes import HALF_SPACE, of_paper
 
 
 @pytest.fixture(scope="module")
@@ -177,16 +177,6 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         again = edges.equilibrium(wanted, d, edges.wave)
         assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.field_error
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
-
-
-def test_no_step_leads_to_another_branch():
-    """After a jump one edge was predicted to move by 3 λ_min, and a state found there was taken."""
-    profile = rough(14, 39, 779993, hurst=0.772, amplitudes="rayleigh")
-    gamma = 0.5935246633443851 * HALF_SPACE.modulus * 1e-12 * profile.q0 * 14
-    path = {"max_penetration": 0.6572167384925119, "load_steps": 28}
-    coarse, fine = loops_at(Problem(profile, HALF_SPACE, gamma), 1e-3, 3e-4, **path)
-    assert abs(coarse.loss - fine.loss) < coarse.loss_error
-    assert abs(coarse.audit_residual) < 1e-4
 
 
 # Edges of 33 gaps next to a fold, in units of 1/q0, as a jump of the paper's campaign begins. No

@@ -175,17 +175,6 @@ def test_edges_that_begin_to_move_together_do_not_hold_each_other_back(monkeypat
     assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error
 
 
-def test_an_edge_that_turns_back_within_a_step_is_pinned_where_it_was_furthest():
-    """A jump of unloading came 9e-5 h_max early: the loss was 5.9e-5 off, 3.4e-5 was stated."""
-    scene = draw(5202, 32, "open")
-    problem = scene.problem()
-    path = {"load_steps": scene.load_steps, **scene.turn(problem)}
-    coarse, fine = loops_at(problem, 1e-4, 1e-6, **path)
-    assert coarse.loss == pytest.approx(fine.loss, rel=1e-5)
-    assert coarse.loss_from_drops == pytest.approx(fine.loss_from_drops, rel=1e-5)
-    assert coarse.loss_error < 2e-5 * coarse.loss
-
-
 @pytest.mark.parametrize("ratio", [1.0, 2.0])
 def test_a_refusal_names_another_method_only_where_it_takes_the_problem(ratio, monkeypatch):
     def refuse(*_):
