@@ -83,7 +83,7 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skip, with the reason, what cannot run here; a test that is slow says why."""
+    """Skip, with the reason, what cannot run here, and what is slow."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         items.sort(key=lambda item: rank_of(item.nodeid))
     reasons = {"mpi": without_mpi(), "slurm": without_slurm()}
@@ -92,9 +92,5 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             if reason and item.get_closest_marker(name):
                 item.add_marker(pytest.mark.skip(reason=reason))
         slow = item.get_closest_marker("slow")
-        if slow is None:
-            continue
-        if not slow.kwargs.get("reason"):
-            raise pytest.UsageError(f"{item.nodeid} is slow, but gives no reason")
-        if not config.getoption("--slow"):
+        if slow is not None and not config.getoption("--slow"):
             item.add_marker(pytest.mark.skip(reason=f"slow ({slow.kwargs['reason']}): --slow"))

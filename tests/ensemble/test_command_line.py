@@ -18,7 +18,7 @@ from adhesis.ensemble.command.main import COMMANDS, main, module_of, parser_of
 from adhesis.ensemble.errors import RankError
 from adhesis.ensemble.quantities import Quantity
 from adhesis.ensemble.results.layout import create
-from adhesis.solver import checks
+from tests.solver.test_bad_input import NUMBERS
 from tests.support.campaign_support import environment, run_python, write_campaign
 from tests.support.processes import ran
 from tests.support.wrong_values import outside
@@ -44,28 +44,24 @@ def refused(capsys, words) -> str:
     return line
 
 
-# Options of `adhesis loop` that are one number, with the rule that Python and campaigns have too.
-BOUNDED = {
-    **{"--hurst": checks.HURST, "--period": checks.LENGTH, "--n0": checks.HARMONIC},
-    **{"--ratio": checks.HARMONIC, "--seed": checks.SEED, "--h-rms": checks.HEIGHT},
-    **{"--m2": checks.MEAN_SQUARE_SLOPE, "--work-of-adhesion": checks.WORK_OF_ADHESION},
-    **{"--young": checks.YOUNG, "--poisson": checks.POISSON, "--load-steps": checks.LOAD_STEPS},
-    **{"--accuracy": checks.ACCURACY, "--nodes-per-wave": checks.NODES_PER_WAVE},
-    **{"--stiffness": checks.STIFFNESS, "--max-penetration": checks.MAX_PENETRATION},
-    **{"--preload": checks.MAX_STRESS, "--adhesion-range": checks.ADHESION_RANGE},
-}
+# Options of `adhesis loop` that are one number, with the rule that Python has too.
+KNOWN = parser_of("loop")._option_string_actions
+RULES = {f"--{name.replace('_', '-')}": bounds for name, (_, bounds) in NUMBERS.items()}
+BOUNDED = {option: bounds for option, bounds in RULES.items() if option in KNOWN}
 
 
 @pytest.mark.parametrize("option", BOUNDED)
 def test_a_number_beyond_the_bounds_of_its_rule_is_refused(option, capsys, monkeypatch):
     monkeypatch.setattr("adhesis.ensemble.command.loop.run_loop", None)
     bounds = BOUNDED[option]
+    words = ["loop", *([] if option == "--hurst" else ["--hurst=0.8"])]
+    words += ["--stiffness=0"] if option == "--max-stress" else []
     unit = bounds.unit.partition(" ")[0].replace("²", "2")
     for number in outside(bounds):
         if bounds.whole and not float(number).is_integer():
             continue  # the parser refuses it: below
         given = f"{option}={number:.17g}{unit if math.isfinite(number) else ''}"
-        line = refused(capsys, ["loop", *([] if option == "--hurst" else ["--hurst=0.8"]), given])
+        line = refused(capsys, [*words, given])
         assert line.startswith(f"adhesis loop: {option} is "), line
         assert f": it must be {bounds.text}" in line
 

@@ -9,26 +9,18 @@ import shutil
 import signal
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 
+from tests.project.test_package import PROJECT
 from tests.support.campaign_support import ROOT, started, wait_until
 from tests.support.processes import ran
 
 # Distribution names that differ from what is imported, and what other packages need to find.
 IMPORTED_AS = {"markdown-it-py": "markdown_it", "surfacetopography": "SurfaceTopography"}
 LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
-
-
-def project() -> dict[str, object]:
-    return dict(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"])
-
-
-def names(requirements: list[str]) -> set[str]:
-    return {re.split(r"[^\w.-]", text)[0].lower() for text in requirements}
 
 
 def locked(name: str = "requirements.lock") -> dict[str, str]:
@@ -56,10 +48,9 @@ def test_dependencies_are_what_is_imported() -> None:
                 elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                     imported.add(node.module.split(".")[0])
     imported -= set(sys.stdlib_module_names) | {"adhesis"}
-    extras = project()["optional-dependencies"]
-    assert isinstance(extras, dict)
-    needed = list(project()["dependencies"]) + extras["mpi"] + extras["instruments"]  # type: ignore[call-overload]
-    declared = names(needed)
+    extras = PROJECT["optional-dependencies"]
+    needed = [*PROJECT["dependencies"], *extras["mpi"], *extras["instruments"]]
+    declared = {Requirement(text).name.lower() for text in needed}
     assert imported | LOADED_BY_NAME == {IMPORTED_AS.get(name, name) for name in declared}
 
 
