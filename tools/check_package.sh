@@ -7,7 +7,6 @@ python=$(realpath -s "${PYTHON:-.venv/bin/python}")
 place=$(mktemp -d)
 say() { echo "package: $*"; }
 log=.setup/check-package.log
-mkdir -p .setup
 . tools/parts.sh
 trap 'end_parts; rm -rf "$place"' EXIT
 export PIP_DISABLE_PIP_VERSION_CHECK=1

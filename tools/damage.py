@@ -29,14 +29,13 @@ import numpy as np
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.status import read_status
 from adhesis.ensemble.campaign.file import load_campaign
-from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import ROW_DATASETS
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Options, run_campaign
-from tests.support.campaign_support import differences, write_campaign
+from tests.support.campaign_support import adhesis_here, differences, write_campaign
 from tests.support.fake_run import fake_engine
 
 
@@ -92,7 +91,8 @@ class Damage:
                 file.unlink()
 
     def _judge(self, path: Path) -> tuple[str, str]:
-        code, out, err = _command("verify", str(path), "--json")
+        verified = adhesis_here("verify", path, "--json")
+        code, err = verified.returncode, verified.stderr
         commands: dict[str, Callable[[], Any]] = {
             "status": lambda: _status(path),
             "averages": lambda: _averages(path),
@@ -108,7 +108,7 @@ class Damage:
                 else:
                     raise Wrong(f"{command} takes what verify refuses: {err}")
             return "refused", _sentence(err)
-        reported = json.loads(out)
+        reported = json.loads(verified.stdout)
         named = tuple(d["row"] for d in reported["damaged"])
         if bool(named) != (code == 1):
             raise Wrong(f"verify ends with {code} and names {named}")
@@ -158,13 +158,6 @@ def _sentence(text: str) -> str:
     if "\n" in text.strip() or "Traceback" in text or not text.strip():
         raise Wrong(f"not one sentence: {text}")
     return text.strip()
-
-
-def _command(*words: str) -> tuple[int, str, str]:
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main(list(words))
-    return code, out.getvalue(), err.getvalue()
 
 
 def _status(path: Path) -> str:

@@ -8,7 +8,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-.venv/bin/python}
 say() { echo "docs: $*"; }
 log=.setup/docs.log
-mkdir -p .setup
 . tools/parts.sh
 trap end_parts EXIT
 tools=.setup/docs

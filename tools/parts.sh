@@ -3,6 +3,7 @@
 # words. Each has its log, .setup/NAME.log, whose end tells its time and that of the processor.
 # What sources this has say() and log; TELL_EVERY is the longest silence in s.
 
+mkdir -p .setup
 TELL_EVERY=${TELL_EVERY:-10}
 TIMEFORMAT="%R s, %U + %S s of the processor"
 declare -A pid text since code

@@ -139,7 +139,6 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
 
 
 def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
-    (tmp_path / ".setup").mkdir(exist_ok=True)
     head = f"""
         set -eu
         say() {{ printf 'setup: %s\\n' "$*" | tee -a {tmp_path}/said; }}

@@ -30,6 +30,7 @@ from tools.isolated import Isolated
 KINDS = ("rows", "head", "cuts")
 LIMIT = 300.0  # s of CPU time of one case
 _MEMORY = 4 * 2**30
+_damage = cache(Damage)
 
 
 def draw(damage: Damage, seed: int, kind: str, number: int) -> tuple[str, bytes]:
@@ -47,14 +48,9 @@ def judged(folder: str, seed: int, kind: str, number: int) -> tuple[str, str, st
     """Damage a file and judge it: what was done to it, what it is, and why."""
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    damage = _damage(folder)
+    damage = _damage(Path(folder))
     what, content = draw(damage, seed, kind, number)
     return what, *damage.judge(content)
-
-
-@cache
-def _damage(folder: str) -> Damage:
-    return Damage(Path(folder))
 
 
 def main() -> int:
