@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 
 from adhesis.ensemble.command.parser import within
-from adhesis.ensemble.option_table import declare
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import bar
 
@@ -23,21 +22,13 @@ EXAMPLES = (
     "adhesis bench --to out/benchmark --budget 60",
 )
 _FILES = tuple(f"benchmark.{suffix}" for suffix in ("csv", "md", "png", "pdf"))
-_OPTIONS = f"""
+ARGUMENTS = f"""
 --to DIR file: directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})
 --quick: small scenes only, under a minute
 --budget SECONDS number: CPU time after which a run is given up (default 360)
 """
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis bench``."""
-    budget = within(1e-9, 1e9, "a positive number of seconds")
-    declare(
-        *(parser, _OPTIONS),
-        to={"default": _DEFAULT},
-        budget={"type": budget, "default": 360.0},
-    )
+_BUDGET = within(1e-9, 1e9, "a positive number of seconds")
+DETAILS = {"to": {"default": _DEFAULT}, "budget": {"type": _BUDGET, "default": 360.0}}
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import Any
 
-from adhesis.ensemble.option_table import declare
 from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.reporter import bar
 
@@ -15,18 +14,16 @@ EXAMPLES = (
 )
 _TABLES = ("losses", "precision", "growth", "jumps", "works", "beside", "slopes")
 _FILES = (*(f"{name}.csv" for name in _TABLES), "curves.nc", "report.md", "report.html")
-_OPTIONS = """
+ARGUMENTS = """
+file FILE.h5 file: results file of a campaign
 --to DIR file: directory for losses.csv, curves.nc, the figures, report.md and report.html
 --beside OTHER.h5 file: other campaigns to compare with, loop by loop: another resolution or method,
     other load steps, another largest penetration, another spectrum
 """
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    parser.add_argument("file", metavar="FILE.h5", type=Path, help="results file of a campaign")
-    several = {"nargs": "+", "default": []}
-    declare(parser, _OPTIONS, to={"required": True}, beside=several)
+DETAILS: dict[str, dict[str, Any]] = {
+    "to": {"required": True},
+    "beside": {"nargs": "+", "default": []},
+}
 
 
 def execute(args: argparse.Namespace) -> int:

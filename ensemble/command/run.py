@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError, WriteError, parameter
-from adhesis.ensemble.option_table import declare
 from adhesis.ensemble.reporter import bar, log
 
 if TYPE_CHECKING:
@@ -36,7 +35,8 @@ EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
 )
-_OPTIONS = """
+ARGUMENTS = """
+campaign CAMPAIGN.toml file: the campaign file
 --out FILE.h5 file: results file (default: the campaign's name, here)
 --ranks N whole: start N ranks on this machine (one more than cores is right: rank 0 only hands out)
 --dry-run: estimate the cost from about a minute of pilot loops, and write nothing
@@ -51,21 +51,15 @@ _OPTIONS = """
 --realisation VALUE whole: with --redo: only this realisation; may be repeated
 --patience SECONDS number: how long to wait for another run to let go of FILE.h5 (default: 10)
 """
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="the campaign file")
-    repeated = {"action": "append", "default": []}
-    declare(
-        *(parser, _OPTIONS),
-        ranks={"type": within(1, _MOST, "a whole number of at least 1", int)},
-        max_failures={"type": _WHOLE, "default": 20},
-        hurst={"type": _NUMBER, **repeated},
-        work_of_adhesion=repeated,
-        realisation={"type": _WHOLE, **repeated},
-        patience={"type": _NUMBER, "default": 10.0},
-    )
+_REPEATED: dict[str, Any] = {"action": "append", "default": []}
+DETAILS = {
+    "ranks": {"type": within(1, _MOST, "a whole number of at least 1", int)},
+    "max_failures": {"type": _WHOLE, "default": 20},
+    "hurst": {"type": _NUMBER, **_REPEATED},
+    "work_of_adhesion": _REPEATED,
+    "realisation": {"type": _WHOLE, **_REPEATED},
+    "patience": {"type": _NUMBER, "default": 10.0},
+}
 
 
 def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:

@@ -7,11 +7,9 @@ in Pa, unless they carry a unit (5um, 20kPa).
 
 from __future__ import annotations
 
-import argparse
 import math
 
-from adhesis.ensemble.option_table import declare
-from adhesis.ensemble.trace import trace_arguments
+from adhesis.ensemble.trace.trace_arguments import CYCLE, METHOD, READING, SHARED
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6
@@ -20,9 +18,8 @@ EXAMPLES = (
     "adhesis loop --heights heights.csv --period 1mm --work-of-adhesion 0.04 --young 1e6 "
     "--poisson 0.5 --figure loop.png",
 )
-
-
-_PROFILE = f"""
+ARGUMENTS = f"""
+[profile (--heights, --hurst or --trace)]
 --heights FILE file: text or .npy: heights in m, or in the unit of the header or of --unit
 --trace FILE file: a measured trace: see adhesis trace
 --hurst H number: Hurst exponent, 0 < H < 1
@@ -34,18 +31,20 @@ _PROFILE = f"""
 --m2 number: mean square slope, instead of --h-rms
 --c0 number: |a_n0|² in m², instead of --h-rms
 --amplitudes KIND text: deterministic (default) or rayleigh
-"""
-_MATERIAL = """
+{READING}
+[contact and cycle]
 --work-of-adhesion G work: in J/m², or 20mJ/m2 (required unless the profile is that of --hurst;
     there 0.04)
 --young E stress: in Pa, or 1MPa (likewise; with --hurst 1e6)
 --poisson NU number: (likewise; with --hurst 0.5)
-"""
-_PATH = """
+{CYCLE}
 --path A,B,…,out text: instead of turning points: any path, loading first, ending with 'out' of
     contact or in contact
-"""
-_OUTPUT = """
+[method]
+{METHOD}
+--accuracy number: relative error of the loss (default 1e-3)
+--nodes-per-wave N whole: for grid
+[output]
 --json OUT file: states, losses and jumps
 --csv FILE file: the curve: a row a state, units in the header
 --figure FILE file: stress and contact: .png, .pdf or .svg
@@ -59,19 +58,4 @@ _OUTPUT = """
 --strict: exit code 1 if the loss is doubtful
 --quiet: no progress on stderr
 """
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis loop``."""
-    declare(parser.add_argument_group("profile (--heights, --hurst or --trace)"), _PROFILE)
-    trace_arguments.add_reading_arguments(parser)
-    contact = parser.add_argument_group("contact and cycle")
-    declare(contact, _MATERIAL)
-    trace_arguments.add_cycle_arguments(contact)
-    declare(contact, _PATH)
-    method = parser.add_argument_group("method")
-    trace_arguments.add_method_arguments(method, "relative error of the loss (default 1e-3)")
-    declare(method, "--nodes-per-wave N whole: for grid")
-    several = {"nargs": "+"}
-    output = parser.add_argument_group("output")
-    declare(output, _OUTPUT, field_penetrations=several, field_stresses=several)
+DETAILS = SHARED | {name: {"nargs": "+"} for name in ("field_penetrations", "field_stresses")}

@@ -7,22 +7,13 @@ Lengths are in m and stresses in Pa, unless they carry a unit (5um, 20kPa).
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
-from adhesis.ensemble.option_table import declare
+from typing import Any
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
     "adhesis trace trace.csv --work-of-adhesion 0.02,0.04 --young 1e6 --poisson 0.5 --plan",
 )
-_MATERIAL = """
---work-of-adhesion G text: in J/m², or 20mJ/m2; of several (0.04,0.02,0.08) the first is the
-    answer's, the others make a table, as of several turning points
---young E stress: in Pa, or 1MPa
---poisson NU number
-"""
-_CYCLE = """
+CYCLE = """
 --work-of-adhesion-open G work: where an edge recedes, at least that where it advances,
     --work-of-adhesion; between both it is pinned (default: the same)
 --stripes N whole: the work of adhesion varies N times along the period, about --work-of-adhesion
@@ -42,7 +33,9 @@ _CYCLE = """
 --layer D length: instead: the stiffness of a layer of this thickness, 1mm
 --load-steps N whole: (default 40)
 """
-_READING = """
+METHOD = "--method NAME text: grid, sharp or auto (default auto)"
+READING = """
+[reading a trace]
 --unit U text: unit of a text: um, or mm,um for positions and heights
 --step S length: step, for heights without positions: 0.5um
 --columns X,Z text: columns of a text, from 1; Z: heights alone
@@ -50,8 +43,7 @@ _READING = """
 --decimal text: decimal sign, if not found out
 --row K whole: row of a map, from 0
 --channel K whole: of an instrument's file, from 0
-"""
-_PREPARING = """
+[preparing a trace]
 --degree N whole: polynomial subtracted (default 1, or as is seen)
 --cut-off W length: shortest wave kept: 5um (default from step, noise and tip)
 --tip-radius R length: of the stylus or probe: 2um
@@ -61,43 +53,32 @@ _PREPARING = """
 --keep-outliers: leave spikes in
 --invert: z points into the sample: turn it
 """
-_OUTPUT = """
+ARGUMENTS = f"""
+file FILE file: text or instrument's file
+[contact and cycle]
+--work-of-adhesion G text: in J/m², or 20mJ/m2; of several (0.04,0.02,0.08) the first is the
+    answer's, the others make a table, as of several turning points
+--young E stress: in Pa, or 1MPa
+--poisson NU number
+{CYCLE}
+{METHOD}
+--accuracy number: of each loop (default 1e-3)
+{READING}
+[output]
 --to DIR file: for the page, its figures and JSON
 --plan: print the plan, and stop
 --quick: without tables of γ and turning point
 --processes N whole: side by side (default: cores)
 --quiet: no progress on stderr
 """
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis trace``."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="text or instrument's file")
-    contact = parser.add_argument_group("contact and cycle")
-    needed = {"required": True}
-    declare(contact, _MATERIAL, work_of_adhesion=needed, young=needed, poisson=needed)
-    add_cycle_arguments(contact)
-    add_method_arguments(contact, "of each loop (default 1e-3)")
-    add_reading_arguments(parser)
-    declare(parser.add_argument_group("output"), _OUTPUT)
-
-
-def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare laws of adhesion, turning points and control, which ``adhesis loop`` shares."""
-    declare(group, _CYCLE, measure={"default": "arc"}, load_steps={"default": 40})
-
-
-def add_method_arguments(group: argparse._ArgumentGroup, accuracy: str) -> None:
-    """Declare method and accuracy; ``adhesis loop`` shares them."""
-    group.add_argument(
-        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
-    )
-    group.add_argument("--accuracy", type=float, default=1e-3, help=accuracy)
-
-
-def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare how a trace is read and prepared; ``adhesis loop --trace`` shares them."""
-    reading = parser.add_argument_group("reading a trace")
-    declare(reading, _READING, decimal={"choices": [",", "."]})
-    making = parser.add_argument_group("preparing a trace")
-    declare(making, _PREPARING, exclude={"action": "append"})
+SHARED: dict[str, dict[str, Any]] = {
+    "measure": {"default": "arc"},
+    "load_steps": {"default": 40},
+    "method": {"default": "auto"},
+    "accuracy": {"default": 1e-3},
+    "decimal": {"choices": [",", "."]},
+    "exclude": {"action": "append"},
+}
+"""Details of the arguments that ``adhesis loop`` has too."""
+_NEEDED = ("work_of_adhesion", "young", "poisson")
+DETAILS = SHARED | {name: {"required": True} for name in _NEEDED}
