@@ -18,10 +18,10 @@ from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.run.dispatch import Unresponsive
-from adhesis.ensemble.trace.loops import Cycle, Loops, Result, Watch
+from adhesis.ensemble.trace.loops import Cycle, Loops, Result, Run, Watch
 from adhesis.ensemble.trace.options import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.variants import TABLES, Plan, Run, make_plan
+from adhesis.ensemble.trace.variants import TABLES, Plan, make_plan
 from adhesis.solver import checks
 from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
 from adhesis.solver.model.control import Control
@@ -275,16 +275,14 @@ class Answer(ByValue):
     @property
     def works_of_adhesion(self) -> list[tuple[float, Result]]:
         """Works of adhesion in J/m², ascending, and the numbers of their loops."""
-        first = (self.cycle.works_of_adhesion[0], self.main)
-        others = [(run.work_of_adhesion or 0.0, r) for run, r in self.group("work of adhesion")]
-        return sorted([first, *others], key=itemgetter(0))
+        runs = self.group("answer") + self.group("work of adhesion")
+        return sorted(((run.work_of_adhesion, r) for run, r in runs), key=itemgetter(0))
 
     @property
     def turning_points(self) -> list[tuple[float, Result]]:
         """Turning points, ascending, and the numbers of their loops."""
-        first = (self.cycle.turning_points[0], self.main)
-        others = [(run.turning_point or 0.0, r) for run, r in self.group("turning point")]
-        return sorted([first, *others], key=itemgetter(0))
+        runs = self.group("answer") + self.group("turning point")
+        return sorted(((run.turning_point, r) for run, r in runs), key=itemgetter(0))
 
     def change(self, name: str, quantity: str = "loss") -> float | None:
         """Relative change of a quantity in one loop against the loop that it is compared with."""
@@ -467,7 +465,7 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
     """Run a plan; see :func:`loss_of_trace`."""
     started = time.monotonic()
     try:
-        results = Loops(plan.jobs, plan.processes, plan.seconds).run(watch)
+        results = Loops(plan.runs, plan.processes, plan.seconds).run(watch)
     except Unresponsive as error:  # a process of a loop hangs
         raise NoAnswer(f"the loops could not be run to their end: {error}") from error
     main = results.get("answer")

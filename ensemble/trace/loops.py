@@ -111,22 +111,31 @@ class Cycle:
 
 
 @dataclass(frozen=True)
-class Job:
-    """Arguments of one loop: of the cycle, its own work of adhesion and turning point."""
+class Run:
+    """Loop of the answer, or one that differs from that of ``reference`` in one decision.
+
+    ``group`` is the doubt or the table to which it belongs; ``changes`` are those of its profile,
+    as :meth:`adhesis.ensemble.trace.prepare.Prepared.profile` takes them. Of the cycle it has its
+    own work of adhesion and turning point.
+    """
 
     name: str
     profile: Profile
     cycle: Cycle
     work_of_adhesion: float
     turning_point: float
+    group: str = "answer"
+    description: str = "the loop"
+    changes: dict[str, Any] = field(default_factory=dict)
+    reference: str = "answer"
 
 
-def compute(job: Job, progress: Progress | None = None) -> Result:
+def compute(run: Run, progress: Progress | None = None) -> Result:
     """Run one loop and return its numbers, and its states as lists."""
-    cycle = job.cycle
-    problem = cycle.problem(job.profile, job.work_of_adhesion)
+    cycle = run.cycle
+    problem = cycle.problem(run.profile, run.work_of_adhesion)
     method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
-    turn = turn_arguments(cycle.control, job.turning_point, cycle.at_preload, cycle.latest)
+    turn = turn_arguments(cycle.control, run.turning_point, cycle.at_preload, cycle.latest)
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
     drops = loop.loss_from_drops - loop.closing_drop
     return loop.numbers() | {
@@ -140,32 +149,32 @@ def compute(job: Job, progress: Progress | None = None) -> Result:
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),
         "small_scale_share": loop.drops(small_scale=True) / drops if drops > 0 else 0.0,
-        "waves": job.profile.highest_harmonic,
+        "waves": run.profile.highest_harmonic,
         "states": {name: values.tolist() for name, values in loop.columns().items()},
     }
 
 
-def _compute(jobs: Sequence[Job], task: int, check: StopCheck) -> Result:
-    """Run a job as the hand-out asks for it."""
-    return compute(jobs[task], lambda branch, drive, _: check((branch, drive)))
+def _compute(runs: Sequence[Run], task: int, check: StopCheck) -> Result:
+    """Run a loop as the hand-out asks for it."""
+    return compute(runs[task], lambda branch, drive, _: check((branch, drive)))
 
 
 class Loops:
     """Loops of a plan in processes, the longest first; 0 processes run them in this one.
 
-    ``seconds`` are expected, by job name. ``done`` holds the result by job name, the error text of
-    a failed loop; ``pids`` the ids of the processes.
+    ``seconds`` are expected, by name. ``done`` holds the result by name, the error text of a failed
+    loop; ``pids`` the ids of the processes.
     """
 
     def __init__(
-        self, jobs: Sequence[Job], processes: int, seconds: Mapping[str, float] | None = None
+        self, runs: Sequence[Run], processes: int, seconds: Mapping[str, float] | None = None
     ) -> None:
-        self._jobs = tuple(jobs)
-        self.count = len(self._jobs)
+        self._runs = tuple(runs)
+        self.count = len(self._runs)
         self.processes = min(processes, self.count)
         self.done: dict[str, Result | str] = {}
         self.pids: list[int] = []
-        expected = [(seconds or {}).get(job.name, 1.0) for job in self._jobs]
+        expected = [(seconds or {}).get(run.name, 1.0) for run in self._runs]
         priors: dict[Hashable, float] = dict(enumerate(expected))
         tasks = range(self.count)
         self._schedule = Schedule(tasks, dict(enumerate(tasks)), priors, dict.fromkeys(tasks, 0))
@@ -179,15 +188,15 @@ class Loops:
 
     @property
     def running(self) -> dict[str, tuple[str, float]]:
-        """By job name: the branch and prescribed value reached."""
+        """By name: the branch and prescribed value reached."""
         notes = {} if self._master is None else self._master.notes
-        return {self._jobs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
+        return {self._runs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
 
     def run(
         self, watch: Watch | None = None, every: float = _REPORT_INTERVAL
     ) -> dict[str, Result | str]:
-        """Run all jobs; ``watch`` is called at this interval (s), and when a loop is done."""
-        computing, last = partial(_compute, self._jobs), -math.inf
+        """Run all loops; ``watch`` is called at this interval (s), and when a loop is done."""
+        computing, last = partial(_compute, self._runs), -math.inf
 
         def tick() -> None:
             nonlocal last
@@ -197,7 +206,7 @@ class Loops:
 
         def collect(outcome: Outcome) -> None:
             nonlocal last
-            name = self._jobs[outcome.task].name
+            name = self._runs[outcome.task].name
             # the solver's own errors are written for users, without their class
             failure = (outcome.error or "").removeprefix("PathError: ")
             self.done[name] = failure or outcome.result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
-from adhesis.ensemble.trace.loops import Cycle, Job
+from adhesis.ensemble.trace.loops import Cycle, Run
 from adhesis.ensemble.trace.options import MAX_PENETRATION
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
@@ -35,28 +35,11 @@ TABLES = ("work of adhesion", "turning point")
 _START = 2.0  # seconds for a process to start
 
 
-@dataclass(frozen=True)
-class Run:
-    """Loop of the plan: that of the answer, or one that differs from ``reference`` in one decision.
-
-    ``group`` is the doubt or the table to which it belongs.
-    """
-
-    name: str
-    group: str
-    description: str
-    changes: dict[str, Any] = field(default_factory=dict)
-    reference: str = "answer"
-    work_of_adhesion: float | None = None
-    turning_point: float | None = None
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(ByValue):
-    """Runs, jobs and expected cost."""
+    """Runs and expected cost."""
 
-    runs: tuple[Run, ...]
-    jobs: tuple[Job, ...]
+    runs: tuple[Run, ...]  # that of the answer first
     seconds: dict[str, float]  # expected CPU seconds by run
     # waves, patches: number of waves of the answer's loop, and expected number of patches
     waves: int
@@ -86,27 +69,16 @@ def make_plan(
     for this one alone.
     """
     processes = cores() if processes is None else processes
-    runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]
-    jobs, base = {}, prepared.profile()
-    for run in runs:
-        gamma, point = run.work_of_adhesion, run.turning_point
-        profile = prepared.profile(**run.changes) if run.changes else base
-        own = cycle
-        if cycle.pattern is not None:  # stripes keep their width where the period is another
-            own = replace(cycle, pattern=cycle.pattern.on_period(profile.period / base.period))
-        jobs[run.name] = Job(
-            *(run.name, profile, own),
-            cycle.works_of_adhesion[0] if gamma is None else gamma,
-            cycle.turning_points[0] if point is None else point,
-        )
-    seconds = {name: expected_seconds(job) for name, job in jobs.items()}
+    profile, gamma, point = prepared.profile(), cycle.works_of_adhesion[0], cycle.turning_points[0]
+    answer = Run("answer", profile, cycle, gamma, point)
+    runs = (answer, *_doubts(prepared, answer), *([] if quick else _tables(answer)))
+    seconds = {run.name: expected_seconds(run) for run in runs}
     wall = max(sum(seconds.values()) / max(processes, 1), max(seconds.values()))
     plan = Plan(
-        runs=tuple(runs),
-        jobs=tuple(jobs.values()),
+        runs=runs,
         seconds=seconds,
-        waves=base.highest_harmonic,
-        patches=round(expected_patches(jobs["answer"])),
+        waves=profile.highest_harmonic,
+        patches=round(expected_patches(answer)),
         processes=processes,
         wall=wall + 2 * _START,
         hints=(),
@@ -114,11 +86,11 @@ def make_plan(
     return replace(plan, hints=_hints(prepared, plan, quick))
 
 
-def _doubts(prepared: Prepared) -> list[Run]:
-    """List the answer's loop, and one for each decision that could have been made otherwise."""
+def _doubts(prepared: Prepared, answer: Run) -> list[Run]:
+    """List a loop for each decision that could have been made otherwise."""
     cut, step = prepared.cut_off, prepared.step
     length = prepared.filled.size * step
-    runs = [Run("answer", "answer", "the loop")]
+    runs = []
     # On long traces the other doubts are measured with fewer waves, all else being equal.
     factor = 1.0
     while length / (factor * cut) > _MAX_WAVES_OF_VARIANTS and factor < _LONGEST_CUT_OFF:
@@ -126,14 +98,23 @@ def _doubts(prepared: Prepared) -> list[Run]:
     base = {} if factor == 1 else {"cut_off": factor * cut}
     reference = "answer" if factor == 1 else f"cut-off × {factor:.3g}"
 
+    def add(
+        name: str, group: str, description: str, changes: dict[str, Any], reference: str = "answer"
+    ) -> None:
+        profile, cycle = prepared.profile(**changes), answer.cycle
+        if cycle.pattern is not None:  # stripes keep their width where the period is another
+            longer = profile.period / answer.profile.period
+            cycle = replace(cycle, pattern=cycle.pattern.on_period(longer))
+        run = replace(answer, name=name, group=group, description=description, changes=changes)
+        runs.append(replace(run, profile=profile, cycle=cycle, reference=reference))
+
     def variant(name: str, group: str, description: str, **changes: Any) -> None:
-        runs.append(Run(name, group, description, base | changes, reference))
+        add(name, group, description, base | changes, reference)
 
     for longer in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0), 1 / math.sqrt(2.0)):
         if longer * cut <= length / 4 if longer > 1 else longer * cut >= 2.5 * step:
             described = f"waves down to {length_text(longer * cut)}"
-            shortest = {"cut_off": longer * cut}
-            runs.append(Run(f"cut-off × {longer:.3g}", "cut-off", described, shortest))
+            add(f"cut-off × {longer:.3g}", "cut-off", described, {"cut_off": longer * cut})
     variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
     for part in (0.05, 0.1):
         faded = f"both ends faded to the mean over {100 * part:.0f} %"
@@ -150,25 +131,28 @@ def _doubts(prepared: Prepared) -> list[Run]:
     if prepared.spectrum.noise > 0:
         described = "white noise of the instrument's size added"
         for seed in (1, 2) if factor == 1 else (1,):
-            runs.append(Run(f"noise {seed}", "noise", described, {"noise_seed": seed}))
+            add(f"noise {seed}", "noise", described, {"noise_seed": seed})
     return runs
 
 
-def _tables(cycle: Cycle) -> list[Run]:
+def _tables(answer: Run) -> list[Run]:
+    cycle = answer.cycle
+    of_gamma = replace(answer, group="work of adhesion")
+    of_turn = replace(answer, group="turning point")
     runs = []
     for gamma in cycle.works_of_adhesion[1:]:
         name, described = f"γ {gamma:g}", f"γ = {gamma:g} J/m²"
-        runs.append(Run(name, "work of adhesion", described, work_of_adhesion=gamma))
+        runs.append(replace(of_gamma, name=name, description=described, work_of_adhesion=gamma))
     for point in cycle.turning_points[1:]:
         name, described = f"{cycle.turning.short} {point:g}", f"turning at {cycle.turn(point)}"
-        runs.append(Run(name, "turning point", described, turning_point=point))
+        runs.append(replace(of_turn, name=name, description=described, turning_point=point))
     return runs
 
 
 # ---------------------------------------------------------------------- cost
 
 
-def expected_patches(job: Job) -> float:
+def expected_patches(run: Run) -> float:
     """Estimate the largest number of patches at a time of one loop.
 
     By adhesion alone, waves up to the mean one stay apart as far as the energy of full contact,
@@ -176,15 +160,15 @@ def expected_patches(job: Job) -> float:
     self-affine profiles. There are no more than crests that a plane cuts at a time on its way to
     the turning point; where its separation is not known, those of the usual one count.
     """
-    profile, cycle = job.profile, job.cycle
+    profile, cycle = run.profile, run.cycle
     a = np.abs(profile.coefficients) ** 2
     m = np.arange(a.size)
     full = 0.5 * cycle.half_space.modulus * float(np.sum(m * profile.q0 * a))
     longest = float(np.sum(m * a) / np.sum(a))
-    ratio = max(job.work_of_adhesion / full, 1e-3)
+    ratio = max(run.work_of_adhesion / full, 1e-3)
     by_adhesion = np.clip(1.2 * longest * ratio**-0.7, 1.0, 4 * profile.highest_harmonic)
     is_known = cycle.control.is_fixed and not cycle.at_preload
-    penetration = job.turning_point if is_known else MAX_PENETRATION
+    penetration = run.turning_point if is_known else MAX_PENETRATION
     heights = profile.heights(max(4 * profile.highest_harmonic, 64))
     crests = 1
     for share in np.linspace(0.0, 1.0, _LEVELS + 1)[1:]:
@@ -193,19 +177,18 @@ def expected_patches(job: Job) -> float:
     return min(float(by_adhesion), float(crests))
 
 
-def expected_seconds(job: Job) -> float:
+def expected_seconds(run: Run) -> float:
     """Estimate the CPU seconds of one loop."""
-    waves, patches = float(job.profile.highest_harmonic), expected_patches(job)
+    waves, patches = float(run.profile.highest_harmonic), expected_patches(run)
     of_patches = _SECONDS_OF_PATCH * waves**_WAVES_POWER * patches**_PATCHES_POWER
-    steps = max(job.cycle.load_steps / 40, 0.5)
+    steps = max(run.cycle.load_steps / 40, 0.5)
     return float(_LEAST_SECONDS + _SECONDS_OF_WAVE * waves + of_patches) * steps
 
 
 def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
     if plan.wall < _SECONDS_TO_HINT:
         return ()
-    (answer,) = (job for job in plan.jobs if job.name == "answer")
-    hints = []
+    answer, hints = plan.runs[0], []
     factor = 2.0
     while plan.waves / factor >= _MIN_WAVES:
         coarser = replace(answer, profile=prepared.profile(cut_off=factor * prepared.cut_off))

@@ -66,7 +66,7 @@ def test_the_table_of_a_trace_keeps_the_ratio_of_both_works_of_adhesion():
     prepared = small_trace()
     check_trace(prepared, cycle)
     plan = make_plan(prepared, cycle, processes=0)
-    problems = [cycle.problem(job.profile, job.work_of_adhesion) for job in plan.jobs]
+    problems = [cycle.problem(run.profile, run.work_of_adhesion) for run in plan.runs]
     found = {(problem.work_of_adhesion, problem.gamma_open) for problem in problems}
     assert found == {(0.04, 0.06), (0.02, 0.03), (0.08, 0.12)}
 

@@ -20,8 +20,8 @@ from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.trace import answer as answers
-from adhesis.ensemble.trace.loops import Cycle, Job, Loops
-from adhesis.ensemble.trace.loops import compute as compute_job
+from adhesis.ensemble.trace.loops import Cycle, Loops, Run
+from adhesis.ensemble.trace.loops import compute as compute_run
 from adhesis.ensemble.trace.trace_page import page_text
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
@@ -88,7 +88,7 @@ def test_the_loss_of_a_weight_says_so(tmp_path):
 def test_a_trace_doubts_a_fall_and_takes_shares_of_the_drops_before_it():
     profile, gamma, stress = rough(3, 6, 4, period=1e-3), 0.012, 2000.0
     cycle = Cycle(HALF_SPACE, (gamma,), (stress,), load_steps=5, control=Control(0.0))
-    found = compute_job(Job("answer", profile, cycle, gamma, stress))
+    found = compute_run(Run("answer", profile, cycle, gamma, stress))
     problem = Problem(profile, HALF_SPACE, gamma, Control(0.0))
     loop = loop_of(problem, "auto", max_stress=stress, load_steps=5)
     assert found["fall_warnings"] == loop.fall_warnings() != []

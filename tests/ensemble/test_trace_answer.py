@@ -38,7 +38,7 @@ from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
-from adhesis.ensemble.trace.variants import Plan, Run, make_plan
+from adhesis.ensemble.trace.variants import Plan, make_plan
 from benchmarks.trace_coverage import case, judged
 from tests.support.figures import few_figures
 from tests.support.scenes import HALF_SPACE
@@ -54,10 +54,7 @@ SAVED = "loop.png"  # the one that is laid out and written: all are by one funct
 
 def only(plan: Plan, *names: str) -> Plan:
     """Return the plan with these runs alone."""
-    runs = tuple(run for run in plan.runs if run.name in names)
-    return dataclasses.replace(
-        plan, runs=runs, jobs=tuple(job for job in plan.jobs if job.name in names)
-    )
+    return dataclasses.replace(plan, runs=tuple(run for run in plan.runs if run.name in names))
 
 
 @cache
@@ -247,11 +244,11 @@ def small_plan() -> tuple[Prepared, Any, Plan]:
 
 def spoiled(plan: Plan, name: str) -> Plan:
     """The same plan, with a loop that cannot be run."""
-    jobs = tuple(
-        dataclasses.replace(job, turning_point=2.0) if job.name == name else job
-        for job in plan.jobs
+    runs = tuple(
+        dataclasses.replace(run, turning_point=2.0) if run.name == name else run
+        for run in plan.runs
     )
-    return dataclasses.replace(plan, jobs=jobs)
+    return dataclasses.replace(plan, runs=runs)
 
 
 def test_without_adhesion_nothing_is_lost_and_no_range_is_doubted() -> None:
@@ -310,7 +307,9 @@ def with_losses(
     for name in losses:
         group = "answer" if name == "answer" else "cut-off" if "cut-off" in name else "noise"
         factor = name.partition("× ")[2] if group == "cut-off" else ""
-        runs.append(Run(name, group, "", {"cut_off": float(factor) * 10e-6} if factor else {}))
+        changes = {"cut_off": float(factor) * 10e-6} if factor else {}
+        own: Any = {"name": name, "group": group, "description": "", "changes": changes}
+        runs.append(dataclasses.replace(answer.plan.runs[0], **own))
     results = {
         name: answer.main | {"loss": loss, "range_warnings": [], "strain_warnings": [], "races": 0}
         for name, loss in losses.items()
@@ -462,7 +461,7 @@ def test_unphysical_input_is_doubted_and_zero_range_comes_first() -> None:
 
 def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     _, _, plan = small_plan()
-    loops = Loops(plan.jobs, processes=1)
+    loops = Loops(plan.runs, processes=1)
     killed: list[str] = []
 
     def watch(loops: Loops) -> None:
@@ -471,7 +470,7 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
             os.kill(loops.pids[-1], signal.SIGKILL)
 
     done = loops.run(watch, every=0.05)
-    assert set(done) == {job.name for job in plan.jobs}
+    assert set(done) == {run.name for run in plan.runs}
     failed = [name for name, found in done.items() if isinstance(found, str)]
     assert failed == killed
     assert "ended with code -9" in str(done[killed[0]])
@@ -482,7 +481,7 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
 def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
     """In what was raised, though it is of a class that loops fail with; and no process is left."""
     _, _, plan = small_plan()
-    loops = Loops(plan.jobs, processes=processes)
+    loops = Loops(plan.runs, processes=processes)
 
     def watch(loops: Loops) -> None:
         if processes == 0 or len(loops.running) == processes:
@@ -507,7 +506,7 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     plan = make_plan(found, make_cycle(HALF_SPACE, 0.001, 0.9, 40, "auto", 1e-3), processes=2)
     assert plan.text.splitlines()[0].endswith(" on 2 cores of a quiet machine")
     assert plan.waves == pytest.approx(0.95 * n / 5, rel=0.01)
-    sizes = {job.name: job.profile.highest_harmonic for job in plan.jobs}
+    sizes = {run.name: run.profile.highest_harmonic for run in plan.runs}
     assert sizes["taper 5 %"] < 8000 < sizes["answer"]
     reference = {run.name: run.reference for run in plan.runs}
     assert reference["taper 5 %"] == "cut-off × 4"
@@ -565,12 +564,12 @@ def test_turning_points_of_a_table_have_their_unit() -> None:
 def test_stripes_reach_every_loop_of_a_trace_with_their_width() -> None:
     cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-2, pattern=stripes(20, 0.3))
     trace = prepared()
-    jobs = {job.name: job for job in make_plan(trace, cycle, quick=True, processes=0).jobs}
-    periods = {name: job.profile.period for name, job in jobs.items()}
+    runs = {run.name: run for run in make_plan(trace, cycle, quick=True, processes=0).runs}
+    periods = {name: run.profile.period for name, run in runs.items()}
     assert periods["blend 10 %"] < 0.96 * periods["answer"]
     width = periods["answer"] / 20
-    for name, job in jobs.items():
-        problem = job.cycle.problem(job.profile, job.work_of_adhesion)
+    for name, run in runs.items():
+        problem = run.cycle.problem(run.profile, run.work_of_adhesion)
         assert problem.pattern.stripes[0] == round(periods[name] / width)
     found = document_of(of_the_answer_alone(cycle, trace))
     assert found["stripes"] == found["loop"]["stripes"] == 20
@@ -592,7 +591,7 @@ def test_a_range_of_a_trace_is_said_with_what_zones_at_edges_change() -> None:
 @pytest.mark.usefixtures("quick_figures")
 def test_adhesion_acts_on_the_projection_if_it_is_asked_to(tmp_path, capsys, monkeypatch):
     """The measure reaches the loops, the page and the document; an unknown one is refused."""
-    monkeypatch.setattr(answers, "Loops", lambda jobs, *_: Loops(jobs, 0))  # in this process
+    monkeypatch.setattr(answers, "Loops", lambda runs, *_: Loops(runs, 0))  # in this process
     rows = [f"{1e6 * a:.4f},{1e6 * b:.5f}" for a, b in zip(X, 5 * PROFILE.at(X), strict=True)]
     file = tmp_path / "t.csv"
     file.write_text("x (um),z (um)\n" + "\n".join(rows))

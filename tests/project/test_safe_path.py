@@ -11,14 +11,14 @@ import pytest
 
 from adhesis.ensemble.doctor import examine
 from adhesis.ensemble.run import launch
-from adhesis.ensemble.trace.loops import Cycle, Job, Loops
+from adhesis.ensemble.trace.loops import Cycle, Loops, Run
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import single_wave
 from tests.support.campaign_support import ROOT, environment, has_ended, wait_until
 
-# A job that the solver refuses: no loop turns below full penetration.
+# A loop that the solver refuses: no loop turns below full penetration.
 CYCLE = Cycle(HalfSpace(1.0, 0.5), (1.0,), (2.0,), 4, "grid")
-IMPOSSIBLE = Job("only", single_wave(0.01, 1.0), CYCLE, 1.0, 2.0)
+IMPOSSIBLE = Run("only", single_wave(0.01, 1.0), CYCLE, 1.0, 2.0)
 STRAY = ("numpy", "mpi4py", "solver", "ensemble", "h5py", "json", "pickle", "ctypes")
 
 
