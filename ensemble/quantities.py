@@ -160,10 +160,11 @@ LENGTH = Quantity(
     {
         name: unit
         for unit, names in {
-            "m": "meter meters metre metres",
-            "mm": "millimeter millimeters millimetre millimetres",
-            "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer",
-            "nm": "nanometer nanometers nanometre nanometres",
+            "m": "meter meters metre metres метр",
+            "mm": "millimeter millimeters millimetre millimetres мм 毫米",
+            "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer мкм "
+            "微米",
+            "nm": "nanometer nanometers nanometre nanometres нм 纳米",
             "Å": "a angstrom angstroms ångström angström angstroem",
             "inch": "in inches",
             "mil": "mils thou",

@@ -71,8 +71,8 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         known = _given_twice(text, str(error)) or _foreign_sign(text, str(error))
-        reason = known or " ".join(str(error).split())
-        raise InputError(f"{source} is not valid TOML: {reason}") from error
+        known = known or " ".join(str(error).split()) + _line_of(text, str(error))
+        raise InputError(f"{source} is not valid TOML: {known}") from error
     try:
         return _campaign_of(document, text)
     except InputError as error:
@@ -121,6 +121,14 @@ def _foreign_sign(text: str, error: str) -> str | None:
                     f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
                 )
     return None
+
+
+def _line_of(text: str, error: str) -> str:
+    """Return the line of an error, and how TOML writes values if it gives one; or nothing."""
+    found = re.search(r"\(at line (\d+)", error)
+    line = text.split("\n")[int(found[1]) - 1].strip() if found else ""
+    form = ', where numbers are as 0.5, and values with a unit as "2 mm"' if "=" in line else ""
+    return f" in {quoted(line)}{form}" if line else ""
 
 
 def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:

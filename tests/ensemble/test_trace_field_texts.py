@@ -70,6 +70,14 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["Pitch: 0.5 um", "a,b", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {"unit": "um"},
     ),
+    "a named count from ten on": (
+        ["Nr.;Höhe (um)", *(f"{k};{z}" for k, z in enumerate(ZS, 10))],
+        {"step": STEP},
+    ),
+    "a count without a name": (
+        [",z (um)", *(f"{k:.1f},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um", "step": STEP},
+    ),
     "a column that marks": (
         ["X;Z;valid", "[um];[um];[1/0]", *(f"{row.replace(',', ';')};1" for row in TWO)],
         {"columns": [1, 2]},
@@ -207,6 +215,16 @@ def test_positions_that_are_rounded_in_print_have_equal_steps(step, decimals, tm
         assert trace.drop_outs == 0
 
 
+@pytest.mark.parametrize("form", ["{}", "{}.0"])
+@pytest.mark.parametrize("name", ["Index", "a", ""])
+def test_points_that_a_count_leaves_out_are_drop_outs(name, form, tmp_path):
+    missing = [7, 50, 51, 90]
+    rows = [f"{form.format(k)},{z}" for k, z in enumerate(ZS) if k not in missing]
+    trace = read_trace(put(tmp_path / "t.csv", [f"{name},z (um)", *rows]), step=1e-6)
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == missing
+    assert (trace.points, trace.step) == (N, 1e-6)
+
+
 def test_a_row_left_out_between_whole_positions_is_a_gap(tmp_path: Path) -> None:
     """One longer step is a row that is left out; a step of 1.0025 would explain it as well."""
     rows = [f"{k},{z}" for k, z in enumerate(ZS)]
@@ -307,11 +325,32 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         "the first column of .* counts the points: give step",
     ),
-    "a named count from ten on": (
-        ["Nr.;Höhe (um)", *(f"{k};{z}" for k, z in enumerate(ZS, 10))],
+    "a named count that begins anew": (
+        ["Nr.;Höhe (um)", *(f"{k % 150};{z}" for k, z in enumerate(ZS))],
         {"step": STEP},
         r"does not count 1, 2, 3 .*: give columns Z, that of the heights, and step",
     ),
+    "a count without a name": (
+        [",z", *(f"{k:.1f},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        "the first column of .* may count the points: give step",
+    ),
+    "a count without a header": (
+        [f"{k},{z}" for k, z in enumerate(ZS) if k not in (7, 50, 51, 90)],
+        {"unit": "um"},
+        "the first column of .* may count the points: give step",
+    ),
+    "a factor above positions": (
+        ["1.0e-03 *", *(f"{k}.5 {z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        r"line 1 .* is '1.0e-03 \*': multiply the numbers",
+    ),
+    "pairs of decimal commas": (
+        [f"{x}, {z}".replace(".", ",") for x, z in PAIRS],
+        {"unit": "um"},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
+    "a unit and a comma": (TWO, {"unit": "um,"}, "unit is 'um,', and '' is no unit of length"),
     "a count of unknown name": (
         ["番号,高さ(um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {},
@@ -352,7 +391,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "decimal commas between commas": (
         [f"{x},{z}".replace(".", ",") for x, z in PAIRS],
         {"decimal": ",", "unit": "um"},
-        "line 1 .* '0,000,0,.*', which is no number with a decimal comma",
+        "commas can be .*: leave out decimal, or save it with semicolons",
     ),
     "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
     "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "'x': it must be one of '.', ','"),

@@ -338,7 +338,7 @@ def _table_of(
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         source = source[list(wanted)]
     has_one = len(source.columns if wanted is None else wanted) == 1
-    if has_one and source.index.dtype.kind in "iu" and len(source) > 1:
+    if has_one and source.index.dtype.kind in "iuf" and len(source) > 1:
         apart = np.diff(source.index.to_numpy(float, na_value=np.nan))
         if np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0:
             raise InputError(
@@ -397,7 +397,7 @@ def _from_table(
     row: int | None,
     form: str,
 ) -> Trace:
-    notes = [form]
+    notes, is_text = [form], form.startswith("text")
     names: Sequence[Sequence[str]]
     lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
@@ -417,13 +417,14 @@ def _from_table(
     columns[-1], gaps = without_codes(columns[-1])
     found = units_of_header(table.header, names)
     if len(columns) == 2 and found.units[0] is None:
-        first = [row[0] for row in names if re.search(r"[\w#]", row[0])]
+        first = [row[0] for row in names] or [""] * is_text
         given = _step_beside_count(name, table, first, columns[0], unit, step)
         if given is not None:
-            columns, step = columns[1:], given
-            notes.append("the first column counts the points")
-    if len(columns) == 1 and (left_out := int(np.sum(np.diff(places) - 1))):
-        notes.append(f"{counted(left_out, 'empty row')} left out")
+            step = given
+            columns, lines, left_out = _at_counts(columns, places)
+            notes.append(f"the first column counts the points{left_out}")
+    if len(columns) == 1 and (empty := int(np.sum(np.diff(places) - 1))):
+        notes.append(f"{counted(empty, 'empty row')} left out")
     (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
     heights = columns[-1] * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
@@ -461,7 +462,7 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
-    if len(columns) == 1 and form.startswith("text"):
+    if len(columns) == 1 and is_text:
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
     slope = _slope(trace.heights, trace.step)
@@ -571,8 +572,20 @@ def _scan_line(
 
 
 def _counts_points(x: Array) -> bool:
-    """Return whether a column is 0, 1, 2 … or 1, 2, 3 … in order."""
-    return bool(x.size and x[0] in (0, 1) and np.all(np.diff(x) == 1))
+    """Return whether a column holds ascending whole numbers, as 1, 2, 3 …, few of them left out."""
+    steps = np.diff(x)
+    is_whole = bool(x.size) and np.array_equal(x, np.rint(x)) and np.all(steps > 0)
+    return bool(is_whole and np.median(steps) == 1 and np.ptp(x) < 4 * x.size)
+
+
+def _at_counts(columns: Array, lines: Array) -> tuple[Array, Array, str]:
+    """Return the heights at the places that they are counted by, their lines, and a description."""
+    place = (columns[0] - columns[0, 0]).astype(int)
+    whole = np.full((2, place[-1] + 1), np.nan)
+    whole[:, place] = columns[1], lines
+    left_out = whole.shape[1] - place.size
+    about = f", {left_out} of them left out: taken as drop-outs" if left_out else ""
+    return whole[:1], whole[1], about
 
 
 def _step_beside_count(
@@ -586,9 +599,9 @@ def _step_beside_count(
     """Return the step of heights beside a column that counts the points; None for positions.
 
     It counts them if it is named so, or a step is given by the option or the header. ``names`` are
-    those of the column.
+    those of the column, an empty one if it has none; without any it holds positions.
     """
-    is_named = any(map(_COUNTS.fullmatch, names))
+    is_named = any(_COUNTS.fullmatch(text) for text in names if re.search(r"[\w#]", text))
     if not _counts_points(column):
         if not is_named:
             return None
@@ -597,11 +610,11 @@ def _step_beside_count(
             f"count 1, 2, 3 …: give {parameter('columns')} Z, that of the heights, and "
             f"{parameter('step')}, if no point is left out"
         )
-    is_foreign = bool(names) and not names_positions(names[-1])
+    is_foreign = bool(names) and not any(map(names_positions, names))
     if step is None:
         step = step_of_header(name, table.header, table.decimal, counts=is_named or is_foreign)
     if step is None and (is_named or (is_foreign and unit is not None)):
-        word = "counts" if is_named else f"({names[-1]}) may count"
+        word = "counts" if is_named else f"({names[-1]}) may count" if names[-1] else "may count"
         raise InputError(
             f"the first column of {name} {word} the points: give {parameter('step')}, as in 0.5um"
         )
@@ -614,7 +627,7 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
         below = column.size - k - 1
         for length in (step, below * step, (below - 1) * step):
             if any(abs(number * size / length - 1) < _SAME for size in LENGTH.units.values()):
-                where = f"point {k + 1}" if lines is None else f"line {lines[k]}"
+                where = f"point {k + 1}" if lines is None else f"line {lines[k]:.0f}"
                 raise InputError(
                     f"{where} of {name} is {number:g}, and the step or the length of the trace is "
                     f"{length_text(length, 6)}: remove it from the heights"

@@ -159,7 +159,8 @@ class _Reader:
     def _row(self, line: str) -> _Row | None:
         plain = line.strip()
         # "***" may be a missing number, "#N/A" is one, and "###" rules a comment off
-        if plain and plain[0] in COMMENT and not (is_missing(plain) and plain.strip("#")):
+        is_comment = plain[:1] in COMMENT and not (is_missing(plain) and plain.strip("#"))
+        if (plain and is_comment) or _FACTOR.fullmatch(line):
             return None
         fields = [plain] if is_missing(plain) else split(line, self.delimiter)
         while len(fields) > self.count and not fields[-1]:
