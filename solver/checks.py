@@ -192,11 +192,21 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
 
 
+_SI_UNITS = ("", "-", "1", "m", "meter", "meters", "metre", "metres", "Pa", "rad", None)
+
+
 def carries_unit(value: object) -> bool:
     """Return whether a value is a number or array with a unit, which NumPy would drop."""
     # The attributes of a table are its columns.
     owner = value if isinstance(value, np.ndarray) else type(value)
-    return hasattr(owner, "units") or hasattr(owner, "unit")
+    if hasattr(owner, "units") or hasattr(owner, "unit"):
+        return True
+    # Of pandas, perhaps by column, and xarray; an SI unit is that of the numbers.
+    attributes = getattr(value, "attrs", {})
+    unit = attributes.get("units", "") if isinstance(attributes, Mapping) else ""
+    if isinstance(unit, Mapping):
+        unit = unit.get(getattr(value, "name", None), "")
+    return unit not in _SI_UNITS
 
 
 def number_of(value: object) -> float | int | None:

@@ -513,9 +513,10 @@ def _cut_off(
     }
     if wanted is not None:
         if not 2.2 * trace.step <= wanted <= length / 2:
+            low, high = (length_text(end, 6) for end in (2.2 * trace.step, length / 2))
             raise InputError(
-                f"{parameter('cut_off')} is {length_text(wanted)}: it must lie between 2.2 steps "
-                f"({length_text(2.2 * trace.step)}) and half the length ({length_text(length / 2)})"
+                f"{parameter('cut_off')} is {length_text(wanted, 6)}: it must lie between 2.2 "
+                f"steps ({low}) and half the length ({high})"
             )
         if wanted < shortest * (1 - 1e-9):
             work.warnings.append(

@@ -38,7 +38,7 @@ READ: list[tuple[Quantity, str, float]] = [
 LENGTHS, WORKS = "m, cm, mm, µm, nm, Å, inch", "J/m², mJ/m², N/m, mN/m"
 IS_WORK = "it must be a number in J/m² with a decimal point, as in 0.02, or with"
 REFUSED: list[tuple[Quantity, str, str]] = [
-    (LENGTH, "", "is '': it must be a length, as in 5e-6 (m) or 5um"),
+    (LENGTH, "", "is '': it must be a length, as in 5e-6 (m) or 0.5um"),
     (LENGTH, "5 parsec", f"is '5 parsec': its unit must be one of {LENGTHS}"),
     (LENGTH, "9" * 400 + "x", "…': its unit must be one of m, cm"),
     (LENGTH, "20", "which would be 20 m: give its unit, as in 20um (20m, if metres are meant)"),

@@ -335,8 +335,8 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         "the first column of .* may count the points: give step",
     ),
-    "a count without a header": (
-        [f"{k},{z}" for k, z in enumerate(ZS) if k not in (7, 50, 51, 90)],
+    "a count without a name, with gaps": (
+        ['"","z"', *(f'"{k}",{z}' for k, z in enumerate(ZS) if k not in (7, 50, 51, 90))],
         {"unit": "um"},
         "the first column of .* may count the points: give step",
     ),

@@ -346,7 +346,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     ),
     "one number or two": ([f"{k % 7},{k % 3}" for k in range(99)], {"unit": "um"}, "give decimal"),
     "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),
-    "flat": ([f"{k}.5 1.0" for k in range(99)], {"unit": "um"}, "flat trace has no loss"),
+    "flat": ([f"{k} 1.0" for k in range(99)], {"unit": "um"}, "flat trace has no loss"),
 }
 
 

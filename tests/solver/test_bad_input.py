@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import adhesis
 from adhesis import (
@@ -171,6 +172,20 @@ def test_whatever_is_a_number_is_taken_as_one(two: Any) -> None:
     assert check_cycle(0.5, two, Control()) == (0.5, 2)
 
 
+def labelled(units: object) -> pd.Series:
+    """Return a column of a table whose attributes state units."""
+    column = pd.Series([1e-6, 0.0, 2e-6, 0.0], name="z")
+    column.attrs["units"] = units
+    return column
+
+
+@pytest.mark.parametrize("units", ["m", "", {"z": "m"}, {"x": "um"}])
+def test_a_column_in_si_units_is_a_row_of_numbers(units: object) -> None:
+    column = labelled(units)
+    assert profile_from_heights(column, PERIOD) == profile_from_heights(column.array, PERIOD)
+    assert np.array_equal(checks.row("heights", xr.DataArray(column)), column)
+
+
 MASKED = np.ma.array([1.0, 2.0, 4.0], mask=[False, True, False])
 ROWS: list[tuple[Any, type[Exception], str]] = [
     (MASKED, ValueError, "[1] is masked (1 in all): every"),
@@ -180,6 +195,9 @@ ROWS: list[tuple[Any, type[Exception], str]] = [
     (np.array([True, False, True]), TypeError, " holds booleans: every"),
     (np.array(["1", "2", "3"]), TypeError, " holds texts: every"),
     (np.array([0.0, 0.5]).view(WithUnit), TypeError, " carries a unit, which would be lost"),
+    (labelled("um"), TypeError, " carries a unit, which would be lost"),
+    (labelled({"z": "um"}), TypeError, " carries a unit, which would be lost"),
+    (xr.DataArray([0.0, 0.5], attrs={"units": "um"}), TypeError, " carries a unit, which would"),
     (["0", "1", "2"], TypeError, "[0] is '0': it must be a real number"),
     ([0.0, None, 2.0], TypeError, "[1] is None: it must be a real number"),
     (np.array([0.0, None, 2.0]), TypeError, "[1] is None: it must be a real number"),

@@ -397,7 +397,7 @@ def _from_table(
     row: int | None,
     form: str,
 ) -> Trace:
-    notes, is_text = [form], form.startswith("text")
+    notes = [form]
     names: Sequence[Sequence[str]]
     lines: Array | None
     if row is not None and wanted is None and len(table.filled) > 2:
@@ -417,7 +417,7 @@ def _from_table(
     columns[-1], gaps = without_codes(columns[-1])
     found = units_of_header(table.header, names)
     if len(columns) == 2 and found.units[0] is None:
-        first = [row[0] for row in names] or [""] * is_text
+        first = [row[0] for row in names]
         given = _step_beside_count(name, table, first, columns[0], unit, step)
         if given is not None:
             step = given
@@ -462,7 +462,7 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
-    if len(columns) == 1 and is_text:
+    if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))
     slope = _slope(trace.heights, trace.step)
@@ -599,7 +599,7 @@ def _step_beside_count(
     """Return the step of heights beside a column that counts the points; None for positions.
 
     It counts them if it is named so, or a step is given by the option or the header. ``names`` are
-    those of the column, an empty one if it has none; without any it holds positions.
+    those of the column, of which one may be empty; without any it holds positions.
     """
     is_named = any(_COUNTS.fullmatch(text) for text in names if re.search(r"[\w#]", text))
     if not _counts_points(column):
