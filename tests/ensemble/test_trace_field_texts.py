@@ -350,6 +350,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         r"give decimal \. if they are delimiters, or save it with semicolons",
     ),
+    "triples of decimal commas": (
+        [f"{x},0.5,{z.strip('-')}".replace(".", ",") for x, z in PAIRS],
+        {"unit": "um", "columns": [1, 3]},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
     "a unit and a comma": (TWO, {"unit": "um,"}, "unit is 'um,', and '' is no unit of length"),
     "a count of unknown name": (
         ["番号,高さ(um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],

@@ -24,7 +24,8 @@ _PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE) 
 _FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 # "0,5,1,3" and "0,5, 1,3": four numbers, or two
-_PAIR = re.compile(r'[^,."\s]*,[^,."\s]*,\s?[^,."\s]*,[^,."\s]*')
+_DECIMALS = r"\d*(?:e[+\-]?\d+)?"
+_PAIRS = re.compile(rf'\s*[^,."\s]*,{_DECIMALS}(?:,\s?[^,."\s]*,{_DECIMALS})+\s*', re.IGNORECASE)
 _MOSTLY = 0.8  # share of the lines in which a delimiter stands
 _EXPONENT = re.compile(r"(?<=[\d.])\s*[eEdD](?=\s*[+\-]?\d)")
 
@@ -142,7 +143,7 @@ def find_form(
         _refuse_two_ways(source, sample[0], f"leave out {parameter('decimal')}")
     if most and others and best[0] in ", ":
         return _one_comma(sample) or _refuse_two_ways(source, sample[0])
-    if decimal is None and best[0] == "," and all(_PAIR.fullmatch(line.strip()) for line in sample):
+    if decimal is None and best[0] == "," and all(map(_PAIRS.fullmatch, sample)):
         _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
 
