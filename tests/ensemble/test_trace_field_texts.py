@@ -165,7 +165,7 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
     assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
     long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
     with pytest.raises(
-        InputError, match=r"gap of 30\.5 µm .*; 60 heights marked 0 in column 3 \(va"
+        InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"
     ):
         prepare_trace(long)
 
