@@ -17,7 +17,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from adhesis.ensemble.errors import InputError, UnitError, quoted
+from adhesis.ensemble.errors import InputError, UnitError, parameter, quoted
 
 _NUMBER = r"\s*([+\-]?(?:\d+\.?\d*|\.\d+)(?:e[+\-]?\d+)?)\s*"
 _WORD = r"[^\W\d_]+"
@@ -86,7 +86,7 @@ class Quantity:
         unit = self.spellings.get(self._compared(name))
         if unit is None:
             raise InputError(
-                f"{name!r} is no unit of {self.name}: it must be one of {', '.join(self.units)}"
+                f"{parameter('unit')} is {quoted(name)}: it must be one of {', '.join(self.units)}"
             )
         return unit
 

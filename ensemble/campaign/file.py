@@ -70,9 +70,8 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        known = _given_twice(text, str(error)) or _foreign_sign(text, str(error))
-        known = known or " ".join(str(error).split()) + _line_of(text, str(error))
-        raise InputError(f"{source} is not valid TOML: {known}") from error
+        reason = _explained(text, " ".join(str(error).split()))
+        raise InputError(f"{source} is not valid TOML: {reason}") from error
     try:
         return _campaign_of(document, text)
     except InputError as error:
@@ -105,14 +104,17 @@ _PLAIN = {
 }
 
 
-def _foreign_sign(text: str, error: str) -> str | None:
-    """Return the sign on the line of an error that TOML has another one for, or None."""
+def _explained(text: str, error: str) -> str:
+    """Return an error of TOML's reader with its line, or the sign there that TOML has another for.
+
+    A line that gives a value is followed by how TOML writes values.
+    """
     found = re.search(r"\(at line (\d+)", error)
-    for number, line in enumerate(text.split("\n"), 1):
-        if found is not None and number != int(found[1]):
-            continue
+    lines = text.replace("\r\n", "\n").rstrip(" \t\n").split("\n")
+    for number in [int(found[1])] if found else range(1, len(lines) + 1):
         # Quoted texts and comments may hold any sign.
-        bare = re.sub(r'"[^"]*"|\'[^\']*\'|#.*', lambda found: " " * len(found[0]), line)
+        hidden = re.compile(r'"[^"]*"|\'[^\']*\'|#.*')
+        bare = hidden.sub(lambda found: " " * len(found[0]), lines[number - 1])
         for column, sign in enumerate(bare, 1):
             if sign in _PLAIN:
                 shown = sign if sign.isprintable() and not sign.isspace() else "a blank"
@@ -120,15 +122,11 @@ def _foreign_sign(text: str, error: str) -> str | None:
                     f"line {number}, column {column} holds {shown} (U+{ord(sign):04X}), where TOML "
                     f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
                 )
-    return None
-
-
-def _line_of(text: str, error: str) -> str:
-    """Return the line of an error, and how TOML writes values if it gives one; or nothing."""
-    found = re.search(r"\(at line (\d+)", error)
-    line = text.split("\n")[int(found[1]) - 1].strip() if found else ""
+    line = quoted(lines[int(found[1]) - 1 if found else -1].strip())
+    if error.startswith("Cannot overwrite a value"):
+        return f"{error} in {line}, whose key is given before, so remove one of the two"
     form = ', where numbers are as 0.5, and values with a unit as "2 mm"' if "=" in line else ""
-    return f" in {quoted(line)}{form}" if line else ""
+    return f"{error} in {line}{form}"
 
 
 def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
@@ -137,18 +135,6 @@ def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
             f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
             "results file keeps its text"
         )
-
-
-def _given_twice(text: str, error: str) -> str | None:
-    """Return what the error of TOML's reader means by a value that cannot be overwritten."""
-    found = re.match(r"Cannot overwrite a value \(at (?:line (\d+)|end of document)", error)
-    if found is None:
-        return None
-    lines = text.rstrip().splitlines()
-    lines = lines[: int(found[1])] if found[1] else lines
-    number = max((n for n, line in enumerate(lines, 1) if "=" in line), default=0)
-    key = lines[number - 1].partition("=")[0].strip()
-    return f"the key {key} on line {number} is given before, so remove one of the two"
 
 
 def _read_table(

@@ -145,7 +145,7 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
     "nan": ([*METRES[:5], "nan", *METRES[5:]], {}, "has no finite height on line 6: --heights"),
     "overflow": ([*METRES[:5], "-1e400", *METRES[5:]], {}, "has no finite height on line 6"),
-    "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "has no finite height on line 6"),
+    "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "on line 6: .* in a file$"),
     "nan at the beginning": (["1", "nan", *METRES], {}, "has no finite height on line 2"),
     "a code": (
         [*NM[:5], "-9999", *NM[5:]],

@@ -164,9 +164,7 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
     trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
     assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
     long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
-    with pytest.raises(
-        InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"
-    ):
+    with pytest.raises(InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"):
         prepare_trace(long)
 
 
@@ -253,7 +251,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
     "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402; .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
-    "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends"),
+    "two blocks with blank lines": (
+        ["z (um)", *ZS, "", "", *ZS],
+        Z_UM,
+        "unevenly at 1 place, the first on line 402: write NaN where one is a row, remove the",
+    ),
     "a shorter block below": ([UM, *TWO, "Raw", *ZS], {}, "line 402 .* follow on line 403"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
     "brackets for minus": (
@@ -355,14 +357,19 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um", "columns": [1, 3]},
         r"give decimal \. if they are delimiters, or save it with semicolons",
     ),
-    "a unit and a comma": (TWO, {"unit": "um,"}, "unit is 'um,', and '' is no unit of length"),
+    "a unit and a comma": (TWO, {"unit": "um,"}, "unit is '': it must be one of m, cm, mm"),
     "a count of unknown name": (
         ["番号,高さ(um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {},
         "heights alone: give unit X,Z, .*, or step if the first column counts the points",
     ),
-    "figures below heights": (["z (um)", *ZS, "", *ZS[:2]], Z_UM, "line 402 .* at most 3 rows"),
-    "blocks divided by dashes": (["z (um)", *ZS, "-----", *ZS], Z_UM, "line 402 .* and divides"),
+    "figures below heights": (["z (um)", *ZS, "", *ZS[:2]], Z_UM, "1 place, .* 402: write NaN"),
+    "equal parts between dashes": (
+        [*ZS[:99], "--", *ZS[:99], "--", *ZS[:99]],
+        Z_UM,
+        "line 100 .* which may divide two profiles: write NaN if a height",
+    ),
+    "blocks divided by dashes": (["z (um)", *ZS, "-----", *ZS], Z_UM, "line 402 .* may divide"),
     "a count below two columns": ([UM, *TWO, "400"], {}, "line 402 .* has '400', at the end"),
     "a last height cut off": ([UM, *TWO[:-1], TWO[-1][:-1]], {}, "line 401 .* or was cut off"),
     "a last exponent cut off": (

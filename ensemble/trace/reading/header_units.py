@@ -114,10 +114,7 @@ def parse_units(text: str) -> tuple[str, str]:
         raise InputError(
             f"{parameter('unit')} is {text!r}: one unit for both columns, or two as in mm,um"
         )
-    try:
-        return LENGTH.unit_named(words[0]), LENGTH.unit_named(words[-1])
-    except InputError as error:
-        raise InputError(f"{parameter('unit')} is {text!r}, and {error}") from None
+    return LENGTH.unit_named(words[0]), LENGTH.unit_named(words[-1])
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from adhesis.ensemble.trace.reading.header_units import (
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
 from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
-from adhesis.ensemble.trace.reading.text_table import Table, read_table
+from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
@@ -408,7 +408,7 @@ def _from_table(
         columns, lines = _scan_line(name, columns, lines, row, notes)
         places = lines
     if len(columns) == 1:
-        _refuse_uneven_rows(name, places)
+        refuse_uneven_rows(name, places, has_others=len(table.filled) > 1)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -436,11 +436,6 @@ def _from_table(
         )
     if gaps:
         notes.append(gaps)
-    if table.empty_lines:
-        notes.append(
-            f"{counted(len(table.empty_lines), 'empty line')} taken for missing heights, the first "
-            f"on line {table.empty_lines[0]}"
-        )
     if len(columns) == 2:
         if step is not None:
             raise InputError(
@@ -529,20 +524,6 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     return table.columns[list(table.filled), row].reshape(1, -1)
 
 
-def _refuse_uneven_rows(name: str, lines: Array) -> None:
-    """Refuse empty lines here and there between rows that have their places by their order."""
-    apart = np.diff(lines)
-    usual = np.bincount(apart, minlength=1).argmax()
-    odd = np.flatnonzero(apart != usual)
-    if odd.size:
-        line = lines[odd[0]] + min(usual, apart[odd[0]])
-        raise InputError(
-            f"the rows of {name} have no positions, and empty lines divide them unevenly at "
-            f"{counted(odd.size, 'place')}, the first on line {line}: write NaN where one is a "
-            f"row, remove the others, or give {parameter('columns')} X,Z, if there are positions"
-        )
-
-
 def _scan_line(
     name: str, columns: Array, lines: Array, row: int | None, notes: list[str]
 ) -> tuple[Array, Array]:
@@ -574,8 +555,8 @@ def _scan_line(
 def _counts_points(x: Array) -> bool:
     """Return whether a column holds ascending whole numbers, as 1, 2, 3 …, few of them left out."""
     steps = np.diff(x)
-    is_whole = bool(x.size) and np.array_equal(x, np.rint(x)) and np.all(steps > 0)
-    return bool(is_whole and np.median(steps) == 1 and np.ptp(x) < 4 * x.size)
+    counts = np.array_equal(x, np.rint(x)) and np.all(steps > 0) and np.median(steps) == 1
+    return bool(counts and np.ptp(x) < 4 * x.size)
 
 
 def _at_counts(columns: Array, lines: Array) -> tuple[Array, Array, str]:
