@@ -414,6 +414,29 @@ def reals(name: str, values: object) -> NDArray[np.float64]:
     return np.asarray(array, dtype=np.float64)
 
 
+def check_index(name: str, values: Any) -> None:
+    """Raise ValueError if a column of pandas, or a row of xarray, has rows left out or moved.
+
+    Its numeric index then has unequal steps; other objects pass.
+    """
+    indexes = getattr(values, "indexes", None)  # of xarray, by dimension
+    index = (
+        getattr(values, "index", None) if indexes is None else next(iter(indexes.values()), None)
+    )
+    kind = getattr(getattr(index, "dtype", None), "kind", None)
+    if index is None or kind not in ("i", "u", "f"):
+        return
+    apart = np.diff(index.to_numpy(float, na_value=np.nan))
+    if apart.size and (
+        np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0
+    ):
+        raise ValueError(
+            f"the index of {name} leaves rows out, or has another order, and the heights have no "
+            "positions: put the rows in with NaN (reindex), or number them anew "
+            "(reset_index(drop=True))"
+        )
+
+
 def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np.float64]:
     """Return a row of finite numbers, as :func:`row`; ValueError if one is not finite."""
     array = row(name, values, entry=entry)

@@ -319,7 +319,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit is mm for the pos"),
     "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* is no map, as"),
     "two rows": ([UM, "1;2", "2;3"], {}, "holds 2 rows of numbers"),
-    "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
+    "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "unit is 'furlong': it must be one of m"),
     "kilometres": ([UM.replace("µm", "m"), *rows(";", ".")], {}, "m long: is its unit right"),
     "heights in mm, positions in µm": (rows(" ", "."), {"unit": "um,mm"}, "in the same unit"),
     "words within": ([UM, *rows(";", ".")[:50], "pause", *rows(";", ".")[50:]], {}, "line 52 of"),

@@ -57,6 +57,7 @@ SPECTRUM: dict[str, Any] = {
     "seed": 1,
     "h_rms": 1e-6,
 }
+LEFT_OUT = pd.Series(range(9), index=range(9), dtype=float).drop(4)
 TRACE = Trace(self_affine_profile(**SPECTRUM).heights(400), 5e-6, "t.csv")
 
 
@@ -332,6 +333,8 @@ Problem(WAVE, SOLID, 0.004, pattern=0.3) -> TypeError: pattern is 0.3
 # profiles
 profile_from_heights([2.0, 2.0, 2.0], 1.0) -> ValueError: the profile is flat (h_max = 0)
 profile_from_heights([1.0, 2.0], 1.0) -> ValueError: heights hold 2 value(s): at least 3
+profile_from_heights(LEFT_OUT, 1.0) -> ValueError: the index of heights leaves rows out, or has
+profile_from_heights(xr.DataArray(LEFT_OUT), 1.0) -> ValueError: the index of heights leaves rows
 profile_from_heights([0.0, 1e+200, 0.0], 1.0) -> ValueError: largest height is 1e+200: it must be
 profile_from_heights([0.0, 1e-200, 0.0], 1.0) -> ValueError: largest coefficient is 3.3
 profile_from_heights([1, 2j, 3], 1.0) -> TypeError: heights[1] is 2j: it must be a real number
@@ -399,6 +402,7 @@ prepare_trace(TRACE, exclude=[(1.0,)]) -> TypeError: it must hold pairs of posit
 prepare_trace(TRACE, invert='yes') -> TypeError: invert is 'yes': it must be True or False
 prepare_trace(TRACE, keep_outliers=1) -> TypeError: keep_outliers is 1: it must be True or
 replace(TRACE, heights=np.full(400, np.nan)) -> InputError: t.csv holds 0 heights: at least 32
+Trace(LEFT_OUT, 1e-6) -> InputError: the index of array leaves rows out, or has another order
 Trace(['a'] * 99, 1e-06) -> InputError: array holds <U1 of 1 dimensions
 replace(TRACE, step='5um') -> TypeError: step is '5um': it must be a pos
 read_trace(3) -> TypeError: source is 3: it must be a path

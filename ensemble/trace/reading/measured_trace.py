@@ -298,6 +298,8 @@ def load_array(source: Source) -> Array:
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
     _refuse_units(name, values)
+    with refused_as_input():
+        checks.check_index(name, values)
     try:
         array = np.ma.asarray(values)
     except ValueError as error:
@@ -337,15 +339,9 @@ def _table_of(
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         source = source[list(wanted)]
-    has_one = len(source.columns if wanted is None else wanted) == 1
-    if has_one and source.index.dtype.kind in "iuf" and len(source) > 1:
-        apart = np.diff(source.index.to_numpy(float, na_value=np.nan))
-        if np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0:
-            raise InputError(
-                "the index of the table leaves rows out, or has another order, and the heights "
-                "have no positions: put the rows in with NaN (reindex), or number them anew "
-                "(reset_index(drop=True))"
-            )
+    if len(source.columns if wanted is None else wanted) == 1:
+        with refused_as_input():
+            checks.check_index("the table", source)
     units = source.attrs.get("units", {})
     if not isinstance(units, Mapping):
         raise InputError(
