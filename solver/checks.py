@@ -419,12 +419,11 @@ def check_index(name: str, values: Any) -> None:
 
     Its numeric index then has unequal steps; other objects pass.
     """
-    indexes = getattr(values, "indexes", None)  # of xarray, by dimension
-    index = (
-        getattr(values, "index", None) if indexes is None else next(iter(indexes.values()), None)
-    )
-    kind = getattr(getattr(index, "dtype", None), "kind", None)
-    if index is None or kind not in ("i", "u", "f"):
+    if hasattr(values, "iloc"):  # which tables and columns of pandas have
+        index = values.index
+    else:
+        index = next(iter(getattr(values, "indexes", {}).values()), None)
+    if index is None or index.dtype.kind not in ("i", "u", "f"):
         return
     apart = np.diff(index.to_numpy(float, na_value=np.nan))
     if apart.size and (
