@@ -342,6 +342,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         "the first column of .* may count the points: give step",
     ),
+    "a count by two without a name": (
+        [",z", *(f"{2 * k},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        r"may be one that counts the points, and does not count 1, 2, 3 .*: give columns Z, that",
+    ),
     "a factor above positions": (
         ["1.0e-03 *", *(f"{k}.5 {z}" for k, z in enumerate(ZS))],
         {"unit": "um"},

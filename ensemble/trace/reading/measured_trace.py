@@ -580,12 +580,15 @@ def _step_beside_count(
     """
     is_named = any(_COUNTS.fullmatch(text) for text in names if re.search(r"[\w#]", text))
     if not _counts_points(column):
-        if not is_named:
+        # As R and pandas write the numbers of rows.
+        is_unnamed = names and not any(names) and np.array_equal(column, np.rint(column))
+        if not is_named and not is_unnamed:
             return None
+        word = "is named as" if is_named else "may be"
         raise InputError(
-            f"the first column of {name} is named as one that counts the points, and does not "
-            f"count 1, 2, 3 …: give {parameter('columns')} Z, that of the heights, and "
-            f"{parameter('step')}, if no point is left out"
+            f"the first column of {name} {word} one that counts the points, and does not count 1, "
+            f"2, 3 …: give {parameter('columns')} Z, that of the heights, and {parameter('step')}, "
+            "if no point is left out"
         )
     is_foreign = bool(names) and not any(map(names_positions, names))
     if step is None:
