@@ -287,11 +287,8 @@ def load_array(source: Source) -> Array:
     try:
         with source.open() as stream:
             table: Any = np.load(stream, allow_pickle=False)
-            is_array = isinstance(table, np.ndarray)
     except (OSError, ValueError, EOFError, MemoryError, SyntaxError, TypeError) as error:
         raise InputError(f"{source} is no .npy of numbers: {reason(error)}") from None
-    if not is_array:
-        raise InputError(f"{source} is an archive of arrays: save the one of the heights as .npy")
     return _numbers(source.name, table)
 
 
