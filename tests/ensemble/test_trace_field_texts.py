@@ -29,6 +29,7 @@ Z = 1e-6 * np.array(ZS, dtype=float)
 PAIRS = list(zip(XS, ZS, strict=True))
 UM = "x (um),z (um)"
 TWO = [f"{x},{z}" for x, z in PAIRS]
+RU = [row.replace(",", ";").replace(".", ",") for row in TWO]
 
 
 def grouped(sign: str) -> list[str]:
@@ -74,6 +75,7 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["Nr.;Höhe (um)", *(f"{k};{z}" for k, z in enumerate(ZS, 10))],
         {"step": STEP},
     ),
+    "names and units in Cyrillic": (["Расстояние, мкм;Высота, мкм", *RU], {}),
     "a count without a name": (
         [",z (um)", *(f"{k:.1f},{z}" for k, z in enumerate(ZS))],
         {"unit": "um", "step": STEP},
@@ -141,6 +143,7 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "12.5", 51: "12.5", 52: "12.5", 200: "-13.5", 201: "-13.5", 202: "-13.5"}, 6),
         ({50: "-9.99", 200: "9.99"}, 2),
         ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
+        ({k: ("0.00", "0.11")[k % 2] for k in (50, 61, 70, 81, 90, 101)}, 0),  # rounded heights
     ],
 )
 def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
