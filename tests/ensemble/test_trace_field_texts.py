@@ -400,6 +400,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"row": 1, "step": STEP, "unit": "um"},
         "the first column of .* rises or falls throughout, as positions do",
     ),
+    "a map of four rows with their positions": (
+        [",".join([f"{k / 2}", *ZS]) for k in range(4)],
+        {"row": 1, "step": STEP, "unit": "um"},
+        "the first column of .* rises or falls throughout, as positions do",
+    ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
     "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "the decimal sign: omit"),

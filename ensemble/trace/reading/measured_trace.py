@@ -507,7 +507,8 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
         for part in line, line[1:]:
             steps = np.diff(part[np.isfinite(part)])
-            if steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0)):
+            is_even = steps.size > 2 and np.ptp(steps) <= _SAME * abs(steps[0]) > 0
+            if (steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0))) or is_even:
                 raise InputError(
                     f"the first {what} of {name} rises or falls throughout, as positions do: "
                     f"remove it, and give {parameter('step')}"
