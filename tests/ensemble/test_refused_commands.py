@@ -168,6 +168,8 @@ TRACE --unit um --to out --work-of-adhesion 0.04,0.02 --work-of-adhesion-open 0.
 TRACE --unit um --to out --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' besi
 loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --seed 1 ->
     --seed belongs to --hurst
+loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --period 2mm ->
+    --period belongs to --hurst and --heights
 trace ow/trace.md --work-of-adhesion 1 --young 1e6 --poisson 0.5 --unit um --to ow ->
     --to is ow: trace.md would be written there over ow/trace.md, the file that the command reads
 trace ow/trace.md --work-of-adhesion 1 --young 1e6 --poisson 0.5 --unit um --to linked ->
