@@ -687,7 +687,7 @@ def test_a_report_compares_and_doubts_no_loss_without_adhesion(tmp_path):
     known = [np.isfinite(cell.estimates["loss"].low) for cell in data.cells]
     assert known == [False, True]
     values["status"][~none] = 0
-    values["jump_count"][none] = 0
+    values["jump_kind"][none] = -1
     data = aggregate(write(tmp_path / "none.h5", plan, values))
     assert findings.verdict(data) == [last]
     assert "jump_energies" not in {figure.name for figure in catalogue.sections(data)["mechanisms"]}
