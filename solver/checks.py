@@ -192,7 +192,7 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
 
 
-_SI_UNITS = ("", "-", "1", "m", "meter", "meters", "metre", "metres", "Pa", "rad", None)
+_SI_UNITS = ("", "-", "1", "m", "meter", "meters", "metre", "metres", "Pa", "rad")
 
 
 def carries_unit(value: object) -> bool:
@@ -206,7 +206,7 @@ def carries_unit(value: object) -> bool:
     unit = attributes.get("units", "") if isinstance(attributes, Mapping) else ""
     if isinstance(unit, Mapping):
         unit = unit.get(getattr(value, "name", None), "")
-    return unit not in _SI_UNITS
+    return unit is not None and str(unit) not in _SI_UNITS
 
 
 def number_of(value: object) -> float | int | None:
