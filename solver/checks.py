@@ -192,7 +192,10 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
 
 
-_SI_UNITS = ("", "-", "1", "m", "meter", "meters", "metre", "metres", "Pa", "rad")
+_SI_UNITS = frozenset(
+    ("", "-", "1", "m", "meter", "meters", "metre", "metres", "m²", "m2", "m³", "1/m²", "m-2",
+     "rad", "rad/m", "Pa", "Pa/m", "Pa m-1", "N/m", "J/m", "J m-1", "J/m²", "J/m2", "J m-2", "s")
+)  # fmt: skip
 
 
 def carries_unit(value: object) -> bool:

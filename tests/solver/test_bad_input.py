@@ -35,6 +35,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.ensemble.errors import naming_options
+from adhesis.ensemble.quantities import UNITS
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, real, shown, whole
@@ -180,7 +181,7 @@ def labelled(units: object) -> pd.Series:
     return column
 
 
-@pytest.mark.parametrize("units", ["m", "", {"z": "m"}, {"x": "um"}])
+@pytest.mark.parametrize("units", [*sorted({*UNITS.values(), ""}), {"z": "m"}, {"x": "um"}])
 def test_a_column_in_si_units_is_a_row_of_numbers(units: object) -> None:
     column = labelled(units)
     assert profile_from_heights(column, PERIOD) == profile_from_heights(column.array, PERIOD)
