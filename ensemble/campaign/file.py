@@ -111,9 +111,9 @@ def _explained(text: str, error: str) -> str:
     """
     found = re.search(r"\(at line (\d+)", error)
     lines = text.replace("\r\n", "\n").rstrip(" \t\n").split("\n")
-    for number in [int(found[1])] if found else range(1, len(lines) + 1):
-        # Quoted texts and comments may hold any sign.
-        hidden = re.compile(r'"[^"]*"|\'[^\']*\'|#.*')
+    numbers = [min(int(found[1]), len(lines))] if found else range(1, len(lines) + 1)
+    hidden = re.compile(r'"[^"]*"|\'[^\']*\'|#.*')  # texts and comments may hold any sign
+    for number in numbers:
         bare = hidden.sub(lambda found: " " * len(found[0]), lines[number - 1])
         for column, sign in enumerate(bare, 1):
             if sign in _PLAIN:
@@ -122,7 +122,7 @@ def _explained(text: str, error: str) -> str:
                     f"line {number}, column {column} holds {shown} (U+{ord(sign):04X}), where TOML "
                     f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
                 )
-    line = quoted(lines[int(found[1]) - 1 if found else -1].strip())
+    line = quoted(lines[numbers[-1] - 1].strip())
     if error.startswith("Cannot overwrite a value"):
         return f"{error} in {line}, whose key is given before, so remove one of the two"
     form = ', where numbers are as 0.5, and values with a unit as "2 mm"' if "=" in line else ""

@@ -345,6 +345,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         "the first column of .* may count the points: give step",
     ),
+    "rounded positions without a unit beside their step": (
+        ["Step: 1.08 um", "x,z", *(f"{1.08 * k:.0f},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        "may be one that counts the points, and does not count 1, 2, 3 .*: give columns Z, that",
+    ),
     "a count by two without a name": (
         [",z", *(f"{2 * k},{z}" for k, z in enumerate(ZS))],
         {"unit": "um"},

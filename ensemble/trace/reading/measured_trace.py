@@ -577,10 +577,14 @@ def _step_beside_count(
     those of the column, of which one may be empty; without any it holds positions.
     """
     is_named = any(_COUNTS.fullmatch(text) for text in names if re.search(r"[\w#]", text))
-    if not _counts_points(column):
-        # As R and pandas write the numbers of rows.
+    is_foreign = bool(names) and not any(map(names_positions, names))
+    may_count, counts = is_named or is_foreign, _counts_points(column)
+    if not counts or (not may_count and np.ptp(column) >= column.size):
+        # Names are empty where R and pandas write the numbers of rows. Others that skip numbers may
+        # be rounded positions as well.
         is_unnamed = names and not any(names) and np.array_equal(column, np.rint(column))
-        if not is_named and not is_unnamed:
+        is_stated = counts and step_of_header(name, table.header, table.decimal) is not None
+        if not is_named and not is_unnamed and not is_stated:
             return None
         word = "is named as" if is_named else "may be"
         raise InputError(
@@ -588,9 +592,8 @@ def _step_beside_count(
             f"2, 3 …: give {parameter('columns')} Z, that of the heights, and {parameter('step')}, "
             "if no point is left out"
         )
-    is_foreign = bool(names) and not any(map(names_positions, names))
     if step is None:
-        step = step_of_header(name, table.header, table.decimal, counts=is_named or is_foreign)
+        step = step_of_header(name, table.header, table.decimal, counts=may_count)
     if step is None and (is_named or (is_foreign and unit is not None)):
         word = "counts" if is_named else f"({names[-1]}) may count" if names[-1] else "may count"
         raise InputError(

@@ -404,15 +404,11 @@ def refuse_uneven_rows(name: object, lines: Array, has_others: bool = False) -> 
     odd = np.flatnonzero(apart != usual)
     if odd.size:
         line = lines[odd[0]] + min(usual, apart[odd[0]])
+        mend = f", or give {parameter('columns')} X,Z, if there are positions" if has_others else ""
         raise InputError(
             f"the rows of {name} have no positions, and empty lines divide them unevenly at "
             f"{counted(odd.size, 'place')}, the first on line {line}: write NaN where one is a "
-            "row, remove the others, and keep one profile in a file"
-            + (
-                f", or give {parameter('columns')} X,Z, if there are positions"
-                if has_others
-                else ""
-            )
+            f"row, remove the others, and keep one profile in a file{mend}"
         )
 
 
