@@ -122,11 +122,12 @@ def _explained(text: str, error: str) -> str:
                     f"line {number}, column {column} holds {shown} (U+{ord(sign):04X}), where TOML "
                     f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
                 )
-    line = quoted(lines[numbers[-1] - 1].strip())
-    if error.startswith("Cannot overwrite a value"):
-        return f"{error} in {line}, whose key is given before, so remove one of the two"
-    form = ', where numbers are as 0.5, and values with a unit as "2 mm"' if "=" in line else ""
-    return f"{error} in {line}{form}"
+    line = lines[numbers[-1] - 1].strip(" \t\r")
+    if error.startswith("Cannot overwrite a value"):  # which may end lines below its key
+        line = next(line for line in reversed(lines[: numbers[-1]]) if "=" in line).strip()
+        return f"{error} in {quoted(line)}, whose key is given before, so remove one of the two"
+    form = ', where values are as 0.5, [0.5, 0.6], or "2 mm" with a unit' if "=" in line else ""
+    return f"{error} in {quoted(line)}{form}"
 
 
 def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
