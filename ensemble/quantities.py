@@ -17,7 +17,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from adhesis.ensemble.errors import InputError, UnitError, quoted
+from adhesis.ensemble.errors import InputError, UnitError, parameter, quoted
 
 _NUMBER = r"\s*([+\-]?(?:\d+\.?\d*|\.\d+)(?:e[+\-]?\d+)?)\s*"
 _WORD = r"[^\W\d_]+"
@@ -86,7 +86,7 @@ class Quantity:
         unit = self.spellings.get(self._compared(name))
         if unit is None:
             raise InputError(
-                f"{name!r} is no unit of {self.name}: it must be one of {', '.join(self.units)}"
+                f"{parameter('unit')} is {quoted(name)}: it must be one of {', '.join(self.units)}"
             )
         return unit
 
@@ -153,17 +153,18 @@ LENGTH = Quantity(
         "µin": 25.4e-9,
     },
     "2 mm",
-    "a length, as in 5e-6 (m) or 5um",
+    "a length, as in 5e-6 (m) or 0.5um",
     ("m", "mm", "µm", "nm"),
     1.0,
     "as in {0}um ({0}m, if metres are meant)",
     {
         name: unit
         for unit, names in {
-            "m": "meter meters metre metres",
-            "mm": "millimeter millimeters millimetre millimetres",
-            "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer",
-            "nm": "nanometer nanometers nanometre nanometres",
+            "m": "meter meters metre metres метр",
+            "mm": "millimeter millimeters millimetre millimetres мм 毫米",
+            "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer мкм "
+            "微米",
+            "nm": "nanometer nanometers nanometre nanometres нм 纳米",
             "Å": "a angstrom angstroms ångström angström angstroem",
             "inch": "in inches",
             "mil": "mils thou",
@@ -179,14 +180,14 @@ STRESS = Quantity(
     "stress",
     {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
     "20 kPa",
-    "a stress, as in 2e4 (Pa) or 20kPa",
+    "a stress, as in 2e4 (Pa) or 0.5kPa",
     ("GPa", "MPa", "kPa", "Pa"),
 )
 STIFFNESS = Quantity(
     "stiffness",
     {"Pa/m": 1.0, "kPa/m": 1e3, "MPa/m": 1e6, "GPa/m": 1e9},
     "2 GPa/m",
-    "a stiffness, as in 2e9 (Pa/m) or 2GPa/m",
+    "a stiffness, as in 2e9 (Pa/m) or 0.5GPa/m",
     ("Pa/m",),
 )
 WORK_OF_ADHESION = Quantity(
@@ -210,7 +211,7 @@ def drive_text(drive: float, load: bool) -> str:
 
 
 _WHOLE = re.compile(r"[+\-]?\d+")
-_DIGITS = re.compile(r"\d+(?![\d.])")
+_DIGITS = re.compile(r"(\d+)(?![\d.])(e[+\-]?\d+)?(.*)", re.IGNORECASE)
 
 
 def words_of(option: str, text: str) -> list[str]:
@@ -221,12 +222,12 @@ def words_of(option: str, text: str) -> list[str]:
     """
     words = text.split(",")
     for whole, rest in pairwise(words):
-        digits = _DIGITS.match(rest)
-        if _WHOLE.fullmatch(whole.strip()) and digits is not None:
+        found = _DIGITS.fullmatch(rest)
+        if _WHOLE.fullmatch(whole.strip()) and found is not None:
+            digits, exponent, unit = found.groups("")
             raise InputError(
-                f"{option} is {quoted(text)}: numbers have a decimal point, as in "
-                f"{whole}.{digits[0]}; if two are meant, write "
-                f"{float(whole):.1f},{float(digits[0]):.1f}"
+                f"{option} is {quoted(text)}: numbers have a decimal point, as in {whole}.{rest}; "
+                f"if two are meant, write {float(whole):.1f}{unit},{int(digits)}.0{exponent}{unit}"
             )
     return [word.strip() for word in words]
 
@@ -243,13 +244,17 @@ def read_words(
     ``rule`` says what the list must be, for a ``read`` whose ValueError has no sentence; ``text``
     is the option as it was given, if it holds more than the words.
     """
+    given = quoted(",".join(words) if text is None else text)
     try:
-        return tuple(read(word) for word in words)
+        numbers = tuple(read(word) for word in words)
     except InputError as error:
         raise InputError(f"{option} {error}") from None
     except ValueError:
-        given = quoted(",".join(words) if text is None else text)
         raise InputError(f"{option} is {given}: it must be {rule}") from None
+    *others, last = [isinstance(number, Written) for number in numbers if number] or [False]
+    if last and others and not any(others):
+        raise InputError(f"{option} is {given}: give each of the numbers its unit")
+    return numbers
 
 
 _NAMES = {

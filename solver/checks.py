@@ -192,11 +192,24 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
 
 
+_SI_UNITS = frozenset(
+    ("", "-", "1", "m", "meter", "meters", "metre", "metres", "m²", "m2", "m³", "1/m²", "m-2",
+     "rad", "rad/m", "Pa", "Pa/m", "Pa m-1", "N/m", "J/m", "J m-1", "J/m²", "J/m2", "J m-2", "s")
+)  # fmt: skip
+
+
 def carries_unit(value: object) -> bool:
     """Return whether a value is a number or array with a unit, which NumPy would drop."""
     # The attributes of a table are its columns.
     owner = value if isinstance(value, np.ndarray) else type(value)
-    return hasattr(owner, "units") or hasattr(owner, "unit")
+    if hasattr(owner, "units") or hasattr(owner, "unit"):
+        return True
+    # Of pandas, perhaps by column, and xarray; an SI unit is that of the numbers.
+    attributes = getattr(value, "attrs", {})
+    unit = attributes.get("units", "") if isinstance(attributes, Mapping) else ""
+    if isinstance(unit, Mapping):
+        unit = unit.get(getattr(value, "name", None), "")
+    return unit is not None and str(unit) not in _SI_UNITS
 
 
 def number_of(value: object) -> float | int | None:
@@ -402,6 +415,28 @@ def reals(name: str, values: object) -> NDArray[np.float64]:
     if array.dtype.kind not in "fiu":
         raise TypeError(_sentence(name, values, "a real number, or an array of them"))
     return np.asarray(array, dtype=np.float64)
+
+
+def check_index(name: str, values: Any) -> None:
+    """Raise ValueError if a column of pandas, or a row of xarray, has rows left out or moved.
+
+    Its numeric index then has unequal steps; other objects pass.
+    """
+    if hasattr(values, "iloc"):  # which tables and columns of pandas have
+        index = values.index
+    else:
+        index = next(iter(getattr(values, "indexes", {}).values()), None)
+    if index is None or index.dtype.kind not in ("i", "u", "f"):
+        return
+    apart = np.diff(index.to_numpy(float, na_value=np.nan))
+    if apart.size and (
+        np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0
+    ):
+        raise ValueError(
+            f"the index of {name} leaves rows out, or has another order, and the heights have no "
+            "positions: put the rows in with NaN (reindex), or number them anew "
+            "(reset_index(drop=True))"
+        )
 
 
 def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np.float64]:

@@ -70,8 +70,7 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        known = _given_twice(text, str(error)) or _foreign_sign(text, str(error))
-        reason = known or " ".join(str(error).split())
+        reason = _explained(text, " ".join(str(error).split()))
         raise InputError(f"{source} is not valid TOML: {reason}") from error
     try:
         return _campaign_of(document, text)
@@ -105,14 +104,17 @@ _PLAIN = {
 }
 
 
-def _foreign_sign(text: str, error: str) -> str | None:
-    """Return the sign on the line of an error that TOML has another one for, or None."""
+def _explained(text: str, error: str) -> str:
+    """Return an error of TOML's reader with its line, or the sign there that TOML has another for.
+
+    A line that gives a value is followed by how TOML writes values.
+    """
     found = re.search(r"\(at line (\d+)", error)
-    for number, line in enumerate(text.split("\n"), 1):
-        if found is not None and number != int(found[1]):
-            continue
-        # Quoted texts and comments may hold any sign.
-        bare = re.sub(r'"[^"]*"|\'[^\']*\'|#.*', lambda found: " " * len(found[0]), line)
+    lines = text.replace("\r\n", "\n").rstrip(" \t\n").split("\n")
+    numbers = [min(int(found[1]), len(lines))] if found else range(1, len(lines) + 1)
+    hidden = re.compile(r'"[^"]*"|\'[^\']*\'|#.*')  # texts and comments may hold any sign
+    for number in numbers:
+        bare = hidden.sub(lambda found: " " * len(found[0]), lines[number - 1])
         for column, sign in enumerate(bare, 1):
             if sign in _PLAIN:
                 shown = sign if sign.isprintable() and not sign.isspace() else "a blank"
@@ -120,7 +122,12 @@ def _foreign_sign(text: str, error: str) -> str | None:
                     f"line {number}, column {column} holds {shown} (U+{ord(sign):04X}), where TOML "
                     f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
                 )
-    return None
+    line = lines[numbers[-1] - 1].strip(" \t\r")
+    if error.startswith("Cannot overwrite a value"):  # which may end lines below its key
+        line = next(line for line in reversed(lines[: numbers[-1]]) if "=" in line).strip()
+        return f"{error} in {quoted(line)}, whose key is given before, so remove one of the two"
+    form = ', where values are as 0.5, [0.5, 0.6], or "2 mm" with a unit' if "=" in line else ""
+    return f"{error} in {quoted(line)}{form}"
 
 
 def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
@@ -129,18 +136,6 @@ def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
             f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
             "results file keeps its text"
         )
-
-
-def _given_twice(text: str, error: str) -> str | None:
-    """Return what the error of TOML's reader means by a value that cannot be overwritten."""
-    found = re.match(r"Cannot overwrite a value \(at (?:line (\d+)|end of document)", error)
-    if found is None:
-        return None
-    lines = text.rstrip().splitlines()
-    lines = lines[: int(found[1])] if found[1] else lines
-    number = max((n for n, line in enumerate(lines, 1) if "=" in line), default=0)
-    key = lines[number - 1].partition("=")[0].strip()
-    return f"the key {key} on line {number} is given before, so remove one of the two"
 
 
 def _read_table(

@@ -200,7 +200,10 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     if args.hurst is None:
         of_hurst = ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes")
         for option in given(args, *of_hurst, *(() if args.trace is None else ("period",))):
-            raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
+            other = " and --heights" if option == "--period" else ""
+            raise InputError(
+                f"{option} belongs to --hurst{other}: given heights are taken as they are"
+            )
     if args.trace is None:
         of_heights = () if args.heights is None else ("--unit", "--delimiter", "--decimal")
         for option in given(args):

@@ -42,7 +42,7 @@ def execute(args: argparse.Namespace) -> int:
         log(f"adhesis merge: {doubt}")
     failed = f", {merged.failed} failed" if merged.failed else ""
     print(
-        f"{out}: {merged.taken} rows taken over from {counted(len(args.parts), 'file')}; "
-        f"{merged.done} of {merged.total} tasks done{failed}"
+        f"{out}: {counted(merged.taken, 'row')} taken over from "
+        f"{counted(len(args.parts), 'file')}; {merged.done} of {merged.total} tasks done{failed}"
     )
     return 0

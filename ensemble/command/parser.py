@@ -133,7 +133,9 @@ def _number(value: str) -> float:
     try:
         return float(value)  # NaN too: the rule of the quantity refuses it
     except ValueError:
-        raise argparse.ArgumentTypeError(f"is {quoted(value)}: it must be a number") from None
+        raise argparse.ArgumentTypeError(
+            f"is {quoted(value)}: it must be a number, as in 0.5"
+        ) from None
 
 
 def within(

@@ -13,7 +13,7 @@ from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_he
 from adhesis.ensemble.trace.reading.measured_trace import load_array
 from adhesis.ensemble.trace.reading.missing_heights import without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
-from adhesis.ensemble.trace.reading.text_table import Table, read_column
+from adhesis.ensemble.trace.reading.text_table import Table, read_column, refuse_uneven_rows
 from adhesis.solver.model.profile import Array
 
 # A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
@@ -57,6 +57,7 @@ def read_heights(
     table = read_column(source, delimiter, decimal)
     if len(table.filled) > 1:
         raise InputError(_not_one_column(source, table.columns.shape[1], len(table.filled)))
+    refuse_uneven_rows(source, table.lines)
     unit = _unit_of(source, table, given)
     heights = table.columns[table.filled[0]]
     missing = np.flatnonzero(~np.isfinite(heights))

@@ -69,7 +69,7 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         if there is not None and len(there) != campaign.task_count:
             raise InputError(f"{out} is part {there.part} of its campaign itself")
         files = opened if there is None else [there, *opened]
-        doubts = [doubt for file in files for doubt in file.doubts()]
+        doubts = [doubt for part in opened for doubt in part.doubts()]
         sources, status = _assign(files, campaign, there)
         of_file = {*schema.fixed_attributes(campaign), "part", "laid_out"}
         if there is None:
@@ -81,6 +81,8 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
             raise InputError(f"{out} cannot be written: permission denied")
         if there is None or taken:
             create(out, campaign, attributes=attributes, sources=sources)
+    with Results(out) as made:
+        doubts += made.doubts()
     return Merged(
         total=status.size,
         done=int(np.sum(status == schema.DONE)),

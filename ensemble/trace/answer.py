@@ -434,7 +434,7 @@ def make_cycle(
         )
     control, turning = cycle.control, cycle.turning.parameter
     gammas, turns = given, _several(turning, turning_points)
-    if len(gammas) == 1 and gammas[0] > 0:
+    if len(gammas) == 1 and 0 < gammas[0] < np.inf:
         gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
     if len(turns) == 1:
         turns = (turns[0], *(float(f"{share * turns[0]:.6g}") for share in (1 / 3, 2 / 3)))

@@ -402,6 +402,13 @@ def _filled(
     trace, gaps = work.trace, ~np.isfinite(heights)
     if not gaps.any():
         return heights, gaps
+    share = float(gaps.mean())
+    if share > _MAX_MISSING:
+        with_these = f", with what {parameter('exclude')} removes" if excluded.any() else ""
+        raise InputError(
+            f"{trace.source} lacks {100 * share:.1f} % of its heights{with_these}: up to "
+            f"{100 * _MAX_MISSING:.0f} % may lack{_why_missing(trace)}"
+        )
     edges = np.flatnonzero(np.diff(np.concatenate([[False], gaps, [False]]).astype(int)))
     starts, ends = edges[::2], edges[1::2]
     missing = np.add.reduceat((gaps & ~excluded).astype(int), starts)
@@ -415,13 +422,6 @@ def _filled(
             f"{trace.source} has a gap of {length_text(longest_here)} at {length_text(at)}: "
             f"up to {length_text(allowed)} "
             f"is interpolated ({parameter('longest_gap')} allows more){_why_missing(trace)}"
-        )
-    share = float(gaps.mean())
-    if share > _MAX_MISSING:
-        with_these = f", with what {parameter('exclude')} removes" if excluded.any() else ""
-        raise InputError(
-            f"{trace.source} lacks {100 * share:.1f} % of its heights{with_these}: up to "
-            f"{100 * _MAX_MISSING:.0f} % may lack{_why_missing(trace)}"
         )
     index = np.arange(heights.size)
     filled = heights.copy()
@@ -513,9 +513,10 @@ def _cut_off(
     }
     if wanted is not None:
         if not 2.2 * trace.step <= wanted <= length / 2:
+            low, high = (length_text(end, 6) for end in (2.2 * trace.step, length / 2))
             raise InputError(
-                f"{parameter('cut_off')} is {length_text(wanted)}: it must lie between 2.2 steps "
-                f"({length_text(2.2 * trace.step)}) and half the length ({length_text(length / 2)})"
+                f"{parameter('cut_off')} is {length_text(wanted, 6)}: it must lie between 2.2 "
+                f"steps ({low}) and half the length ({high})"
             )
         if wanted < shortest * (1 - 1e-9):
             work.warnings.append(

@@ -32,6 +32,7 @@ from adhesis.solver.checks import (
     ROLLOFF,
     SEED,
     Bounds,
+    check_index,
     choice,
     finite_row,
     real,
@@ -460,8 +461,8 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     Raises
     ------
     ValueError
-        If the heights are not one row of at least 3 finite numbers, one of them is masked, or all
-        are equal.
+        If the heights are not one row of at least 3 finite numbers, one of them is masked, all are
+        equal, or a numeric index (of pandas, xarray) leaves some out.
     TypeError
         If they are not real numbers (booleans are not).
 
@@ -469,6 +470,7 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     ----------
     docs/theory.md, "2. Profiles"
     """
+    check_index("heights", heights)
     h = finite_row("heights", heights, entry="height")
     if h.size < 3:
         raise ValueError(f"heights hold {h.size} value(s): at least 3 are needed for one period")

@@ -131,6 +131,9 @@ max_penetration =; preload = 200; control = "load" -> a weight or a machine? For
 preload = 200; max_penetration = [0.5, 0.9] -> several values beside a preload
 preload = 200; max_penetration =; stiffness = 1e9 -> max_penetration is missing
 preload = [200, 200.0] -> a list of different values
+hurst = [0.7, 0.7000000000000001] -> a list of different values
+young = [1000000, 1000000.1] -> a list of different values
+work_of_adhesion = [0,4] -> work_of_adhesion holds 0,4: write 0.4, or 0.0, 4.0 for two
 work_of_adhesion_open = 0.02 -> _open is 0.02: it must be at least the work of adhesion, 0.04
 work_of_adhesion_open = 0.08; work_of_adhesion = [0, 0.04] ->
     must be left out, as γ is 0, in every cell
@@ -217,9 +220,19 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         ("[profile\n", "is not valid TOML"),
         (
             campaign_text().replace("n0 =", "n0 = 3\nn0 ="),
-            "is not valid TOML: the key n0 on line 4 is given before, so remove one of the two",
+            "in 'n0 = 1', whose key is given before, so remove one of the two",
         ),
-        ("[stop]\nmost = 3\nmost = 3", "the key most on line 3 is given before"),
+        ("[stop]\nmost = 3\nmost = 3", "in 'most = 3', whose key is given before"),
+        ("[sweep]\nhurst = [0,7", "in 'hurst = [0,7', where values are as 0.5, [0.5, 0.6], or"),
+        ("[sweep]\nzip = []\nzip = [\n]", "in 'zip = [', whose key is given before, so remove"),
+        ("[cycle]\r\nload_steps = 20\r\n\f\r\n", "is not valid TOML: Invalid statement"),
+        *(
+            (
+                campaign_text().replace("poisson = 0.5", f"poisson = {text}"),
+                f"in 'poisson = {text}'",
+            )
+            for text in ("0,5", ".5", "1/2", "0.5 // rubber")
+        ),
         ("x = " + "[" * 5000, "is not valid TOML"),
         ("# " + "x" * 70_000, "bytes"),
         ("", "[profile] period is missing"),

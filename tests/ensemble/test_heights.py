@@ -108,7 +108,7 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "words": ("x.csv", b"a trace\nof words\n", "holds no line of numbers"),
     "one long line": ("x.csv", b"y" * 2_000_000, "holds no line of numbers"),
     "ambiguous and long": ("x.csv", b"1,2,3,4\n" + b"1" * 999 + b",2,3,4\n" * 9, r"give decimal"),
-    "no array": ("x.npy", b"junk", r"is no \.npy of numbers"),
+    "no array": ("x.npy", b"junk", "holds no line of numbers"),
     "half an array": ("x.npy", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', '", r"is no \.npy"),
 }
 
@@ -145,7 +145,7 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
     "nan": ([*METRES[:5], "nan", *METRES[5:]], {}, "has no finite height on line 6: --heights"),
     "overflow": ([*METRES[:5], "-1e400", *METRES[5:]], {}, "has no finite height on line 6"),
-    "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "has no finite height on line 6"),
+    "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "on line 6: .* in a file$"),
     "nan at the beginning": (["1", "nan", *METRES], {}, "has no finite height on line 2"),
     "a code": (
         [*NM[:5], "-9999", *NM[5:]],

@@ -319,7 +319,7 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
         ("text.npy", np.array(["a", "b", "c"]), "heights are real numbers"),
         ("complex.npy", np.ones(4) * 1j, "heights are real numbers"),
         ("object.npy", np.array([{}, 1, 2], dtype=object), "is no .npy of numbers"),
-        ("ragged.csv", "1;2\n1\n3;4;5\n", "holds no rows of numbers of one length"),
+        ("ragged.csv", "1;2\n1\n3;4;5\n", "at least 3 of one length are needed"),
     ],
 )
 def test_files_that_are_not_one_period_of_heights_are_refused(

@@ -38,7 +38,7 @@ READ: list[tuple[Quantity, str, float]] = [
 LENGTHS, WORKS = "m, cm, mm, µm, nm, Å, inch", "J/m², mJ/m², N/m, mN/m"
 IS_WORK = "it must be a number in J/m² with a decimal point, as in 0.02, or with"
 REFUSED: list[tuple[Quantity, str, str]] = [
-    (LENGTH, "", "is '': it must be a length, as in 5e-6 (m) or 5um"),
+    (LENGTH, "", "is '': it must be a length, as in 5e-6 (m) or 0.5um"),
     (LENGTH, "5 parsec", f"is '5 parsec': its unit must be one of {LENGTHS}"),
     (LENGTH, "9" * 400 + "x", "…': its unit must be one of m, cm"),
     (LENGTH, "20", "which would be 20 m: give its unit, as in 20um (20m, if metres are meant)"),
@@ -82,7 +82,7 @@ def test_blanks_within_a_unit_and_raised_digits_make_no_quantity() -> None:
     for text in ("5 m m", "5 k Pa", "2² mm", "²2 mm", "2½ mm"):
         with pytest.raises(InputError, match="it must be a"):
             (STRESS if "Pa" in text else LENGTH).read(text)
-    with pytest.raises(InputError, match=r"'m m' is no unit of length: it must be one of m, cm"):
+    with pytest.raises(InputError, match="unit is 'm m': it must be one of m, cm"):
         LENGTH.unit_named("m m")
 
 

@@ -106,7 +106,10 @@ LOOP --max-penetration 0.5,0.5 -> turning points must differ
 LOOP --max-penetration {{0\,5,0\,3\,0\,6}} ->
     --max-penetration is '{{}}': numbers have a decimal point
 LOOP --stiffness 0 -> needs --max-stress
-LOOP --stiffness 0 --max-stress 2,5kPa -> --max-stress is '2,5kPa': numbers have a decimal point
+LOOP --stiffness 0 --max-stress 2,5kPa ->
+    as in 2.5kPa; if two are meant, write 2.0kPa,5.0kPa
+LOOP --preload 0.5,1kPa -> --preload is '0.5,1kPa': give each of the numbers its unit
+LOOP --hurst 0,8 -> --hurst is '0,8': it must be a number, as in 0.5
 LOOP --max-stress 20kPa -> a weight or a machine? For a weight give --stiffness 0 with
 LOOP --max-stress 20kPa --stiffness 1e9 -> give --preload 20kPa instead
 LOOP --preload 20kPa --stiffness 0 -> For a weight give --max-stress 20kPa with
@@ -152,6 +155,7 @@ TRACE --plan --unit um --processes 0 -> --processes is 0
 TRACE --plan --work-of-adhesion {{0\,04,0.02\,0\,04,2\,5mJ/m2}} ->
     --work-of-adhesion is '{{}}': numbers have a decimal point, as in
 TRACE --plan --work-of-adhesion 1.0,1.0 -> is '1.0,1.0': its values must
+TRACE --plan --unit um --work-of-adhesion inf -> work-of-adhesion is inf: it must be 0 or a positive
 TRACE --plan --work-of-adhesion 20mJ -> --work-of-adhesion is '20mJ': it must be a number in J/m²
 TRACE --plan --unit um --work-of-adhesion=-1 -> --work-of-adhesion is -1
 TRACE --plan --unit um --exclude 0.1:0.2:0.3mm -> it must be two positions with a colon
@@ -164,6 +168,8 @@ TRACE --unit um --to out --work-of-adhesion 0.04,0.02 --work-of-adhesion-open 0.
 TRACE --unit um --to out --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' besi
 loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --seed 1 ->
     --seed belongs to --hurst
+loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --period 2mm ->
+    --period belongs to --hurst and --heights
 trace ow/trace.md --work-of-adhesion 1 --young 1e6 --poisson 0.5 --unit um --to ow ->
     --to is ow: trace.md would be written there over ow/trace.md, the file that the command reads
 trace ow/trace.md --work-of-adhesion 1 --young 1e6 --poisson 0.5 --unit um --to linked ->

@@ -684,9 +684,13 @@ def test_a_report_compares_and_doubts_no_loss_without_adhesion(tmp_path):
     assert not any("γ = 0 " in text for text in sentences)
     assert "at most 0.01 % of it" in sentences[2]
     assert not any("WARNING" in text or "below 0 nm" in text for text in findings.quality(data))
+    known = [np.isfinite(cell.estimates["loss"].low) for cell in data.cells]
+    assert known == [False, True]
     values["status"][~none] = 0
+    values["jump_kind"][none] = -1
     data = aggregate(write(tmp_path / "none.h5", plan, values))
     assert findings.verdict(data) == [last]
+    assert "jump_energies" not in {figure.name for figure in catalogue.sections(data)["mechanisms"]}
 
 
 def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):

@@ -29,6 +29,7 @@ Z = 1e-6 * np.array(ZS, dtype=float)
 PAIRS = list(zip(XS, ZS, strict=True))
 UM = "x (um),z (um)"
 TWO = [f"{x},{z}" for x, z in PAIRS]
+RU = [row.replace(",", ";").replace(".", ",") for row in TWO]
 
 
 def grouped(sign: str) -> list[str]:
@@ -74,6 +75,15 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
     "a count of another name": (
         ["Pitch: 0.5 um", "a,b", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {"unit": "um"},
+    ),
+    "a named count from ten on": (
+        ["Nr.;Höhe (um)", *(f"{k};{z}" for k, z in enumerate(ZS, 10))],
+        {"step": STEP},
+    ),
+    "names and units in Cyrillic": (["Расстояние, мкм;Высота, мкм", *RU], {}),
+    "a count without a name": (
+        [",z (um)", *(f"{k:.1f},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um", "step": STEP},
     ),
     "a column that marks": (
         ["X;Z;valid", "[um];[um];[1/0]", *(f"{row.replace(',', ';')};1" for row in TWO)],
@@ -138,6 +148,7 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "12.5", 51: "12.5", 52: "12.5", 200: "-13.5", 201: "-13.5", 202: "-13.5"}, 6),
         ({50: "-9.99", 200: "9.99"}, 2),
         ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
+        ({k: ("0.00", "0.11")[k % 2] for k in (50, 61, 70, 81, 90, 101)}, 0),  # rounded heights
     ],
 )
 def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
@@ -161,9 +172,7 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
     trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
     assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
     long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
-    with pytest.raises(
-        InputError, match=r"gap of 30\.5 µm .*; 60 heights marked 0 in column 3 \(va"
-    ):
+    with pytest.raises(InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"):
         prepare_trace(long)
 
 
@@ -212,6 +221,16 @@ def test_positions_that_are_rounded_in_print_have_equal_steps(step, decimals, tm
         assert trace.drop_outs == 0
 
 
+@pytest.mark.parametrize("form", ["{}", "{}.0"])
+@pytest.mark.parametrize("name", ["Index", "a", ""])
+def test_points_that_a_count_leaves_out_are_drop_outs(name, form, tmp_path):
+    missing = [7, 50, 51, 90]
+    rows = [f"{form.format(k)},{z}" for k, z in enumerate(ZS) if k not in missing]
+    trace = read_trace(put(tmp_path / "t.csv", [f"{name},z (um)", *rows]), step=1e-6)
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == missing
+    assert (trace.points, trace.step) == (N, 1e-6)
+
+
 def test_a_row_left_out_between_whole_positions_is_a_gap(tmp_path: Path) -> None:
     """One longer step is a row that is left out; a step of 1.0025 would explain it as well."""
     rows = [f"{k},{z}" for k, z in enumerate(ZS)]
@@ -240,7 +259,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
     "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402; .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
-    "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends"),
+    "two blocks with blank lines": (
+        ["z (um)", *ZS, "", "", *ZS],
+        Z_UM,
+        "unevenly at 1 place, the first on line 402: write NaN where one is a row, remove the",
+    ),
     "a shorter block below": ([UM, *TWO, "Raw", *ZS], {}, "line 402 .* follow on line 403"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
     "brackets for minus": (
@@ -312,18 +335,59 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         "the first column of .* counts the points: give step",
     ),
-    "a named count from ten on": (
-        ["Nr.;Höhe (um)", *(f"{k};{z}" for k, z in enumerate(ZS, 10))],
+    "a named count that begins anew": (
+        ["Nr.;Höhe (um)", *(f"{k % 150};{z}" for k, z in enumerate(ZS))],
         {"step": STEP},
         r"does not count 1, 2, 3 .*: give columns Z, that of the heights, and step",
     ),
+    "a count without a name": (
+        [",z", *(f"{k:.1f},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        "the first column of .* may count the points: give step",
+    ),
+    "a count without a name, with gaps": (
+        ['"","z"', *(f'"{k}",{z}' for k, z in enumerate(ZS) if k not in (7, 50, 51, 90))],
+        {"unit": "um"},
+        "the first column of .* may count the points: give step",
+    ),
+    "rounded positions without a unit beside their step": (
+        ["Step: 1.08 um", "x,z", *(f"{1.08 * k:.0f},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        "may be one that counts the points, and does not count 1, 2, 3 .*: give columns Z, that",
+    ),
+    "a count by two without a name": (
+        [",z", *(f"{2 * k},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        r"may be one that counts the points, and does not count 1, 2, 3 .*: give columns Z, that",
+    ),
+    "a factor above positions": (
+        ["1.0e-03 *", *(f"{k}.5 {z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        r"line 1 .* is '1.0e-03 \*': multiply the numbers",
+    ),
+    "pairs of decimal commas": (
+        [f"{x}, {z}".replace(".", ",") for x, z in PAIRS],
+        {"unit": "um"},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
+    "triples of decimal commas": (
+        [f"{x},0.5,{z.strip('-')}".replace(".", ",") for x, z in PAIRS],
+        {"unit": "um", "columns": [1, 3]},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
+    "a unit and a comma": (TWO, {"unit": "um,"}, "unit is '': it must be one of m, cm, mm"),
     "a count of unknown name": (
         ["番号,高さ(um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {},
         "heights alone: give unit X,Z, .*, or step if the first column counts the points",
     ),
-    "figures below heights": (["z (um)", *ZS, "", *ZS[:2]], Z_UM, "line 402 .* at most 3 rows"),
-    "blocks divided by dashes": (["z (um)", *ZS, "-----", *ZS], Z_UM, "line 402 .* and divides"),
+    "figures below heights": (["z (um)", *ZS, "", *ZS[:2]], Z_UM, "1 place, .* 402: write NaN"),
+    "equal parts between dashes": (
+        [*ZS[:99], "--", *ZS[:99], "--", *ZS[:99]],
+        Z_UM,
+        "line 100 .* which may divide two profiles: write NaN if a height",
+    ),
+    "blocks divided by dashes": (["z (um)", *ZS, "-----", *ZS], Z_UM, "line 402 .* may divide"),
     "a count below two columns": ([UM, *TWO, "400"], {}, "line 402 .* has '400', at the end"),
     "a last height cut off": ([UM, *TWO[:-1], TWO[-1][:-1]], {}, "line 401 .* or was cut off"),
     "a last exponent cut off": (
@@ -358,6 +422,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"row": 1, "step": STEP, "unit": "um"},
         "the first column of .* rises or falls throughout, as positions do",
     ),
+    "a map of four rows with their positions": (
+        [",".join([f"{k / 2}", *ZS]) for k in range(4)],
+        {"row": 1, "step": STEP, "unit": "um"},
+        "the first column of .* rises or falls throughout, as positions do",
+    ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
     "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "the decimal sign: omit"),
@@ -369,7 +438,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "decimal commas between commas": (
         [f"{x},{z}".replace(".", ",") for x, z in PAIRS],
         {"decimal": ",", "unit": "um"},
-        "line 1 .* '0,000,0,.*', which is no number with a decimal comma",
+        "commas can be .*: leave out decimal, or save it with semicolons",
     ),
     "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
     "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "'x': it must be one of '.', ','"),

@@ -224,31 +224,21 @@ def column_text(seed: int) -> tuple[list[str], dict[str, object]]:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_two_columns_that_an_empty_line_divides_are_not_joined_in_silence(seed, tmp_path):
-    """Those of one length are refused, others that leap there, and the rest have a note."""
     (one, options), (two, _) = column_text(seed), column_text(seed + 1000)
     path = tmp_path / "two.txt"
-    path.write_text("\n".join([*one, "", *one[::-1], "", *one]))
-    with pytest.raises(
-        InputError, match=rf"line {len(one) + 1} of .*two.txt is empty, and divides"
-    ):
-        read_trace(path, **options)
-    lifted = [f"{float(z) + 5:.6f}" for z in two[:50]]
-    path.write_text("\n".join([*one, "", *lifted]))
-    with pytest.raises(
-        InputError, match=rf"line {len(one) + 1} of .*two.txt is empty, and the heig"
-    ):
-        read_trace(path, **options)
+    for lines in ([*one, "", *one[::-1], "", *one], [*one, "", *two], [*one, "", "", *two]):
+        path.write_text("\n".join(lines))
+        with pytest.raises(InputError, match=rf"the first on line {len(one) + 1}: write NaN where"):
+            read_trace(path, **options)
 
 
-def test_one_profile_with_empty_lines_is_read_with_a_note(tmp_path):
+def test_one_profile_with_empty_lines_is_read_as_the_refusal_says(tmp_path):
     one, options = column_text(3)
     path = tmp_path / "one.txt"
-    # the smallest leaps over a height: not those of another profile
-    heights = np.array([float(z) for z in one])
-    leaps = np.abs(heights[2:] - heights[:-2])
-    missing = sorted(int(k) + 1 for k in np.argsort(leaps)[:2])
-    path.write_text("\n".join("" if k in missing else z for k, z in enumerate(one)))
-    trace = read_trace(path, **options)
-    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == missing
-    note = f"2 empty lines taken for missing heights, the first on line {missing[0] + 1}"
-    assert note in trace.notes
+    for gap, missing in (("NaN", [30, 31]), (None, [])):
+        rows = [*one[:30], "", "", *one[32:]]
+        path.write_text("\n".join(rows))
+        with pytest.raises(InputError, match="unevenly at 1 place, the first on line 31: write"):
+            read_trace(path, **options)
+        path.write_text("\n".join(row or gap for row in rows if row or gap))
+        assert np.flatnonzero(np.isnan(read_trace(path, **options).heights)).tolist() == missing

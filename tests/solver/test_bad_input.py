@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import adhesis
 from adhesis import (
@@ -34,6 +35,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.ensemble.errors import naming_options
+from adhesis.ensemble.quantities import UNITS
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds, counted, real, shown, whole
@@ -56,6 +58,7 @@ SPECTRUM: dict[str, Any] = {
     "seed": 1,
     "h_rms": 1e-6,
 }
+LEFT_OUT = pd.Series(range(9), index=range(9), dtype=float).drop(4)
 TRACE = Trace(self_affine_profile(**SPECTRUM).heights(400), 5e-6, "t.csv")
 
 
@@ -171,6 +174,20 @@ def test_whatever_is_a_number_is_taken_as_one(two: Any) -> None:
     assert check_cycle(0.5, two, Control()) == (0.5, 2)
 
 
+def labelled(units: object) -> pd.Series:
+    """Return a column of a table whose attributes state units."""
+    column = pd.Series([1e-6, 0.0, 2e-6, 0.0], name="z")
+    column.attrs["units"] = units
+    return column
+
+
+@pytest.mark.parametrize("units", [*sorted({*UNITS.values(), ""}), {"z": "m"}, {"x": "um"}])
+def test_a_column_in_si_units_is_a_row_of_numbers(units: object) -> None:
+    column = labelled(units)
+    assert profile_from_heights(column, PERIOD) == profile_from_heights(column.array, PERIOD)
+    assert np.array_equal(checks.row("heights", xr.DataArray(column)), column)
+
+
 MASKED = np.ma.array([1.0, 2.0, 4.0], mask=[False, True, False])
 ROWS: list[tuple[Any, type[Exception], str]] = [
     (MASKED, ValueError, "[1] is masked (1 in all): every"),
@@ -180,6 +197,9 @@ ROWS: list[tuple[Any, type[Exception], str]] = [
     (np.array([True, False, True]), TypeError, " holds booleans: every"),
     (np.array(["1", "2", "3"]), TypeError, " holds texts: every"),
     (np.array([0.0, 0.5]).view(WithUnit), TypeError, " carries a unit, which would be lost"),
+    (labelled("um"), TypeError, " carries a unit, which would be lost"),
+    (labelled({"z": "um"}), TypeError, " carries a unit, which would be lost"),
+    (xr.DataArray([0.0, 0.5], attrs={"units": "um"}), TypeError, " carries a unit, which would"),
     (["0", "1", "2"], TypeError, "[0] is '0': it must be a real number"),
     ([0.0, None, 2.0], TypeError, "[1] is None: it must be a real number"),
     (np.array([0.0, None, 2.0]), TypeError, "[1] is None: it must be a real number"),
@@ -314,6 +334,8 @@ Problem(WAVE, SOLID, 0.004, pattern=0.3) -> TypeError: pattern is 0.3
 # profiles
 profile_from_heights([2.0, 2.0, 2.0], 1.0) -> ValueError: the profile is flat (h_max = 0)
 profile_from_heights([1.0, 2.0], 1.0) -> ValueError: heights hold 2 value(s): at least 3
+profile_from_heights(LEFT_OUT, 1.0) -> ValueError: the index of heights leaves rows out, or has
+profile_from_heights(xr.DataArray(LEFT_OUT), 1.0) -> ValueError: the index of heights leaves rows
 profile_from_heights([0.0, 1e+200, 0.0], 1.0) -> ValueError: largest height is 1e+200: it must be
 profile_from_heights([0.0, 1e-200, 0.0], 1.0) -> ValueError: largest coefficient is 3.3
 profile_from_heights([1, 2j, 3], 1.0) -> TypeError: heights[1] is 2j: it must be a real number
@@ -381,6 +403,7 @@ prepare_trace(TRACE, exclude=[(1.0,)]) -> TypeError: it must hold pairs of posit
 prepare_trace(TRACE, invert='yes') -> TypeError: invert is 'yes': it must be True or False
 prepare_trace(TRACE, keep_outliers=1) -> TypeError: keep_outliers is 1: it must be True or
 replace(TRACE, heights=np.full(400, np.nan)) -> InputError: t.csv holds 0 heights: at least 32
+Trace(LEFT_OUT, 1e-6) -> InputError: the index of array leaves rows out, or has another order
 Trace(['a'] * 99, 1e-06) -> InputError: array holds <U1 of 1 dimensions
 replace(TRACE, step='5um') -> TypeError: step is '5um': it must be a pos
 read_trace(3) -> TypeError: source is 3: it must be a path

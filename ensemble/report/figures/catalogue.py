@@ -192,6 +192,7 @@ MECHANISMS = (
         "eight decades below the largest are not shown. Shading: n jumps in a bin are known to "
         "sqrt(n).",
         loss_figures.jump_energies,
+        is_worth=lambda data: any(cell.jumps.histogram.any() for cell in data.cells),
     ),
     Illustration(
         "pull_off_stress",

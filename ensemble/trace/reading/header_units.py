@@ -80,7 +80,7 @@ _NUMBERED = re.compile(r"\b(channel|kanal|profile|profil|column|trace|line|scan)
 _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
 # A label and a value name no column: "Unit:", "0.5 µm", "Tip radius 2 um", "Cut-off (mm): 0.8".
 _VALUE = re.compile(
-    rf"(?:^|[:=\s;,])\s*{_NUMBER}\s*(?:{_WORD})?\s*$|[:=]\s*([+\-]?[.,]?\d|$)", re.IGNORECASE
+    rf"(?:^|[:=\s;,])\s*{_NUMBER}[\s,;]*(?:{_WORD})?\s*$|[:=]\s*([+\-]?[.,]?\d|$)", re.IGNORECASE
 )
 
 # The step is named by words for the distance of two points, and by nothing else: a "step height" or

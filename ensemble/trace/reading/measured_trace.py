@@ -24,7 +24,7 @@ from adhesis.ensemble.trace.reading.header_units import (
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
 from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
-from adhesis.ensemble.trace.reading.text_table import Table, read_table
+from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
@@ -287,17 +287,16 @@ def load_array(source: Source) -> Array:
     try:
         with source.open() as stream:
             table: Any = np.load(stream, allow_pickle=False)
-            is_array = isinstance(table, np.ndarray)
     except (OSError, ValueError, EOFError, MemoryError, SyntaxError, TypeError) as error:
         raise InputError(f"{source} is no .npy of numbers: {reason(error)}") from None
-    if not is_array:
-        raise InputError(f"{source} is an archive of arrays: save the one of the heights as .npy")
     return _numbers(source.name, table)
 
 
 def _numbers(name: str, values: Any) -> Array:
     """Return an array of real numbers as floats; masked ones are NaN."""
     _refuse_units(name, values)
+    with refused_as_input():
+        checks.check_index(name, values)
     try:
         array = np.ma.asarray(values)
     except ValueError as error:
@@ -337,15 +336,9 @@ def _table_of(
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         source = source[list(wanted)]
-    has_one = len(source.columns if wanted is None else wanted) == 1
-    if has_one and source.index.dtype.kind in "iu" and len(source) > 1:
-        apart = np.diff(source.index.to_numpy(float, na_value=np.nan))
-        if np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0:
-            raise InputError(
-                "the index of the table leaves rows out, or has another order, and the heights "
-                "have no positions: put the rows in with NaN (reindex), or number them anew "
-                "(reset_index(drop=True))"
-            )
+    if len(source.columns if wanted is None else wanted) == 1:
+        with refused_as_input():
+            checks.check_index("the table", source)
     units = source.attrs.get("units", {})
     if not isinstance(units, Mapping):
         raise InputError(
@@ -408,7 +401,7 @@ def _from_table(
         columns, lines = _scan_line(name, columns, lines, row, notes)
         places = lines
     if len(columns) == 1:
-        _refuse_uneven_rows(name, places)
+        refuse_uneven_rows(name, places, has_others=len(table.filled) > 1)
     if not MIN_POINTS <= columns.shape[1] <= MAX_POINTS:
         raise InputError(
             f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS} and at most "
@@ -417,13 +410,14 @@ def _from_table(
     columns[-1], gaps = without_codes(columns[-1])
     found = units_of_header(table.header, names)
     if len(columns) == 2 and found.units[0] is None:
-        first = [row[0] for row in names if re.search(r"[\w#]", row[0])]
+        first = [row[0] for row in names]
         given = _step_beside_count(name, table, first, columns[0], unit, step)
         if given is not None:
-            columns, step = columns[1:], given
-            notes.append("the first column counts the points")
-    if len(columns) == 1 and (left_out := int(np.sum(np.diff(places) - 1))):
-        notes.append(f"{counted(left_out, 'empty row')} left out")
+            step = given
+            columns, lines, left_out = _at_counts(columns, places)
+            notes.append(f"the first column counts the points{left_out}")
+    if len(columns) == 1 and (empty := int(np.sum(np.diff(places) - 1))):
+        notes.append(f"{counted(empty, 'empty row')} left out")
     (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
     heights = columns[-1] * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
@@ -435,11 +429,6 @@ def _from_table(
         )
     if gaps:
         notes.append(gaps)
-    if table.empty_lines:
-        notes.append(
-            f"{counted(len(table.empty_lines), 'empty line')} taken for missing heights, the first "
-            f"on line {table.empty_lines[0]}"
-        )
     if len(columns) == 2:
         if step is not None:
             raise InputError(
@@ -518,7 +507,8 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
         for part in line, line[1:]:
             steps = np.diff(part[np.isfinite(part)])
-            if steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0)):
+            is_even = steps.size > 2 and np.ptp(steps) <= _SAME * abs(steps[0]) > 0
+            if (steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0))) or is_even:
                 raise InputError(
                     f"the first {what} of {name} rises or falls throughout, as positions do: "
                     f"remove it, and give {parameter('step')}"
@@ -526,20 +516,6 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     check_row(name, row, table.columns.shape[1])
     notes.append(f"row {row} of {table.columns.shape[1]}, of {len(table.filled)} heights each")
     return table.columns[list(table.filled), row].reshape(1, -1)
-
-
-def _refuse_uneven_rows(name: str, lines: Array) -> None:
-    """Refuse empty lines here and there between rows that have their places by their order."""
-    apart = np.diff(lines)
-    usual = np.bincount(apart, minlength=1).argmax()
-    odd = np.flatnonzero(apart != usual)
-    if odd.size:
-        line = lines[odd[0]] + min(usual, apart[odd[0]])
-        raise InputError(
-            f"the rows of {name} have no positions, and empty lines divide them unevenly at "
-            f"{counted(odd.size, 'place')}, the first on line {line}: write NaN where one is a "
-            f"row, remove the others, or give {parameter('columns')} X,Z, if there are positions"
-        )
 
 
 def _scan_line(
@@ -571,8 +547,20 @@ def _scan_line(
 
 
 def _counts_points(x: Array) -> bool:
-    """Return whether a column is 0, 1, 2 … or 1, 2, 3 … in order."""
-    return bool(x.size and x[0] in (0, 1) and np.all(np.diff(x) == 1))
+    """Return whether a column holds ascending whole numbers, as 1, 2, 3 …, few of them left out."""
+    steps = np.diff(x)
+    counts = np.array_equal(x, np.rint(x)) and np.all(steps > 0) and np.median(steps) == 1
+    return bool(counts and np.ptp(x) < 4 * x.size)
+
+
+def _at_counts(columns: Array, lines: Array) -> tuple[Array, Array, str]:
+    """Return the heights at the places that they are counted by, their lines, and a description."""
+    place = (columns[0] - columns[0, 0]).astype(int)
+    whole = np.full((2, place[-1] + 1), np.nan)
+    whole[:, place] = columns[1], lines
+    left_out = whole.shape[1] - place.size
+    about = f", {left_out} of them left out: taken as drop-outs" if left_out else ""
+    return whole[:1], whole[1], about
 
 
 def _step_beside_count(
@@ -586,22 +574,28 @@ def _step_beside_count(
     """Return the step of heights beside a column that counts the points; None for positions.
 
     It counts them if it is named so, or a step is given by the option or the header. ``names`` are
-    those of the column.
+    those of the column, of which one may be empty; without any it holds positions.
     """
-    is_named = any(map(_COUNTS.fullmatch, names))
-    if not _counts_points(column):
-        if not is_named:
+    is_named = any(_COUNTS.fullmatch(text) for text in names if re.search(r"[\w#]", text))
+    is_foreign = bool(names) and not any(map(names_positions, names))
+    may_count, counts = is_named or is_foreign, _counts_points(column)
+    if not counts or (not may_count and np.ptp(column) >= column.size):
+        # Names are empty where R and pandas write the numbers of rows. Others that skip numbers may
+        # be rounded positions as well.
+        is_unnamed = names and not any(names) and np.array_equal(column, np.rint(column))
+        is_stated = counts and step_of_header(name, table.header, table.decimal) is not None
+        if not is_named and not is_unnamed and not is_stated:
             return None
+        word = "is named as" if is_named else "may be"
         raise InputError(
-            f"the first column of {name} is named as one that counts the points, and does not "
-            f"count 1, 2, 3 …: give {parameter('columns')} Z, that of the heights, and "
-            f"{parameter('step')}, if no point is left out"
+            f"the first column of {name} {word} one that counts the points, and does not count 1, "
+            f"2, 3 …: give {parameter('columns')} Z, that of the heights, and {parameter('step')}, "
+            "if no point is left out"
         )
-    is_foreign = bool(names) and not names_positions(names[-1])
     if step is None:
-        step = step_of_header(name, table.header, table.decimal, counts=is_named or is_foreign)
+        step = step_of_header(name, table.header, table.decimal, counts=may_count)
     if step is None and (is_named or (is_foreign and unit is not None)):
-        word = "counts" if is_named else f"({names[-1]}) may count"
+        word = "counts" if is_named else f"({names[-1]}) may count" if names[-1] else "may count"
         raise InputError(
             f"the first column of {name} {word} the points: give {parameter('step')}, as in 0.5um"
         )
@@ -614,7 +608,7 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
         below = column.size - k - 1
         for length in (step, below * step, (below - 1) * step):
             if any(abs(number * size / length - 1) < _SAME for size in LENGTH.units.values()):
-                where = f"point {k + 1}" if lines is None else f"line {lines[k]}"
+                where = f"point {k + 1}" if lines is None else f"line {lines[k]:.0f}"
                 raise InputError(
                     f"{where} of {name} is {number:g}, and the step or the length of the trace is "
                     f"{length_text(length, 6)}: remove it from the heights"

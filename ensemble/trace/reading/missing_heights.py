@@ -36,7 +36,7 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
 
     ``known_alone``: only those that instruments write, beyond the range of all others.
     """
-    heights = np.where(np.isfinite(heights), heights, np.nan)
+    heights = np.where(np.isfinite(heights), heights, np.nan) + 0.0  # no sign of a nought
     values, times = np.unique(heights[np.isfinite(heights)], return_counts=True)
     known = np.array([is_known_code(value) for value in values], dtype=bool)
     nines = np.array([bool(_NINES.fullmatch(f"{value:g}")) for value in values], dtype=bool)
@@ -48,9 +48,10 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
     low, high = _usual(values[~likely])
     away = np.maximum(low - values, values - high)
     far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
-    # Where hardly a height occurs twice, noughts and nines that do stand for no height even within
-    # the range.
+    # Where hardly a height occurs twice, noughts and nines that do, and more often than all others,
+    # stand for no height even within the range.
     are_single = float(np.median(times)) == 1.0
+    repeated &= times > times[~likely & (values != 0)].max()
     codes = (known if known_alone else likely) & (away > _BEYOND_KNOWN * (high - low))
     if not known_alone:
         codes |= far | ((nines | (values == 0)) & repeated & are_single)

@@ -23,7 +23,9 @@ _SIGNS = re.compile(r"[-+*.()\s]")  # about such a word, or as wide as the numbe
 _PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE)  # #NAME?, 1.#INF
 _FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
-_PAIR = re.compile(r'[^,."\s]*(,[^,."\s]*){3}')  # "0,5,1,3": four numbers, or two
+# "0,5,1,3" and "0,5, 1,3": four numbers, or two
+_DECIMALS = r"\d*(?:e[+\-]?\d+)?"
+_PAIRS = re.compile(rf'\s*[^,."\s]*,{_DECIMALS}(?:,\s?[^,."\s]*,{_DECIMALS})+\s*', re.IGNORECASE)
 _MOSTLY = 0.8  # share of the lines in which a delimiter stands
 _EXPONENT = re.compile(r"(?<=[\d.])\s*[eEdD](?=\s*[+\-]?\d)")
 
@@ -136,19 +138,22 @@ def find_form(
     best = max(read, key=lambda form: read[form][:2])
     most = read[best][0]
     others = [form for form in read if read[form][0] == most and read[form][2] != read[best][2]]
-    if decimal == "," and best[0] == " " and not delimiter and _one_comma(sample) == (",", "."):
-        _refuse_two_ways(source, sample[0], "leave out")
+    delimits = ("," in some and not most) or _one_comma(sample) == (",", ".")
+    if decimal == "," and best[0] == " " and not delimiter and delimits:
+        _refuse_two_ways(source, sample[0], f"leave out {parameter('decimal')}")
     if most and others and best[0] in ", ":
         return _one_comma(sample) or _refuse_two_ways(source, sample[0])
-    if decimal is None and best[0] == "," and all(_PAIR.fullmatch(line.strip()) for line in sample):
-        _refuse_two_ways(source, sample[0])
+    if decimal is None and best[0] == "," and all(map(_PAIRS.fullmatch, sample)):
+        _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
 
 
-def _refuse_two_ways(source: Source, line: str, mend: str = "give") -> NoReturn:
+def _refuse_two_ways(source: Source, line: str, mend: str = "") -> NoReturn:
+    both = ", or save it with semicolons between the numbers if they are both"
+    mend = f"{mend}{both}" if mend else f"give {parameter('decimal')}"
     raise InputError(
         f"{source} has rows such as {shown_line(line)}, whose commas can be decimal signs or "
-        f"delimiters: {mend} {parameter('decimal')}"
+        f"delimiters: {mend}"
     )
 
 

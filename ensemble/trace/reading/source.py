@@ -71,8 +71,8 @@ class Source:
 
     @property
     def is_npy(self) -> bool:
-        """Whether it is an array of NumPy, by its name or its first bytes."""
-        return self.suffix == ".npy" or self.beginning().startswith(b"\x93NUMPY")
+        """Whether it is an array of NumPy, whatever its name."""
+        return self.beginning().startswith(b"\x93NUMPY")
 
     def holds_numbers(self) -> bool:
         """Return whether it is a text or a .npy, and no instrument's file.

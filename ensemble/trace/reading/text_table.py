@@ -6,7 +6,6 @@ refused: where they belong to cannot be known.
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -72,8 +71,6 @@ class Table:
     lines: Array  # shape (n,); line of the file that each row stands on, from 1
     delimiter: str
     decimal: str
-    # Lines of a single column that are empty, each a missing height
-    empty_lines: tuple[int, ...] = ()
 
     @property
     def form(self) -> str:
@@ -159,7 +156,8 @@ class _Reader:
     def _row(self, line: str) -> _Row | None:
         plain = line.strip()
         # "***" may be a missing number, "#N/A" is one, and "###" rules a comment off
-        if plain and plain[0] in COMMENT and not (is_missing(plain) and plain.strip("#")):
+        is_comment = plain[:1] in COMMENT and not (is_missing(plain) and plain.strip("#"))
+        if (plain and is_comment) or _FACTOR.fullmatch(line):
             return None
         fields = [plain] if is_missing(plain) else split(line, self.delimiter)
         while len(fields) > self.count and not fields[-1]:
@@ -220,7 +218,6 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     places = _block(reader, start)
     _refuse_numbers_outside(reader, start, places[-1])
     filled = tuple(k for k in range(count) if any(reader.rows[p].fields[k] for p in places))
-    places = _without_empty_rows(reader, places, len(filled))
     rows = [reader.rows[place] for place in places]
     columns = [[row.fields[k] for row in rows] for k in filled]
     if not is_given:
@@ -229,7 +226,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         numbers = [row.values[k] for row in rows]
         _refuse_odd_ends(source, column, numbers, places, is_lone=len(filled) == 1)
         if len(filled) == 1:
-            _refuse_parts(reader, numbers, places)
+            _refuse_dashes(reader, column, places)
     header = [line[:_LONGEST_HEADER_LINE].strip(" \r\n").lstrip(COMMENT) for line in lines[:start]]
     # Of one column, a line of the header is a name as a whole.
     names = [
@@ -244,7 +241,6 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         lines=np.array(places) + 1,
         delimiter=delimiter,
         decimal=decimal,
-        empty_lines=tuple(place + 1 for place in places if not lines[place].strip()),
     )
 
 
@@ -256,7 +252,7 @@ def _first_row(reader: _Reader) -> int | None:
         row = reader.rows.get(place)
         if row is None or (not row.is_empty and not reader.is_whole(place)):
             found = []
-        elif not row.is_empty or (found and reader.count == 1):
+        elif not row.is_empty:
             found.append(place)
         if len(found) == needed:
             return found[0]
@@ -275,24 +271,19 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
                 "within cells, remarks and quotes about rows out, or give "
                 f"{parameter('decimal')} and {parameter('delimiter')}"
             )
-    if numbers < _ROWS_TO_BEGIN:
-        raise InputError(
-            f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
-            "needed"
-        )
-    raise InputError(f"{source} holds no rows of numbers of one length")
+    raise InputError(
+        f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} of one "
+        "length are needed, one after the other"
+    )
 
 
 def _block(reader: _Reader, start: int) -> list[int]:
-    """Return the lines of the block, from 0, those of empty rows too."""
+    """Return the lines of the block, from 0, without those of empty rows."""
     places: list[int] = []
-    is_blank = [not line.strip() for line in reader.lines]
     for place in range(start, len(reader.lines)):
         row = reader.rows.get(place)
         if row is None:
             break
-        if reader.count == 1 and place > start and is_blank[place - 1] and is_blank[place]:
-            break  # one empty line is a missing height, two are the end of a block
         lacks = not row.is_empty and not reader.is_whole(place)
         if lacks and reader.delimiter == " " and reader.count > 2:
             reader.refuse(
@@ -300,20 +291,11 @@ def _block(reader: _Reader, start: int) -> list[int]:
                 f": which of the {reader.count} columns are missing cannot be seen between spaces, "
                 "so save it with another delimiter",
             )
-        places.append(place)
+        if reader.holds_row(place):
+            places.append(place)
     while reader.rows[places[-1]].is_empty:
         places.pop()
     return places
-
-
-def _without_empty_rows(reader: _Reader, places: list[int], columns: int) -> list[int]:
-    """Leave out empty rows; of one column they are gaps, which have their places."""
-    if columns > 1:
-        return [place for place in places if reader.holds_row(place)]
-    blank = [not reader.lines[place].strip() for place in places]
-    # A text with double line ends has no gaps.
-    is_double = len(places) > _TO_JUDGE and all(blank[1::2]) and not any(blank[::2])
-    return places[::2] if is_double else places
 
 
 def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
@@ -397,40 +379,37 @@ def _refuse_odd_ends(
             )
 
 
-def _refuse_parts(reader: _Reader, numbers: Sequence[float], places: Sequence[int]) -> None:
-    """Refuse a column that lines without letters and digits divide into several profiles.
+def _refuse_dashes(reader: _Reader, column: Sequence[str], places: Sequence[int]) -> None:
+    """Refuse a lone column that a line of dashes divides, or lines of dashes into equal parts.
 
-    One empty line, or one of dashes, is a missing height. It is none if all parts have one length,
-    if the heights leap there as they do nowhere else, or near the ends, where figures of the whole
-    profile stand.
+    Others stand for missing heights.
     """
-    lines = [reader.lines[place].strip() for place in places]
-    empty = [k for k, line in enumerate(lines) if not any(map(str.isalnum, line))]
-    bounds = [-1, *empty, len(numbers)]
-    lengths = {end - start - 1 for start, end in itertools.pairwise(bounds)}
-    if not empty or max(lengths) < _LONG_ROW:
-        return
-    if len(empty) > 1:  # several dashes are a code
-        empty = [k for k in empty if not lines[k]]
-    heights = np.array([nan if may_be_code(number) else number for number in numbers])
-    leaps = np.abs(heights[2:] - heights[:-2])
-    over = [k - 1 for k in empty]
-    usual = np.fmax.reduce(np.delete(leaps, over), initial=0.0)
-    leap = next((k for k in empty if leaps[k - 1] > usual), None)
-    end = next((k for k in empty if k <= _ENDS or k >= len(numbers) - _ENDS - 1), None)
-    if len(lengths) == 1:
-        place, reason = bounds[1], f"divides the column into parts of {lengths.pop()} rows each"
-    elif leap is not None:
-        place, reason = leap, "the heights beside it differ as no others two rows apart do"
-    elif end is not None:
-        place, reason = end, f"at most {_ENDS} rows stand between it and the end of the column"
-    else:
-        return
-    line = shown_line(lines[place]) if lines[place] else "empty"
-    raise InputError(
-        f"line {places[place] + 1} of {reader.source} is {line}, and {reason}: write NaN on it if "
-        "one height is missing, or keep one profile in a file, without other numbers"
-    )
+    dashes = [k for k, field in enumerate(column) if not any(map(str.isalnum, field))]
+    is_even = bool(dashes) and np.ptp(np.diff([-1, *dashes, len(column)])) == 0
+    if len(dashes) == 1 or is_even:
+        reader.refuse(
+            places[dashes[0]],
+            ", which may divide two profiles: write NaN if a height is missing, or keep one "
+            "profile in a file, without other numbers",
+        )
+
+
+def refuse_uneven_rows(name: object, lines: Array, has_others: bool = False) -> None:
+    """Refuse empty lines here and there between heights that have their places by their order.
+
+    ``has_others``: there are columns beside that of the heights.
+    """
+    apart = np.diff(lines)
+    usual = np.bincount(apart, minlength=1).argmax()
+    odd = np.flatnonzero(apart != usual)
+    if odd.size:
+        line = lines[odd[0]] + min(usual, apart[odd[0]])
+        mend = f", or give {parameter('columns')} X,Z, if there are positions" if has_others else ""
+        raise InputError(
+            f"the rows of {name} have no positions, and empty lines divide them unevenly at "
+            f"{counted(odd.size, 'place')}, the first on line {line}: write NaN where one is a "
+            f"row, remove the others, and keep one profile in a file{mend}"
+        )
 
 
 # ---------------------------------------------------------------------- header
