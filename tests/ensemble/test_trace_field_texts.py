@@ -398,7 +398,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "header against option": ([UM, *TWO], {"unit": "mm"}, "unit is mm for the pos"),
     "a row of no map": ([UM, *TWO], {"row": 3}, "row is 3: .* is no map, as"),
     "two rows": ([UM, *TWO[:2]], {}, "holds 2 rows of numbers"),
-    "an unknown unit": (TWO, {"unit": "furlong"}, "'furlong' is no unit"),
+    "an unknown unit": (TWO, {"unit": "furlong"}, "unit is 'furlong': it must be one of m"),
     "heights in mm, positions in µm": (TWO, {"unit": "um,mm"}, "in the same unit"),
     "turning back": ([*TWO[:60], "25.0,0.1", *TWO[60:]], {"unit": "um"}, "turn back at line 61"),
     "unequal steps": (
