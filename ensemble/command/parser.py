@@ -55,24 +55,30 @@ class Parser(argparse.ArgumentParser):
             --n0 whole: lowest harmonic
             --quiet: no progress on stderr
 
-        Name, placeholder of the value (by default the name), kind of the value, and what it is. One
-        without a kind is a flag; brackets begin a group. ``details`` are further arguments of
-        ``add_argument`` by the name, with underscores: a default, say, or a type with bounds.
+        Name, placeholder of the value (by default the name), kind of the value (a key of
+        ``_KINDS``), and what it is. One without a kind is a flag; brackets begin a group.
+        ``details`` are further arguments of ``add_argument`` by the name, with underscores: a
+        default, say, or a type with bounds. ValueError for another kind, or details of no argument.
         """
         group: argparse._ActionsContainer = self
+        more = dict(details)
         for entry in re.split(r"\n+(?=\S)", table.strip()):
             if entry.startswith("["):
                 group = self.add_argument_group(entry.strip("[]"))
                 continue
             head, _, text = " ".join(entry.split()).partition(": ")
-            name, *value = head.rstrip(":").split()
+            name, *value = head.split()
             about: dict[str, Any] = {"action": "store_true"}
             if value:
+                if value[-1] not in _KINDS:
+                    raise ValueError(f"{head!r} must end with a kind: {', '.join(_KINDS)}")
                 about = {"type": _KINDS[value[-1]]}
             if len(value) > 1:
                 about["metavar"] = value[0]
-            about |= details.get(name.removeprefix("--").replace("-", "_"), {})
+            about |= more.pop(name.removeprefix("--").replace("-", "_"), {})
             group.add_argument(name, help=text or None, **about)
+        if more:
+            raise ValueError(f"details of what is no argument of the table: {', '.join(more)}")
 
     def parse(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the options; InputError for a bad one, SystemExit after ``--help``."""
