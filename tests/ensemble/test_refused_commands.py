@@ -41,7 +41,7 @@ run c.toml --out c.toml -> the campaign file itself
 run c.toml --out text -> text is not a results file of adhesis
 run c.toml --ranks 100000 -> at most {16 * launch.cores()} are started here
 run c.toml --ranks {{x,0,-1,nan}} -> --ranks is '{{}}'
-run c.toml --walltime {{x,m,0,-1,nan,1e99,1:2:3:4}} -> --walltime is '{{}}': it must
+run c.toml --walltime {{x,m,0,-1,nan,1e99,1000000000,1:2:3:4}} -> --walltime is '{{}}': it must
 run c.toml --max-failures {{x,-1,nan,1e99,inf}} -> --max-failures is '{{}}'
 run c.toml --patience {{x,-1,nan,1e99,inf}} -> --patience is '{{}}'
 run c.toml --out p.h5 --part {{x,0/3,4/3,1/0}} -> --part is '{{}}': it must be K/N

@@ -38,7 +38,7 @@ from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
-from adhesis.ensemble.trace.variants import Plan, make_plan
+from adhesis.ensemble.trace.variants import TABLES, Plan, make_plan
 from benchmarks.trace_coverage import case, judged
 from tests.support.figures import few_figures
 from tests.support.scenes import HALF_SPACE
@@ -232,6 +232,13 @@ def test_text_and_figure_say_what_turning_points_are(control, at_preload, turn, 
     )
     drawn = tables_of(found)
     assert drawn[0].axes[-1].get_xlabel() == f"turning point: {label}"
+
+
+def test_every_loop_of_a_trace_is_held_as_its_cycle_says() -> None:
+    cycle = make_cycle(HALF_SPACE, [0.04, 0.02], [0.3, 0.5], 4, "auto", 1e-3, Control(1e9))
+    plan = make_plan(prepared(), cycle, processes=0)
+    assert {run.group for run in plan.runs} > {"answer", "noise", *TABLES}
+    assert {run.cycle.control.stiffness for run in plan.runs} == {1e9}
 
 
 @cache

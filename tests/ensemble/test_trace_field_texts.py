@@ -398,6 +398,8 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "header against option": ([UM, *TWO], {"unit": "mm"}, "unit is mm for the pos"),
     "a row of no map": ([UM, *TWO], {"row": 3}, "row is 3: .* is no map, as"),
     "two rows": ([UM, *TWO[:2]], {}, "holds 2 rows of numbers"),
+    "too few rows": ([UM, *TWO[:9]], {}, "holds 9 rows of numbers: at least 32"),
+    "twice the same place": ([UM, TWO[0], *TWO], {}, "positions stand still at line 3"),
     "an unknown unit": (TWO, {"unit": "furlong"}, "unit is 'furlong': it must be one of m"),
     "heights in mm, positions in µm": (TWO, {"unit": "um,mm"}, "in the same unit"),
     "turning back": ([*TWO[:60], "25.0,0.1", *TWO[60:]], {"unit": "um"}, "turn back at line 61"),
