@@ -201,7 +201,7 @@ def test_a_doubtful_loss_is_said(tmp_path):
         process.stderr
     )
     text = adhesis_here("status", out).stdout
-    assert "2 losses are doubtful" in text
+    assert "2 losses are doubtful: by their own account less accurate than asked for" in text
     assert "realisation 1" in text
     status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert [d["row"] for d in status["doubtful"]] == [1, 3]

@@ -81,6 +81,13 @@ def test_half_a_file_is_one_sentence_and_code_2(name, tmp_path, capsys):
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
+@pytest.mark.parametrize("option", [{"unit": "um"}, {"step": STEP}, {"columns": (1, 2)}])
+def test_units_of_texts_do_not_belong_to_instruments(option, tmp_path):
+    instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
+    with pytest.raises(InputError, match=f"{next(iter(option))} belongs to texts"):
+        read_trace(tmp_path / "a.qep", **option)
+
+
 def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
     monkeypatch.setattr(read, "available", lambda: False)
