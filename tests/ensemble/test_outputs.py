@@ -140,39 +140,24 @@ def test_nothing_is_opened_while_the_content_of_a_new_file_is_made(tmp_path: Pat
 
 
 def test_staged_files_are_moved_together_or_not_at_all(tmp_path: Path) -> None:
-    (tmp_path / "a").write_text("old")
+    """Older files of the writer's own names go once all is written; others stay always."""
+    for name in ("a", "b", "notes"):
+        (tmp_path / name).write_text("old")
 
     def fail() -> None:
-        with staged_folder(tmp_path) as folder:
+        with staged_folder(tmp_path, ("a", "b", "c")) as folder:
             (folder / "a").write_text("new")
             raise OSError("full")
 
     with pytest.raises(OSError, match="full"):
         fail()
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a", "old")]
-    with staged_folder(tmp_path) as folder:
-        (folder / "a").write_text("new")
-        (folder / "b").write_text("more")
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "new", "b": "more"}
-
-
-def test_older_files_of_the_writers_own_names_are_removed(tmp_path: Path) -> None:
-    """Once all is written: after a failure they stay, and other files stay always."""
-    for name in ("a", "b", "notes"):
-        (tmp_path / name).write_text("old")
-
-    def fail() -> None:
-        with staged_folder(tmp_path, ("a", "b", "c")):
-            raise OSError("full")
-
-    with pytest.raises(OSError, match="full"):
-        fail()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "notes"]
+    kept = dict.fromkeys(("a", "b", "notes"), "old")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == kept
     with staged_folder(tmp_path, ("a", "b", "c")) as folder:
         (folder / "a").write_text("new")
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
-        **{"a": "new", "notes": "old"}
-    }
+        (folder / "c").write_text("more")
+    written = {"a": "new", "c": "more", "notes": "old"}
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == written
 
 
 def test_a_terminal_that_nobody_reads_is_refused() -> None:

@@ -23,12 +23,12 @@ def rough(gamma: float = 0.02, seed: int = 5, **options) -> GridMethod:
     return grid_of(Problem(profile, HALF_SPACE, gamma), **{"nodes": 512, **options})
 
 
-def random_contact(rng: np.random.Generator, n: int, patches: int) -> np.ndarray:
-    cuts = np.sort(rng.choice(n, 2 * patches, replace=False))
+def contact_between(cuts: np.ndarray, n: int) -> np.ndarray:
+    """Nodes of the patches that begin and end at these of ``n`` nodes, by turns."""
     mask = np.zeros(n, dtype=bool)
     for a, b in cuts.reshape(-1, 2):
         mask[a:b] = True
-    return np.roll(mask, rng.integers(n))
+    return mask
 
 
 def dense(kernel: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
@@ -46,7 +46,9 @@ def exact_energy(method: GridMethod, mask: np.ndarray, separation: float) -> flo
 
 def test_energy_error_is_of_second_order_in_the_residual():
     method = rough()
-    mask = random_contact(np.random.default_rng(0), method.nodes, 4)
+    rng = np.random.default_rng(0)
+    mask = contact_between(np.sort(rng.choice(method.nodes, 8, replace=False)), method.nodes)
+    mask = np.roll(mask, rng.integers(method.nodes))
     errors, residuals = [], []
     exact = exact_energy(method, mask, 0.3e-6) + method.lattice.elastic.dx * float(
         method.lattice.adhesion[mask].sum()
@@ -91,9 +93,7 @@ def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
             cuts = np.cumsum(rng.integers(1, 24, 2 * patches))
         else:
             cuts = np.sort(rng.choice(n - 1, 2 * patches, replace=False))
-        mask = np.zeros(n, dtype=bool)
-        for a, b in cuts.reshape(-1, 2):
-            mask[a:b] = True
+        mask = contact_between(cuts, n)
         contact = Contact(1.0, 1.0, mask, -np.ones(n) * mask, np.zeros(n))
         # Unit gap, unit tension, no adhesion: the prices are S itself.
         edges = survey(contact, lattice, -1.0)

@@ -51,20 +51,14 @@ def loop_of(young: float, ratio: int = 8, seed: int = 0, gamma: float = 0.04) ->
     return run_loop(method_of(rough(ratio, seed), young, gamma), max_penetration=0.9, load_steps=20)
 
 
-def nearly_full_contact():
-    """A state of two waves with the shallower trough closed and the deeper one nearly so."""
-    waves = Profile(PERIOD, np.array([0.0, 0.15 * np.exp(0.5j), 0.5]) * 1e-6)
-    method = method_of(waves, 1e6, 0.05)
-    state = method.detached(method.problem.profile.h_max)
-    for penetration in (0.0, 0.5, 0.9, 0.97):
-        state = method.follow(state, method.problem.separation(penetration)).states[-1]
-    assert state.patches == 1
-    return method, state
-
-
 def test_the_tension_is_that_of_an_independent_solution():
     """From the openings of the Riemann-Hilbert solution, with the kernel of the half-space."""
-    method, state = nearly_full_contact()
+    waves = Profile(PERIOD, np.array([0.0, 0.15 * np.exp(0.5j), 0.5]) * 1e-6)
+    method = method_of(waves, 1e6, 0.05)
+    state = method.detached(waves.h_max)
+    for penetration in (0.0, 0.5, 0.9, 0.97):
+        state = method.follow(state, method.problem.separation(penetration)).states[-1]
+    assert state.patches == 1  # the shallower trough is closed, and the deeper one nearly so
     profile, unit = method.problem.profile, method.problem.half_space.modulus / 2
     gaps = state.internal.gaps
     theta, opening = explicit_openings(profile, gaps, state.separation * profile.q0)

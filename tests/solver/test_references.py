@@ -99,26 +99,22 @@ def test_parabola_pull_off_is_the_least_load():
     assert np.all(around >= load * (1 + 1e-12))
 
 
-def solved_load(slope, a: float, gamma: float, n: int = 400) -> float:
-    """Line load from the singular integral equation, by Gauss-Chebyshev (Erdogan's scheme).
+@pytest.mark.parametrize("a", [0.3, 1.1])
+def test_parabola_load_solves_the_integral_equation(a):
+    """That of the line load, by Gauss-Chebyshev (Erdogan's scheme).
 
     (2/(πE*)) PV∫ σ(ξ)/(x - ξ) dξ = -h'(x), with σ = g(ξ/a)/sqrt(1 - (ξ/a)²) and the edge values
     of g fixed by K = sqrt(2E*γ): σ ≈ -K/sqrt(2πr).
     """
+    radius, gamma, n = 2.5, 0.05, 400
     t = np.cos((np.arange(n) + 0.5) * np.pi / n)
     x = np.cos(np.arange(1, n) * np.pi / n)
     rows = (2 / (np.pi * MODULUS)) * (np.pi / n) / (x[:, None] - t[None, :])
     # g at +1 by Chebyshev interpolation through the nodes.
     weights = (-1.0) ** np.arange(n) / np.tan((np.arange(n) + 0.5) * np.pi / (2 * n)) / n
     edge = -np.sqrt(2 * MODULUS * gamma) / np.sqrt(np.pi * a)
-    g = np.linalg.solve(np.vstack([rows, weights]), np.append(slope(a * x), edge))
-    return float(np.sum(g) * np.pi / n * a)
-
-
-@pytest.mark.parametrize("a", [0.3, 1.1])
-def test_parabola_load_solves_the_integral_equation(a):
-    radius, gamma = 2.5, 0.05
-    solved = solved_load(lambda x: x / radius, a, gamma)
+    g = np.linalg.solve(np.vstack([rows, weights]), np.append(a * x / radius, edge))
+    solved = np.sum(g) * np.pi / n * a
     assert float(parabola_load(a, radius, MODULUS, gamma)) == pytest.approx(solved, rel=1e-10)
 
 
