@@ -213,7 +213,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             axes.errorbar(x, y, yerr=[bars, above], fmt="o-", color=_BLUE)
             top = max(top, 1.1 * (1 + quantity.relative) * float(y.max()))
         for axes in panels[line]:
-            axes.set_ylim(0, top)
+            axes.set_ylim(0, top if top > 0 else None)  # without adhesion nothing pulls, or is lost
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
     panels[2, 1].set_xlabel(f"turning point: {turning_point}")
