@@ -200,7 +200,7 @@ def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
     """The whole of ``adhesis validate``; without --slow a part of the long claims.
 
     On a grid of a quarter as many nodes, whose edges are known a quarter as well. Other α are in
-    test_sharp_path.py, controls in test_control_loops.py, audits of rough loops in test_grid.py
+    test_sharp_path.py, controls in test_control_loops.py, audits of rough loops in test_extremes.py
     and test_touch.py.
     """
     alphas = validation.ALPHAS
