@@ -22,13 +22,25 @@ EXAMPLES = (
     "adhesis bench --to out/benchmark --budget 60",
 )
 _FILES = tuple(f"benchmark.{suffix}" for suffix in ("csv", "md", "png", "pdf"))
-ARGUMENTS = f"""
---to DIR file: directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})
---quick: small scenes only, under a minute
---budget SECONDS number: CPU time after which a run is given up (default 360)
-"""
-_BUDGET = within(1e-9, 1e9, "a positive number of seconds")
-DETAILS = {"to": {"default": _DEFAULT}, "budget": {"type": _BUDGET, "default": 360.0}}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``adhesis bench``."""
+    parser.add_argument(
+        "--to",
+        type=Path,
+        default=_DEFAULT,
+        metavar="DIR",
+        help=f"directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})",
+    )
+    parser.add_argument("--quick", action="store_true", help="small scenes only, under a minute")
+    parser.add_argument(
+        "--budget",
+        type=within(1e-9, 1e9, "a positive number of seconds"),
+        default=360.0,
+        metavar="SECONDS",
+        help="CPU time after which a run is given up (default 360)",
+    )
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -12,8 +12,7 @@ EXAMPLES = (
     "adhesis completion bash",
     "adhesis completion zsh",
 )
-ARGUMENTS = "shell SHELL text: bash or zsh"
-DETAILS = {"shell": {"choices": ("bash", "zsh")}}
+_SHELLS = ("bash", "zsh")
 # zsh runs the same function by its emulation of bash's completion.
 _ZSH = "autoload -U +X bashcompinit && bashcompinit\n"
 _SCRIPT = """\
@@ -30,6 +29,11 @@ _adhesis() {{
 }}
 complete -o bashdefault -o default -F _adhesis adhesis
 """
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("shell", metavar="SHELL", choices=_SHELLS, help=" or ".join(_SHELLS))
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 from dataclasses import asdict
+from pathlib import Path
 
 from adhesis.ensemble.doctor.examine import Diagnosis, examine
 from adhesis.ensemble.errors import InputError
@@ -18,12 +19,19 @@ EXAMPLES = (
     "adhesis doctor",
     "adhesis doctor --in /scratch/me --json",
 )
-ARGUMENTS = """
---json: the findings as JSON on stdout
---in DIR file: try parallel writing in DIR, on the file system of the campaign (default: a temporary
-    folder)
-"""
-DETAILS = {"in": {"dest": "directory"}}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--json", action="store_true", help="the findings as JSON on stdout")
+    parser.add_argument(
+        "--in",
+        dest="directory",
+        type=Path,
+        metavar="DIR",
+        help="try parallel writing in DIR, on the file system of the campaign (default: a "
+        "temporary folder)",
+    )
 
 
 def execute(args: argparse.Namespace) -> int:

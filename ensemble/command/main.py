@@ -94,7 +94,7 @@ def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
     module = importlib.import_module(_OPTIONS.get(name, module_of(name)))
     parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
-    parser.declare(module.ARGUMENTS, getattr(module, "DETAILS", {}))
+    module.add_arguments(parser)
     return parser
 
 

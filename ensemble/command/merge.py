@@ -7,6 +7,7 @@ results file like any other: merge further parts into it, resume it, grow its ca
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.reporter import log
@@ -15,11 +16,16 @@ EXAMPLES = (
     "adhesis merge part1.h5 part2.h5 --out all.h5",
     "adhesis merge part3.h5 --out all.h5",
 )
-ARGUMENTS = """
-parts PART.h5 file: results files of one campaign
---out FILE.h5 file: made, or merged into
-"""
-DETAILS = {"parts": {"nargs": "+"}, "out": {"required": True}}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        "parts", type=Path, metavar="PART.h5", nargs="+", help="results files of one campaign"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.h5", required=True, help="made, or merged into"
+    )
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import write_new
@@ -15,7 +16,11 @@ EXAMPLES = (
     "adhesis new my.toml",
     "adhesis new study/first.toml",
 )
-ARGUMENTS = "file FILE.toml file: the file to write"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help="the file to write")
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -4,27 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path, PosixPath
 from typing import Any, NoReturn
 
 from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.quantities import HEIGHT, LENGTH, STIFFNESS, STRESS, WORK_OF_ADHESION
 
 _GIVEN = "_given"  # of a namespace: the options so far
-_KINDS: Mapping[str, Callable[[str], Any] | None] = {
-    "text": None,
-    "whole": int,
-    "number": float,
-    "file": Path,
-    "length": LENGTH.option,
-    "height": HEIGHT.option,
-    "stress": STRESS.option,
-    "stiffness": STIFFNESS.option,
-    "work": WORK_OF_ADHESION.option,
-}
 
 
 class Parser(argparse.ArgumentParser):
@@ -45,40 +32,6 @@ class Parser(argparse.ArgumentParser):
         whole = within(-math.inf, math.inf, "a whole number", int)
         for kind, convert in ((None, _text), (int, whole), (float, _number), (Path, _path)):
             self.register("type", kind, convert)
-
-    def declare(self, table: str, details: Mapping[str, Mapping[str, Any]]) -> None:
-        """Declare arguments by a table: a line each, and indented ones below where it is long.
-
-            file FILE.h5 file: the results file
-            [contact and cycle]
-            --work-of-adhesion G work: in J/m², or 20mJ/m2
-            --n0 whole: lowest harmonic
-            --quiet: no progress on stderr
-
-        Name, placeholder of the value (by default the name), kind of the value (a key of
-        ``_KINDS``), and what it is. One without a kind is a flag; brackets begin a group.
-        ``details`` are further arguments of ``add_argument`` by the name, with underscores: a
-        default, say, or a type with bounds. ValueError for another kind, or details of no argument.
-        """
-        group: argparse._ActionsContainer = self
-        more = dict(details)
-        for entry in re.split(r"\n+(?=\S)", table.strip()):
-            if entry.startswith("["):
-                group = self.add_argument_group(entry.strip("[]"))
-                continue
-            head, _, text = " ".join(entry.split()).partition(": ")
-            name, *value = head.split()
-            about: dict[str, Any] = {"action": "store_true"}
-            if value:
-                if value[-1] not in _KINDS:
-                    raise ValueError(f"{head!r} must end with a kind: {', '.join(_KINDS)}")
-                about = {"type": _KINDS[value[-1]]}
-            if len(value) > 1:
-                about["metavar"] = value[0]
-            about |= more.pop(name.removeprefix("--").replace("-", "_"), {})
-            group.add_argument(name, help=text or None, **about)
-        if more:
-            raise ValueError(f"details of what is no argument of the table: {', '.join(more)}")
 
     def parse(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the options; InputError for a bad one, SystemExit after ``--help``."""

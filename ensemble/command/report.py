@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from pathlib import Path
 
 from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.reporter import bar
@@ -14,16 +14,27 @@ EXAMPLES = (
 )
 _TABLES = ("losses", "precision", "growth", "jumps", "works", "beside", "slopes")
 _FILES = (*(f"{name}.csv" for name in _TABLES), "curves.nc", "report.md", "report.html")
-ARGUMENTS = """
-file FILE.h5 file: results file of a campaign
---to DIR file: directory for losses.csv, curves.nc, the figures, report.md and report.html
---beside OTHER.h5 file: other campaigns to compare with, loop by loop: another resolution or method,
-    other load steps, another largest penetration, another spectrum
-"""
-DETAILS: dict[str, dict[str, Any]] = {
-    "to": {"required": True},
-    "beside": {"nargs": "+", "default": []},
-}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("file", metavar="FILE.h5", type=Path, help="results file of a campaign")
+    parser.add_argument(
+        "--to",
+        metavar="DIR",
+        type=Path,
+        required=True,
+        help="directory for losses.csv, curves.nc, the figures, report.md and report.html",
+    )
+    parser.add_argument(
+        "--beside",
+        metavar="OTHER.h5",
+        type=Path,
+        nargs="+",
+        default=[],
+        help="other campaigns to compare with, loop by loop: another resolution or method, other "
+        "load steps, another largest penetration, another spectrum",
+    )
 
 
 def execute(args: argparse.Namespace) -> int:

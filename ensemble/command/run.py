@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError, WriteError, parameter
+from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import bar, log
 
 if TYPE_CHECKING:
@@ -35,31 +36,67 @@ EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
 )
-ARGUMENTS = """
-campaign CAMPAIGN.toml file: the campaign file
---out FILE.h5 file: results file (default: the campaign's name, here)
---ranks N whole: start N ranks on this machine (one more than cores is right: rank 0 only hands out)
---dry-run: estimate the cost from about a minute of pilot loops, and write nothing
---part K/N text: compute the K-th of N shares of the tasks into a file of its own (see adhesis
-    merge)
---walltime TIME text: stop in time for this walltime, as 3600, 1h30m or 12:00:00 (default: what
-    Slurm or Torque say)
---max-failures N whole: stop after so many failed tasks; 0: never (default: 20)
---redo WHICH text: compute tasks again: those that failed (failed), or done ones too (all)
---hurst VALUE number: with --redo: only tasks of this H; may be repeated
---work-of-adhesion VALUE work: with --redo: only tasks of this γ in J/m²; may be repeated
---realisation VALUE whole: with --redo: only this realisation; may be repeated
---patience SECONDS number: how long to wait for another run to let go of FILE.h5 (default: 10)
-"""
-_REPEATED: dict[str, Any] = {"action": "append", "default": []}
-DETAILS = {
-    "ranks": {"type": within(1, _MOST, "a whole number of at least 1", int)},
-    "max_failures": {"type": _WHOLE, "default": 20},
-    "hurst": {"type": _NUMBER, **_REPEATED},
-    "work_of_adhesion": _REPEATED,
-    "realisation": {"type": _WHOLE, **_REPEATED},
-    "patience": {"type": _NUMBER, "default": 10.0},
-}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="the campaign file")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.h5",
+        help="results file (default: the campaign's name, here)",
+    )
+    parser.add_argument(
+        "--ranks",
+        type=within(1, _MOST, "a whole number of at least 1", int),
+        metavar="N",
+        help="start N ranks on this machine (one more than cores is right: rank 0 only hands out)",
+    )
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="estimate the cost from about a minute of pilot loops, and write nothing",
+    )
+    parser.add_argument(
+        "--part",
+        metavar="K/N",
+        help="compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)",
+    )
+    parser.add_argument(
+        "--walltime",
+        metavar="TIME",
+        help="stop in time for this walltime, as 3600, 1h30m or 12:00:00 "
+        "(default: what Slurm or Torque say)",
+    )
+    parser.add_argument(
+        "--max-failures",
+        type=_WHOLE,
+        metavar="N",
+        default=20,
+        help="stop after so many failed tasks; 0: never (default: 20)",
+    )
+    parser.add_argument(
+        "--redo",
+        metavar="WHICH",
+        help="compute tasks again: those that failed (failed), or done ones too (all)",
+    )
+    gamma = WORK_OF_ADHESION.option
+    for name, kind, text in (
+        ("--hurst", _NUMBER, "with --redo: only tasks of this H; may be repeated"),
+        ("--work-of-adhesion", gamma, "with --redo: only tasks of this γ in J/m²; may be repeated"),
+        ("--realisation", _WHOLE, "with --redo: only this realisation; may be repeated"),
+    ):
+        parser.add_argument(
+            name, type=kind, metavar="VALUE", action="append", default=[], help=text
+        )
+    parser.add_argument(
+        "--patience",
+        type=_NUMBER,
+        metavar="SECONDS",
+        default=10.0,
+        help="how long to wait for another run to let go of FILE.h5 (default: 10)",
+    )
 
 
 def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:

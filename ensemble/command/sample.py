@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from pathlib import Path
 
 from adhesis.ensemble.outputs import write_new
 
@@ -14,8 +15,12 @@ EXAMPLES = (
     "adhesis sample trace.csv",
     "adhesis sample data/stylus.csv",
 )
-ARGUMENTS = "file FILE file: the file to write, as .csv"
 _POINTS, _STEP = 1001, 1e-6  # m
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the file to write, as .csv")
 
 
 def execute(args: argparse.Namespace) -> int:

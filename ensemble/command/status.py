@@ -16,14 +16,20 @@ EXAMPLES = (
     "adhesis status paper.h5",
     "adhesis status paper.h5 --watch --interval 10",
 )
-ARGUMENTS = """
-file FILE.h5 file: the results file
---json: everything, as JSON
---watch: repeat the status until all is done
---interval SECONDS number: with --watch: how often (default: 2)
-"""
-_OFTEN = within(0.1, 86_400, "a number of seconds between 0.1 and 86400")
-DETAILS = {"interval": {"type": _OFTEN, "default": 2.0}}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("file", type=Path, metavar="FILE.h5", help="the results file")
+    parser.add_argument("--json", action="store_true", help="everything, as JSON")
+    parser.add_argument("--watch", action="store_true", help="repeat the status until all is done")
+    parser.add_argument(
+        "--interval",
+        type=within(0.1, 86_400, "a number of seconds between 0.1 and 86400"),
+        metavar="SECONDS",
+        default=2.0,
+        help="with --watch: how often (default: 2)",
+    )
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -21,11 +21,17 @@ EXAMPLES = (
     "adhesis validate",
     "adhesis validate --method sharp --json",
 )
-ARGUMENTS = """
---method NAME text: method to validate, may be repeated (default: all)
---json: print the rows as JSON
-"""
-DETAILS = {"method": {"action": "append"}}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``adhesis validate``."""
+    parser.add_argument(
+        "--method",
+        action="append",
+        metavar="NAME",
+        help="method to validate, may be repeated (default: all)",
+    )
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
 
 
 def execute(args: argparse.Namespace) -> int:

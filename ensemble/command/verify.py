@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 
@@ -15,10 +16,14 @@ EXAMPLES = (
     "adhesis verify paper.h5",
     "adhesis verify paper.h5 --json",
 )
-ARGUMENTS = """
-file FILE.h5 file: the results file
---json: counts, and every damaged row with its task, as JSON
-"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("file", type=Path, metavar="FILE.h5", help="the results file")
+    parser.add_argument(
+        "--json", action="store_true", help="counts, and every damaged row with its task, as JSON"
+    )
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -89,18 +89,6 @@ def test_an_option_that_is_given_twice_is_refused(words, capsys):
     assert not [name for name in vars(many) if name.startswith("_")]
 
 
-@pytest.mark.parametrize(
-    ("table", "details", "said"),
-    [
-        ("--size lenght: of it", {}, "'--size lenght' must end with a kind: text, whole, "),
-        ("--size length: of it", {"sise": {"default": 1.0}}, "no argument of the table: sise"),
-    ],
-)
-def test_a_table_of_arguments_that_is_wrong_says_where(table, details, said):
-    with pytest.raises(ValueError, match=said):
-        parser_of("new").declare(table, details)
-
-
 def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
     """Python 3.13 raises what older ones report through ``error``."""
 
