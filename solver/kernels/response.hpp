@@ -67,6 +67,7 @@ struct LinearResponse {
   // Gaps moved so far, between held edges, that the old potential is not theirs: the next solution
   // ends with linearising them in its own.
   Integers displaced;
+  bool is_lost = false;  // whether the last solution is that of a search that failed
   Flags is_stale;  // whether a gap's edges have to be eliminated anew, before the next solution
 
   // Allocate the response of gaps with these nodes, which have room as its tree has.
