@@ -81,9 +81,6 @@ struct LinearResponse {
   // the whole gap through its own loads and the potential of the others.
   void linearise(int k, const EdgeLaw& law);
 
-  // Linearise gap k about its potential in the last solution.
-  void linearise_in_current_potential(int k, double pressure, const EdgeLaw& law);
-
   // Solve for all edges, with d prescribed.
   ResponseSolution solve(double prescribed, const EdgeLaw& law, const LoadingDevice& device);
 
