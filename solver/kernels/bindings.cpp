@@ -338,14 +338,6 @@ void bind_field(nb::module_& m) {
           "Evaluate θ and T of gap k at about `factor` times as many nodes as modes.")
       .def("work_of_gaps", &work_of_gaps, Unlocked());
   m.def(
-      "sum_pull",
-      [](const Vector& theta, const Vector& sine, const Vector& cosine, const Vector& weight) {
-        Vector out;
-        for (double each : theta) out.push_back(sum_pull(each, sine, cosine, weight));
-        return out;
-      },
-      "theta"_a, "sine"_a, "cosine"_a, "weight"_a, Unlocked());
-  m.def(
       "solve_field",
       [](const Vector& gaps, double prescribed, const FieldModel& model,
          const std::optional<Integers>& orders) {

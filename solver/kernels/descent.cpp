@@ -320,7 +320,10 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
       // Next to a fold the error of a finer field may show a minimum: the first step is judged by
       // the field that it began with. Later forces are large, and what finer fields end is not.
       const bool raises = !(judges && is_first);
-      if (!move_references(response, ends, states, pressure, prescribed, loose, model, raises)) {
+      // In the potentials of a search that failed beyond a fold all edges would be out of balance.
+      const bool is_lost = response.is_lost && out.steps == 0;
+      if (!move_references(response, ends, states, pressure, prescribed, loose, model, raises,
+                           is_lost)) {
         out.event = DescentEvent::no_field;
         break;
       }

@@ -91,7 +91,7 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 
 bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
                      double pressure, double prescribed, const EdgeLaw& law,
-                     const FieldModel& model, bool raises) {
+                     const FieldModel& model, bool raises, bool is_lost) {
   const std::vector<Gap> gaps = map_gaps(ends);
   Nodes& nodes = response.nodes;
   const std::vector<Gap> before = nodes.gaps;
@@ -129,7 +129,7 @@ bool move_references(LinearResponse& response, const Vector& ends, const EdgeSta
     hold_edges(response, ends, states);
     return true;
   }
-  response.displaced = indices(far);
+  response.displaced = indices(is_lost ? changed : far);
   if (both.held != states.held) {  // their potentials are needed before their edges can follow
     response.solve(prescribed, law, model.device);
     hold_edges(response, ends, states);
@@ -284,6 +284,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     last = size;
   }
   out.potential = response.potential_at(pressure);
+  response.is_lost = !out.found;
   out.references = response.nodes.gaps;
   out.orders = response.nodes.orders;
   out.ends = ends;

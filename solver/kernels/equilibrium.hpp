@@ -30,11 +30,12 @@ bool any_outdated(const LinearResponse& response, const Vector& ends, const Edge
 // Move the references of gaps to these edges where they have departed from them.
 //
 // `states` are those of the edges from now on. `pressure` is p, with which the last solution
-// gives the potentials. A gap that needs more nodes gets them, where it `raises` orders. Returns
-// false if the edges have no field: then the response serves for no others.
+// gives the potentials. If that one `is_lost`, moved gaps are linearised again in the next. A gap
+// that needs more nodes gets them, where it `raises` orders. Returns false if the edges have no
+// field: then the response serves for no others.
 bool move_references(LinearResponse& response, const Vector& ends, const EdgeStates& states,
                      double pressure, double prescribed, const EdgeLaw& law,
-                     const FieldModel& model, bool raises = true);
+                     const FieldModel& model, bool raises = true, bool is_lost = false);
 
 // Hold some edges where they are, and no others, and note which of all recede.
 void hold_edges(LinearResponse& response, const Vector& ends, const EdgeStates& states);

@@ -131,16 +131,6 @@ std::array<double, 4> sum_modes(const Gap& gap, const std::array<double, 4>& the
   return out;
 }
 
-double sum_pull(double theta, const Vector& sine, const Vector& cosine, const Vector& weight) {
-  const double s = std::sin(0.5 * theta), c = std::cos(0.5 * theta);
-  double total = 0;
-  for (size_t j = 0; j < sine.size(); ++j) {
-    const double half = s * cosine[j] - c * sine[j];
-    total += weight[j] / (half * half);
-  }
-  return total;
-}
-
 double work_of_gaps(const Field& field) {
   const Panels& panels = *field.model.panels;
   const Nodes& nodes = field.nodes;

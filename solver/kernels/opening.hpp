@@ -34,9 +34,6 @@ std::array<double, 4> sum_modes(const Gap& gap, const std::array<double, 4>& the
 // Integrate S_full T dθ over the gaps: by f, less π/2 s_n²/(n+1) of all modes above those of f.
 double work_of_gaps(const Field& field);
 
-// Sum weight_j / sin²((θ-φ_j)/2) over the nodes φ_j, from sine and cosine of φ_j/2.
-double sum_pull(double theta, const Vector& sine, const Vector& cosine, const Vector& weight);
-
 // A minimum by the parabola through three nodes.
 struct Candidate {
   double theta, opening, half;  // half the curvature

@@ -257,7 +257,12 @@ ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
   add_scaled(out.pressure, motion[1].data(), out.motion.data(), 2 * count);
   out.rate.resize(2 * count);
   add_scaled(rate, motion[1].data(), out.rate.data(), 2 * count);
-  for (int k : std::exchange(displaced, {})) linearise_in_current_potential(k, out.pressure, law);
+  for (int k : std::exchange(displaced, {})) {
+    about_pressure[k] = out.pressure;
+    for (int i = nodes.offset[k]; i < nodes.offset[k + 1]; ++i)
+      about[i] = potential[0][i] + out.pressure * potential[1][i];
+    linearise(k, law);
+  }
   return out;
 }
 
@@ -306,13 +311,6 @@ Vector LinearResponse::motion_to(const Vector& ends) const {
   for (int e = 0; e < int(ends.size()); ++e)
     motion[e] = outwards(e) * (ends[e] - nodes.gaps[e / 2].end[e % 2]);
   return motion;
-}
-
-void LinearResponse::linearise_in_current_potential(int k, double pressure, const EdgeLaw& law) {
-  about_pressure[k] = pressure;
-  for (int i = nodes.offset[k]; i < nodes.offset[k + 1]; ++i)
-    about[i] = potential[0][i] + pressure * potential[1][i];
-  linearise(k, law);
 }
 
 }  // namespace adhesis

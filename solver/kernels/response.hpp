@@ -67,6 +67,7 @@ struct LinearResponse {
   // Gaps moved so far, between held edges, that the old potential is not theirs: the next solution
   // ends with linearising them in its own.
   Integers displaced;
+  bool is_lost = false;  // whether the last solution is that of a search that failed
   Flags is_stale;  // whether a gap's edges have to be eliminated anew, before the next solution
 
   // Allocate the response of gaps with these nodes, which have room as its tree has.
@@ -79,9 +80,6 @@ struct LinearResponse {
   // A moving edge leaves a singular opening. The edge's own term follows from the translation of
   // the whole gap through its own loads and the potential of the others.
   void linearise(int k, const EdgeLaw& law);
-
-  // Linearise gap k about its potential in the last solution.
-  void linearise_in_current_potential(int k, double pressure, const EdgeLaw& law);
 
   // Solve for all edges, with d prescribed.
   ResponseSolution solve(double prescribed, const EdgeLaw& law, const LoadingDevice& device);

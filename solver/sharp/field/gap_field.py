@@ -39,6 +39,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 from adhesis.solver._kernels import SHAPE_NODES, Field
@@ -109,6 +110,11 @@ class GapField:
             check_definite(solution)
             self._solution, self._solve = solution, None
         return self._solution
+
+    @cached_property
+    def work(self) -> float:
+        """∫ S_full T dθ over the gaps."""
+        return self.solution.work_of_gaps()
 
     @property
     def nearly(self) -> tuple[float, float]:

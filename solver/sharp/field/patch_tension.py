@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adhesis.solver._kernels import sum_pull
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks, parabola_vertex
@@ -45,8 +44,13 @@ class RefinedTension:
 
     def at(self, theta: Array) -> Array:
         """Compute the tension at some positions on the contact."""
-        pull = sum_pull(theta, self._sine, self._cosine, self._source_weight) / (4 * np.pi)
-        return np.asarray(pull - self._source.panels.stress(theta) - self._pressure)
+        weight, sine, cosine = self._source_weight, self._sine, self._cosine
+        pull = [
+            (weight / (s * cosine - c * sine) ** 2).sum()
+            for s, c in zip(np.sin(0.5 * theta), np.cos(0.5 * theta), strict=True)
+        ]
+        stress = self._source.panels.stress(theta) + self._pressure
+        return np.asarray(np.array(pull) / (4 * np.pi) - stress)
 
     def inside(self, theta: float) -> bool:
         """Return whether a position lies on the contact."""

@@ -110,7 +110,7 @@ class States:
         self.count.energies += 1
         half, gaps, solution = self._half, point.gaps, point.field.solution
         q0_s, pressure, slope = solution.separation, solution.pressure, point.slope
-        elastic = self._full_energy + 0.5 * solution.work_of_gaps() - np.pi * q0_s * pressure
+        elastic = self._full_energy + 0.5 * point.field.work - np.pi * q0_s * pressure
         if held is not None:  # p is linear in d, and the energy quadratic
             (p_rate, s_rate, _), way = held[1].by_prescribed(), held[0] - point.d
             elastic -= np.pi * s_rate * way * (2 * pressure + p_rate * way)
