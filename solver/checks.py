@@ -434,8 +434,7 @@ def check_index(name: str, values: Any) -> None:
     ):
         raise ValueError(
             f"the index of {name} leaves rows out, or has another order, and the heights have no "
-            "positions: put the rows in with NaN (reindex), or number them anew "
-            "(reset_index(drop=True))"
+            "positions: put the rows in (reindex), or number them anew (reset_index(drop=True))"
         )
 
 
