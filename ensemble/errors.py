@@ -50,7 +50,7 @@ class InputError(_Printable, ValueError):
 
 
 class UnitError(InputError):
-    """A number has no unit of its quantity, or may mean two things; the text begins with a verb."""
+    """A number has no unit of its quantity, or one is to be given; the text begins with "is"."""
 
 
 class RankError(InputError):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import numbers
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
@@ -192,10 +193,8 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
 
 
-_SI_UNITS = frozenset(
-    ("", "-", "1", "m", "meter", "meters", "metre", "metres", "m²", "m2", "m³", "1/m²", "m-2",
-     "rad", "rad/m", "Pa", "Pa/m", "Pa m-1", "N/m", "J/m", "J m-1", "J/m²", "J/m2", "J m-2", "s")
-)  # fmt: skip
+_SI = r"(?:m|[Mm]et(?:er|re)s?|Pa|N|J|rad|s)[\^*²³]*-?\d?"
+_SI_UNIT = re.compile(rf"[-1]?|(?:1/)?{_SI}(?:[ */·]+{_SI})*")
 
 
 def carries_unit(value: object) -> bool:
@@ -209,7 +208,7 @@ def carries_unit(value: object) -> bool:
     unit = attributes.get("units", "") if isinstance(attributes, Mapping) else ""
     if isinstance(unit, Mapping):
         unit = unit.get(getattr(value, "name", None), "")
-    return unit is not None and str(unit) not in _SI_UNITS
+    return unit is not None and not _SI_UNIT.fullmatch(str(unit))
 
 
 def number_of(value: object) -> float | int | None:
@@ -434,8 +433,7 @@ def check_index(name: str, values: Any) -> None:
     ):
         raise ValueError(
             f"the index of {name} leaves rows out, or has another order, and the heights have no "
-            "positions: put the rows in with NaN (reindex), or number them anew "
-            "(reset_index(drop=True))"
+            "positions: put the rows in (reindex), or number them anew (reset_index(drop=True))"
         )
 
 

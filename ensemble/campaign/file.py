@@ -11,6 +11,7 @@ import os
 import re
 import tomllib
 from dataclasses import MISSING, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +58,11 @@ def _decoded(data: bytes, source: str) -> str:
         ) from error
 
 
-def parse_campaign(text: str, source: str = "campaign") -> Campaign:
-    """Check the text of a campaign file; ``source`` names it in errors (InputError)."""
+def parse_campaign(text: str, source: str = "campaign", *, is_stored: bool = False) -> Campaign:
+    """Check the text of a campaign file; ``source`` names it in errors (InputError).
+
+    ``is_stored``: an earlier run has taken the lists as they are, and stored them with its results.
+    """
     try:
         size = len(text.encode("utf-8"))
     except UnicodeEncodeError as error:
@@ -73,9 +77,12 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
         reason = _explained(text, " ".join(str(error).split()))
         raise InputError(f"{source} is not valid TOML: {reason}") from error
     try:
-        return _campaign_of(document, text)
+        campaign = _campaign_of(document, text)
+        if not is_stored:
+            _check_lists(campaign, document)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
+    return campaign
 
 
 def _campaign_of(document: dict[str, Any], text: str) -> Campaign:
@@ -167,6 +174,24 @@ def _read_table(
                 f"it must be {entry.metadata['rule'].text}"
             )
     return kind(**values)
+
+
+def _check_lists(campaign: Campaign, document: dict[str, Any]) -> None:
+    """Check that no list may be a number with a decimal comma, and that cells differ by name."""
+    for name, table in document.items():
+        for key, given in table.items():
+            for one, other in pairwise(given if isinstance(given, list) else []):
+                if type(one) is type(other) is int and one == 0 < other:
+                    raise InputError(
+                        f"[{name}] {key} holds 0,{other}: write 0.{other}, or 0.0, {other}.0 for "
+                        "two"
+                    )
+    for axis in campaign.axes:
+        if len({f"{value:g}" for value in axis.values}) < len(axis.values):
+            raise InputError(
+                f"[{axis.table}] {axis.name} is {shown(list(axis.values))}: it must be a list of "
+                "different values, in the first six digits, by which cells are named"
+            )
 
 
 def _check_zip(sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...]]]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 from adhesis.ensemble.errors import InputError, UnitError
@@ -87,11 +86,8 @@ def list_of(rule: Rule, *, may_be_empty: bool = False) -> Rule:
         if not isinstance(value, list) or not (value or may_be_empty):
             raise ValueError
         values = tuple(rule.read(v) for v in value)
-        if len({f"{v:g}" for v in values}) < len(values):  # by which cells are named
+        if len(set(values)) < len(values):
             raise ValueError
-        for one, other in pairwise(value):
-            if type(one) is type(other) is int and one == 0 < other:
-                raise UnitError(f"holds 0,{other}: write 0.{other}, or 0.0, {other}.0 for two")
         return values
 
     text = f"a list of different values, each {rule.text}"

@@ -61,7 +61,8 @@ class Results:
             schema.check_version(
                 self.path, self.attributes.get("file_type"), self.attributes["file_version"]
             )
-            self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
+            text = self.attributes["campaign"]
+            self.campaign = parse_campaign(text, str(self.path), is_stored=True)
             self.part = self._part()
             self._check_attributes()
             self._check_members()

@@ -56,6 +56,16 @@ def test_the_documentation_describes_every_dataset_and_no_other():
     assert described == known
 
 
+@pytest.mark.parametrize("list_", ["[0, 1]", "[0.04, 0.0400000001]"])
+def test_lists_that_an_earlier_run_took_are_read_with_its_results(list_, tmp_path):
+    text = re.sub(r"(work_of_adhesion =).*", rf"\1 {list_}", campaign_text())
+    with pytest.raises(InputError, match=r"holds 0,1: write 0\.1|different values"):
+        parse_campaign(text)
+    create(tmp_path / "r.h5", parse_campaign(text, is_stored=True), attributes={"mpi": "none"})
+    with Results(tmp_path / "r.h5") as results:
+        assert results.campaign.text == text
+
+
 def test_a_new_file_is_whole_and_pending_with_units_names_and_scales(path, campaign):
     with Results(path) as results:
         assert results.campaign == campaign

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -174,6 +175,23 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
     long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
     with pytest.raises(InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"):
         prepare_trace(long)
+
+
+def test_whole_numbers_between_commas_are_read_below_a_name_each(tmp_path: Path) -> None:
+    rows = [f"{k},{500 + k * k % 77},7,1" for k in range(99)]
+    path = put(tmp_path / "t.csv", ["x (um),z (nm),raw,mask", *rows])
+    trace = read_trace(path, columns=[1, 2])
+    assert trace.step == pytest.approx(1e-6)
+    assert trace.heights == pytest.approx([1e-9 * (500 + k * k % 77) for k in range(99)])
+
+
+@pytest.mark.parametrize("missing", [[50], [7, 50, 51]])
+def test_quotes_about_nothing_are_a_missing_height_of_pandas(missing, tmp_path):
+    table = pd.DataFrame({"z (um)": [float(z) for z in ZS]})
+    table.iloc[missing] = np.nan
+    table.to_csv(tmp_path / "t.csv", index=False, float_format="%.6f")
+    trace = read_trace(tmp_path / "t.csv", step=STEP)
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == missing
 
 
 def test_a_row_of_words_for_missing_numbers_keeps_its_place(tmp_path: Path) -> None:
@@ -368,6 +386,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "pairs of decimal commas": (
         [f"{x}, {z}".replace(".", ",") for x, z in PAIRS],
         {"unit": "um"},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
+    "pairs of decimal commas below names with units": (
+        ["x, um, z, um", *(f"{k},0,{1 + k % 7},{k % 9}" for k in range(99))],
+        {"columns": [1, 3]},
         r"give decimal \. if they are delimiters, or save it with semicolons",
     ),
     "triples of decimal commas": (

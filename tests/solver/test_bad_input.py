@@ -181,7 +181,9 @@ def labelled(units: object) -> pd.Series:
     return column
 
 
-@pytest.mark.parametrize("units", [*sorted({*UNITS.values(), ""}), {"z": "m"}, {"x": "um"}])
+@pytest.mark.parametrize(
+    "units", [*sorted({*UNITS.values(), ""}), "-", "J/m^2", "m**-2", {"z": "m"}, {"x": "um"}]
+)
 def test_a_column_in_si_units_is_a_row_of_numbers(units: object) -> None:
     column = labelled(units)
     assert profile_from_heights(column, PERIOD) == profile_from_heights(column.array, PERIOD)
@@ -198,6 +200,10 @@ ROWS: list[tuple[Any, type[Exception], str]] = [
     (np.array(["1", "2", "3"]), TypeError, " holds texts: every"),
     (np.array([0.0, 0.5]).view(WithUnit), TypeError, " carries a unit, which would be lost"),
     (labelled("um"), TypeError, " carries a unit, which would be lost"),
+    *(
+        (labelled(u), TypeError, " carries a unit, which would")
+        for u in ("mm", "MPa", "V", "10 m", "m/µm")
+    ),
     (labelled({"z": "um"}), TypeError, " carries a unit, which would be lost"),
     (xr.DataArray([0.0, 0.5], attrs={"units": "um"}), TypeError, " carries a unit, which would"),
     (["0", "1", "2"], TypeError, "[0] is '0': it must be a real number"),

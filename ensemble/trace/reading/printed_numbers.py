@@ -9,6 +9,7 @@ from itertools import pairwise, product
 from typing import NoReturn
 
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.reading.source import Source
 
 DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
@@ -110,11 +111,15 @@ def refuse_thousands(source: Source, columns: Sequence[Sequence[str]], decimal: 
 
 
 def find_form(
-    source: Source, sample: Sequence[str], delimiter: str | None, decimal: str | None
+    source: Source,
+    sample: Sequence[str],
+    delimiter: str | None,
+    decimal: str | None,
+    names: str = "",
 ) -> tuple[str, str]:
     """Return delimiter and decimal sign by which most lines are rows of numbers.
 
-    InputError if two ways of reading them differ.
+    InputError if two ways of reading them differ. ``names`` is the line above the numbers.
     """
     given = (("delimiter", delimiter, tuple(DELIMITERS)), ("decimal", decimal, (".", ",")))
     for name, sign, known in given:
@@ -143,7 +148,12 @@ def find_form(
         _refuse_two_ways(source, sample[0], f"leave out {parameter('decimal')}")
     if most and others and best[0] in ", ":
         return _one_comma(sample) or _refuse_two_ways(source, sample[0])
-    if decimal is None and best[0] == "," and all(map(_PAIRS.fullmatch, sample)):
+    # A name stands above each of the numbers; "x, mm, z, um" names two.
+    fields = split(names, ",")
+    has_names = not LENGTH.spellings.keys() & set(fields)
+    is_named = has_names and len(fields) == len(split(sample[0], ","))
+    is_doubtful = decimal is None and best[0] == "," and not is_named
+    if is_doubtful and all(map(_PAIRS.fullmatch, sample)):
         _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
 

@@ -175,9 +175,13 @@ class _Reader:
         return len(split(self.lines[place], self.delimiter)) >= self.count
 
     def holds_row(self, place: int) -> bool:
-        """Return whether a row holds a number, or a word for a missing one in its columns."""
+        """Return whether a row holds a number, or a word for a missing one in its columns.
+
+        Of one column, quotes about nothing are such a word: pandas writes them.
+        """
         row = self.rows[place]
-        return not row.is_empty or (self.is_whole(place) and any(row.fields))
+        held = self.lines[place].strip() if self.count == 1 else any(row.fields)
+        return not row.is_empty or (self.is_whole(place) and bool(held))
 
     def may_be_row(self, place: int, adjoins: bool) -> bool:
         """Return whether a line holds a row of numbers, or what may be a damaged one.
@@ -209,7 +213,8 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         )
     spread = sample[:: max(1, len(sample) // _SAMPLE)]
     is_given = decimal is not None
-    delimiter, decimal = find_form(source, spread, delimiter, decimal)
+    above = "".join(lines[: lines.index(sample[0])][-1:])
+    delimiter, decimal = find_form(source, spread, delimiter, decimal, above)
     count = Counter(len(split(line, delimiter)) for line in spread).most_common(1)[0][0]
     reader = _Reader(source, lines, delimiter, decimal, count)
     start = _first_row(reader)
@@ -384,7 +389,7 @@ def _refuse_dashes(reader: _Reader, column: Sequence[str], places: Sequence[int]
 
     Others stand for missing heights.
     """
-    dashes = [k for k, field in enumerate(column) if not any(map(str.isalnum, field))]
+    dashes = [k for k, field in enumerate(column) if field and not any(map(str.isalnum, field))]
     is_even = bool(dashes) and np.ptp(np.diff([-1, *dashes, len(column)])) == 0
     if len(dashes) == 1 or is_even:
         reader.refuse(
