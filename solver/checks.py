@@ -428,9 +428,7 @@ def check_index(name: str, values: Any) -> None:
     if index is None or index.dtype.kind not in ("i", "u", "f"):
         return
     apart = np.diff(index.to_numpy(float, na_value=np.nan))
-    if apart.size and (
-        np.ptp(np.sign(apart)) or np.abs(apart).max() >= 1.5 * np.abs(apart).min() > 0
-    ):
+    if apart.size and np.ptp(apart) > 0.5 * np.abs(apart).min():
         raise ValueError(
             f"the index of {name} leaves rows out, or has another order, and the heights have no "
             "positions: put the rows in (reindex), or number them anew (reset_index(drop=True))"

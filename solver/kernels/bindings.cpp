@@ -326,16 +326,6 @@ void bind_field(nb::module_& m) {
             return out;
           },
           "k"_a, "theta"_a, "modes"_a)
-      .def(
-          "refine_opening",
-          [](const Field& f, int k, const Vector& modes, int factor) {
-            const int count = fast_size(factor * (int(modes.size()) + 1) - 1);
-            auto [theta, opening, weight, same] =
-                rising(refine_opening(f.nodes.gaps[k], modes, count));
-            return std::pair(theta, opening);
-          },
-          "k"_a, "modes"_a, "factor"_a,
-          "Evaluate θ and T of gap k at about `factor` times as many nodes as modes.")
       .def("work_of_gaps", &work_of_gaps, Unlocked());
   m.def(
       "solve_field",

@@ -44,6 +44,18 @@ void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
   minimum.half = half;
 }
 
+// Round up a number N of nodes to one that many gaps share, N + 1 with small prime factors.
+int fast_size(int fewest) {
+  constexpr int many_nodes = 500;  // from so many on, sizes of the transform lie closer together
+  int eighth = 1;
+  while (16 * eighth <= fewest + 1) eighth *= 2;
+  for (int step : {9, 10, 12, 15}) {
+    if (fewest <= many_nodes && step != 12) continue;
+    if (step * eighth - 1 >= fewest) return step * eighth - 1;
+  }
+  return 16 * eighth - 1;
+}
+
 }  // namespace
 
 std::vector<Candidate> local_minima(const Vector& x, const Vector& y) {
@@ -70,17 +82,6 @@ std::vector<Candidate> local_minima(const Vector& x, const Vector& y) {
   return out;
 }
 
-int fast_size(int fewest) {
-  constexpr int many_nodes = 500;  // from so many on, sizes of the transform lie closer together
-  int eighth = 1;
-  while (16 * eighth <= fewest + 1) eighth *= 2;
-  for (int step : {9, 10, 12, 15}) {
-    if (fewest <= many_nodes && step != 12) continue;
-    if (step * eighth - 1 >= fewest) return step * eighth - 1;
-  }
-  return 16 * eighth - 1;
-}
-
 int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave) {
   double widest = 0;
   const auto circle = circle_of(24);
@@ -102,16 +103,6 @@ FineOpening open_gap(const Field& field, int k, const Circle& circle) {
       total += rule.weights[j] * field.scaled_opening[nodes.offset[k] + j] * rule.modes[j * m + n];
     out.modes[n] = 2 / pi * total;
   }
-  sine_sums(out.modes, circle, out.opening);
-  return out;
-}
-
-FineOpening refine_opening(const Gap& gap, Vector modes, int count) {
-  const Circle circle(count + 1);
-  FineOpening out{Vector(count), Vector(count), Vector(count), std::move(modes)};
-  out.modes.resize(count);
-  const std::span<const double> cosine(&circle.cosine[1], count), sine(&circle.sine[1], count);
-  place_nodes(gap, cosine, sine, out.theta.data(), out.theta_by_t.data());
   sine_sums(out.modes, circle, out.opening);
   return out;
 }

@@ -18,14 +18,8 @@ struct FineOpening {
 // there are no fewer than `modes`, those of its field.
 int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave);
 
-// Round up a number N of nodes to one that many gaps share, N + 1 with small prime factors.
-int fast_size(int fewest);
-
 // Evaluate the opening of gap k at the nodes of a circle.
 FineOpening open_gap(const Field& field, int k, const Circle& circle);
-
-// Evaluate θ and T of a gap, θ falling, at `count` nodes, from fewer modes.
-FineOpening refine_opening(const Gap& gap, Vector modes, int count);
 
 // Sum b_n sin((n+1)t), cos t = η(θ), over n, at four places.
 std::array<double, 4> sum_modes(const Gap& gap, const std::array<double, 4>& theta,

@@ -57,7 +57,8 @@ def openings_of(field: GapField, q0: float) -> list[Opening]:
     out = []
     for k, (left, right) in enumerate(field.gaps):
         modes = field.fine_opening(k).modes
-        theta, sine_sum = field.solution.refine_opening(k, modes, _FINER)
-        theta = np.concatenate([[left], theta, [right]])
-        out.append(Opening(theta / q0, np.concatenate([[0.0], sine_sum, [0.0]]) / q0))
+        along = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, _FINER * (modes.size + 1) + 1))
+        theta = left + (right - left) * along
+        inside = field.solution.sum_modes(k, theta[1:-1], modes)
+        out.append(Opening(theta / q0, np.concatenate([[0.0], inside, [0.0]]) / q0))
     return out
