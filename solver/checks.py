@@ -421,10 +421,9 @@ def check_index(name: str, values: Any) -> None:
 
     Its numeric index then has unequal steps; other objects pass.
     """
-    if hasattr(values, "iloc"):  # which tables and columns of pandas have
-        index = values.index
-    else:
-        index = next(iter(getattr(values, "indexes", {}).values()), None)
+    # tables and columns of pandas have iloc
+    indexes = [values.index] if hasattr(values, "iloc") else getattr(values, "indexes", {}).values()
+    index = next(iter(indexes), None)
     if index is None or index.dtype.kind not in ("i", "u", "f"):
         return
     apart = np.diff(index.to_numpy(float, na_value=np.nan))

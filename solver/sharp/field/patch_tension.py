@@ -44,13 +44,12 @@ class RefinedTension:
 
     def at(self, theta: Array) -> Array:
         """Compute the tension at some positions on the contact."""
-        weight, sine, cosine = self._source_weight, self._sine, self._cosine
+        weight, sine, cosine = self._source_weight / (4 * np.pi), self._sine, self._cosine
         pull = [
             (weight / (s * cosine - c * sine) ** 2).sum()
             for s, c in zip(np.sin(0.5 * theta), np.cos(0.5 * theta), strict=True)
         ]
-        stress = self._source.panels.stress(theta) + self._pressure
-        return np.asarray(np.array(pull) / (4 * np.pi) - stress)
+        return np.array(pull) - self._source.panels.stress(theta) - self._pressure
 
     def inside(self, theta: float) -> bool:
         """Return whether a position lies on the contact."""
