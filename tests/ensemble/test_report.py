@@ -691,6 +691,8 @@ def test_a_report_compares_and_doubts_no_loss_without_adhesion(tmp_path):
     data = aggregate(write(tmp_path / "none.h5", plan, values))
     assert findings.verdict(data) == [last]
     assert "jump_energies" not in {figure.name for figure in catalogue.sections(data)["mechanisms"]}
+    with few_figures(), pytest.warns(UserWarning, match="no positive values"):
+        loss_figures.jump_energies(data).finish()  # asked for from Python
 
 
 def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):

@@ -225,6 +225,8 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
 def _occupied(data: Aggregate) -> slice:
     """The bins from the first to the last that holds a jump of any cell; at most eight decades."""
     filled = np.flatnonzero(np.sum([cell.jumps.histogram for cell in data.cells], axis=(0, 1)))
+    if not filled.size:  # drawn from Python: the report leaves the figure out
+        return slice(0, 1)
     stop = int(filled[-1]) + 1
     return slice(int(filled[filled >= stop - 8 * BINS_PER_DECADE][0]), stop)
 
