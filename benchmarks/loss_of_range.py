@@ -125,7 +125,7 @@ def figure(path: Path) -> None:
             **({"yscale": "log", "ylim": (2e-4, 2)} if scene == "steel" else {"ylim": (0, 1.1)})
         )
         axes.xaxis.set_minor_formatter(NullFormatter())
-    panels[0].set_xticks([30, 100, 300], ["30", "100", "300"])
+    panels[0].set_xticks([10, 30, 100, 300], ["10", "30", "100", "300"])
     panels[0].set_ylabel("loss over that of zero range")
     panels[0].legend(frameon=False, fontsize=8, loc="lower left")
     figure.savefig(path, dpi=160)
