@@ -141,36 +141,24 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
     )
 
 
-_STATES = ("field_branch", "field_penetration")
+def _field(name: str, unit: str, meaning: str, *dims: str) -> Dataset:
+    return Dataset(name, unit, meaning, FIELD, dims)
 
 
-def _reduced(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Dataset:
-    return Dataset(name, ("task", *dims), FIELD, unit, meaning)
-
-
-def _kept(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Dataset:
-    return Dataset(name, (KEPT, *dims, "field_position"), FIELD, unit, meaning)
-
-
+_SPECTRUM = "two-sided spectral density of the"
+_BINNED = ("task", "field_branch", "field_penetration")
+_SHAPE = (KEPT, "field_branch", "field_penetration", "field_position")
 FIELD_DATASETS = (
-    _reduced("psd_height", ("wave_number",), "m3", "two-sided spectral density of the profile"),
-    _reduced("height_density", ("height_bin",), "1", "probability density of height/h_rms"),
-    _reduced(
-        "psd_displacement",
-        (*_STATES, "wave_number"),
-        "m3",
-        "two-sided spectral density of the deformed surface",
+    _field("psd_height", "m3", f"{_SPECTRUM} profile", "task", "wave_number"),
+    _field("height_density", "1", "probability density of height/h_rms", "task", "height_bin"),
+    _field("psd_displacement", "m3", f"{_SPECTRUM} deformed surface", *_BINNED, "wave_number"),
+    _field(
+        "gap_density", "1", "probability density of gap/h_max out of contact", *_BINNED, "gap_bin"
     ),
-    _reduced(
-        "gap_density",
-        (*_STATES, "gap_bin"),
-        "1",
-        "probability density of gap/h_max out of contact",
-    ),
-    _kept("field_height", (), "m", "height of the rigid profile"),
-    _kept("field_displacement", _STATES, "m", "displacement of the elastic surface"),
-    _kept("field_stress", _STATES, "Pa", "stress, compression positive"),
-    _kept("field_gap", _STATES, "m", "gap"),
+    _field("field_height", "m", "height of the rigid profile", KEPT, "field_position"),
+    _field("field_displacement", "m", "displacement of the elastic surface", *_SHAPE),
+    _field("field_stress", "Pa", "stress, compression positive", *_SHAPE),
+    _field("field_gap", "m", "gap", *_SHAPE),
 )
 
 
