@@ -27,6 +27,7 @@ from adhesis.ensemble.campaign.rules import (
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import HEIGHT
 from adhesis.solver import checks
+from adhesis.solver.model.jump import BRANCHES, Branch
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
@@ -493,10 +494,11 @@ class Campaign:
     def _top(self) -> float:
         return 1.0 if self.has_axis("max_penetration") else self.cycle.deepest
 
-    def penetration_unit(self, task: Task) -> float:
-        """Return the factor that turns the penetration axes of the results file into Δ/h_max."""
+    def curve_axes(self, task: Task) -> dict[Branch, Array]:
+        """Return Δ/h_max of the curves of a task, which share the axes of the results file."""
         several = self.has_axis("max_penetration")
-        return self.at(task).cycle.turning_point if several else 1.0
+        unit = self.at(task).cycle.turning_point if several else 1.0
+        return {branch: unit * getattr(self, f"{branch}_penetration") for branch in BRANCHES}
 
     def value(self, key: str) -> Any:
         """Return the value in the tables of a key ("cycle.load_steps")."""

@@ -45,27 +45,20 @@ HEIGHT_BINS: Array = 0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:])
 class FieldPlan:
     """States of which a campaign keeps fields, and bins of their statistics."""
 
+    campaign: Campaign  # its tables hold the values of the task, if the plan is that of one
     period: float  # λ in m
-    # lowest_harmonic, highest_harmonic: of the profile
-    lowest_harmonic: int
-    highest_harmonic: int
     finest_harmonic: int  # highest harmonic of all profiles of the campaign
     # Δ/h_max; under a load and at a preload 1, and then all penetrations here are mean stresses
     # over max_stress or preload
     max_penetration: float
-    load_steps: int
-    wanted: tuple[float, ...]  # penetrations Δ/h_max as the campaign gives them
-    max_nodes: int  # largest number of nodes of a stored field
-    # max_stress, preload: in Pa, under a load, and at a preload
-    max_stress: float | None = None
-    preload: float | None = None
 
     @cached_property
     def penetration(self) -> Array:
         """Δ/h_max of the states, ascending: the wanted ones moved to the nearest load step."""
-        step = self.max_penetration / self.load_steps
-        index = {round(value / step) for value in self.wanted}
-        return np.array([step * k for k in sorted(index)])
+        top, wanted = self.max_penetration, self.campaign.output.field_penetrations
+        step = top / self.campaign.cycle.load_steps
+        wanted = (top / 3, 2 * top / 3, top) if wanted is None else wanted
+        return np.array([step * k for k in sorted({round(value / step) for value in wanted})])
 
     @cached_property
     def nodes(self) -> int:
@@ -76,7 +69,7 @@ class FieldPlan:
     def stride(self) -> int:
         """Distance of the nodes of a stored field, in nodes of the computed one; a power of two."""
         stride = 1
-        while self.nodes // stride > self.max_nodes:
+        while self.nodes // stride > self.campaign.output.field_nodes:
             stride *= 2
         return stride
 
@@ -97,7 +90,8 @@ class FieldPlan:
     def filled(self) -> NDArray[np.bool_]:
         """Bins of the spectra in which the profile has every harmonic, shape (bins,)."""
         first, last = self.harmonic_edges[:-1], self.harmonic_edges[1:] - 1
-        return np.asarray((first >= self.lowest_harmonic) & (last <= self.highest_harmonic))
+        n0, ratio = self.campaign.profile.n0, self.campaign.profile.ratio
+        return np.asarray((first >= n0) & (last <= n0 * ratio))
 
     @cached_property
     def wave_number(self) -> Array:
@@ -127,9 +121,9 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
         meaning = "position of a node of a kept field"
         positions = Scale("field_position", plan.position, "m", meaning)
     depth = f"penetration/{'max_penetration' if 'max_penetration' in several else 'h_max'}"
-    if plan.max_stress is not None:
+    if plan.campaign.cycle.under_load:
         depth = "mean stress/max_stress"
-    if plan.preload is not None:
+    if plan.campaign.cycle.preload is not None:
         depth = "mean stress/preload"
     return (
         waves,
@@ -168,25 +162,13 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
     All tasks have the spectral bins of the finest profile of the campaign.
     """
     here = campaign if task is None else campaign.at(task)
-    profile, cycle, output = here.profile, here.cycle, here.output
-    top, period = 1.0 if cycle.turns_at_stress else cycle.turning_point, profile.period
+    cycle, period = here.cycle, here.profile.period
+    top = 1.0 if cycle.turns_at_stress else cycle.turning_point
     if task is None and campaign.has_axis("max_penetration"):
         top = 1.0
     if task is None and campaign.has_axis("period"):
         period = 2 * np.pi
-    wanted = output.field_penetrations
-    return FieldPlan(
-        period=period,
-        lowest_harmonic=profile.n0,
-        highest_harmonic=profile.n0 * profile.ratio,
-        finest_harmonic=campaign.finest_harmonic,
-        max_penetration=top,
-        load_steps=cycle.load_steps,
-        wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,
-        max_nodes=output.field_nodes,
-        max_stress=cycle.turning_point if cycle.under_load else None,
-        preload=cycle.preload,
-    )
+    return FieldPlan(here, period, campaign.finest_harmonic, top)
 
 
 def field_row(
@@ -208,7 +190,8 @@ def field_row(
     row["height_density"][:] = count / (np.diff(HEIGHT_EDGES) * height.size)
     if keep:
         row["field_height"][:] = height[pick]
-    found = _at_penetrations(plan, loop) if plan.preload is None else _at_stresses(plan, loop)
+    at_preload = plan.campaign.cycle.preload is not None
+    found = _at_stresses(plan, loop) if at_preload else _at_penetrations(plan, loop)
     for place, state in found.items():
         fields = method.fields(state, plan.nodes)
         row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
@@ -233,10 +216,9 @@ def _at_penetrations(plan: FieldPlan, loop: LoopResult) -> _Found:
         if not state.patches or not plan.penetration.size:
             continue
         # with a stiffness, the penetration of the far side
-        if plan.max_stress is None:
-            penetration = problem.penetration(problem.prescribed_in(state))
-        else:
-            penetration = state.mean_stress / plan.max_stress
+        penetration = problem.penetration(problem.prescribed_in(state))
+        if plan.campaign.cycle.under_load:
+            penetration = state.mean_stress / plan.campaign.cycle.turning_point
         distance = np.abs(plan.penetration - penetration)
         nearest = int(np.argmin(distance))
         # States between load steps differ from the axis by far more than rounding.
@@ -247,11 +229,10 @@ def _at_penetrations(plan: FieldPlan, loop: LoopResult) -> _Found:
 
 def _at_stresses(plan: FieldPlan, loop: LoopResult) -> _Found:
     """Find the states at the parts of the preload; none that the loop lacks."""
-    assert plan.preload is not None
     found: _Found = {}
     for number, part in enumerate(plan.penetration.tolist()):
         for branch in BRANCHES:
             with suppress(ValueError):  # the preload was not reached
-                state = loop.at_stress(part * plan.preload, branch).state
+                state = loop.at_stress(part * plan.campaign.cycle.turning_point, branch).state
                 found[BRANCHES.index(branch), number] = state
     return found

@@ -311,7 +311,7 @@ def beside_paper(data: Aggregate, figure: PaperFigure) -> str:
     gammas = tuple(cell.work_of_adhesion for cell in cells)
     shown = f"The paper's figure is at {_place(figure.hurst, figure.works_of_adhesion, at)}"
     # A state is stored at the load step that is nearest to the penetration that was asked for.
-    half = 0.5 * plan.max_penetration / plan.load_steps
+    half = 0.5 * plan.max_penetration / plan.campaign.cycle.load_steps
     near = at is None or drawn is None or abs(drawn - at) <= 1.001 * half
     if (cells[0].hurst, gammas, near) == (figure.hurst, figure.works_of_adhesion, True):
         return f"{shown}."
