@@ -84,7 +84,7 @@ def wrong_values(entry: dataclasses.Field) -> Iterator[str]:
     yield from (f"[{value}]" for value in wrong) if is_list else wrong
     if is_list:
         yield from ("0.5", "[0.5, 0.5]", "[0.0, -0.0]")
-    elif entry.metadata["axis"] is None:
+    elif not entry.metadata["axis"]:
         yield "[1, 2]"
     else:
         yield from ("[]", f"[{wrong[0]}]")
