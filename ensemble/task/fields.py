@@ -13,7 +13,6 @@ gap, so that the density of the gap integrates to the fraction out of contact.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -108,22 +107,20 @@ class FieldPlan:
         return np.asarray(total / np.diff(edges))
 
 
-def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale, ...]:
-    """Return the dimensions of the datasets of fields.
-
-    Lengths are in units of the keys that have ``several`` values.
-    """
-    if "period" in several:
+def field_scales(plan: FieldPlan) -> tuple[Scale, ...]:
+    """Return the dimensions of the datasets of fields, lengths in units of keys with a list."""
+    campaign = plan.campaign
+    if campaign.has_axis("period"):
         waves = Scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
         positions = Scale("field_position", plan.position, "1", "q0 times the position of a node")
     else:
         waves = Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin")
         meaning = "position of a node of a kept field"
         positions = Scale("field_position", plan.position, "m", meaning)
-    depth = f"penetration/{'max_penetration' if 'max_penetration' in several else 'h_max'}"
-    if plan.campaign.cycle.under_load:
+    depth = f"penetration/{'max_penetration' if campaign.has_axis('max_penetration') else 'h_max'}"
+    if campaign.cycle.under_load:
         depth = "mean stress/max_stress"
-    if plan.campaign.cycle.preload is not None:
+    if campaign.cycle.preload is not None:
         depth = "mean stress/preload"
     return (
         waves,

@@ -177,7 +177,7 @@ def row_scales(campaign: Campaign) -> tuple[Scale, ...]:
             "unloading_penetration", campaign.unloading_penetration, "1", f"{depth} on unloading"
         ),
         Scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
-        *field_scales(field_plan(campaign), {axis.name for axis in campaign.axes[2:]}),
+        *field_scales(field_plan(campaign)),
     )
 
 
