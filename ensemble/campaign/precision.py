@@ -21,17 +21,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from adhesis.ensemble.interval import Estimate, estimates
+from adhesis.ensemble.interval import Array, Estimate, estimates
 from adhesis.ensemble.quantities import percent
 from adhesis.solver.checks import counted
 
 LEAST = 32
 LOOKS_IN_A_ROW = 4
 MOST_LISTED = 20  # cells in the closing lines of a run and among the findings of a report
-
-Array = NDArray[np.float64]
 
 
 def looks(first: int, batch: int, most: int) -> list[int]:
