@@ -124,7 +124,7 @@ def _group(cell: Cell) -> dict[str, Any]:
     if (now := cell.precision) is not None:
         group |= {
             "quantity": now.quantity,
-            "relative_error": finite(now.relative_error),
+            "relative_error": finite(now.estimate.relative_error),
             "interval_low": finite(now.estimate.low),
             "interval_high": finite(now.estimate.high),
             "wanted_relative_error": now.wanted,
