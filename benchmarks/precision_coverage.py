@@ -145,7 +145,7 @@ def of_the_study(
         known = precision(drawn[:count, 0], wanted)
         held += known.estimate.low <= 1 <= known.estimate.high
         counts.append(count)
-        reach.append(known.relative_error)
+        reach.append(known.estimate.relative_error)
     return held / campaigns, float(np.median(reach)), float(np.median(counts))
 
 

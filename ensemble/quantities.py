@@ -402,11 +402,11 @@ def bytes_text(size: float) -> str:
     return f"{size / 1e6:.0f} MB" if size >= 1e7 else f"{size / 1e3:.0f} kB"
 
 
-def with_error(value: float, error: float, least: float = -math.inf, most: float = math.inf) -> str:
+def with_error(value: float, error: float, most: float = math.inf) -> str:
     """Return "9700 ± 800" or "0.0351 ± 0.0012".
 
     The last digit is the first one of the error, or the second where the first is 1 or 2. Where the
-    error reaches beyond the bounds ``least`` and ``most`` of the quantity, the ends of the interval
+    error reaches below 0 or above ``most``, the bounds of the quantity, the ends of the interval
     are given instead: "0.995, from 0.975 to 1".
     """
     if not 0 < error < math.inf:
@@ -416,8 +416,8 @@ def with_error(value: float, error: float, least: float = -math.inf, most: float
     if places > _MOST_PLACES:
         return f"{value:.4g} ± {error:.2g}"
     shown = max(places, 0)
-    low, high = max(value - error, least), min(value + error, most)
-    if least <= value <= most and high - low < 2 * error * (1 - 1e-9):
+    low, high = max(value - error, 0.0), min(value + error, most)
+    if 0 <= value <= most and high - low < 2 * error * (1 - 1e-9):
         middle, *ends = (f"{round(part, places):.{shown}f}" for part in (value, low, high))
         return f"{middle}, from {ends[0]} to {ends[1]}"
     value = round(value, places) + 0.0  # no sign of a nought

@@ -132,13 +132,13 @@ def _losses_in_contact(
     found: dict[int, float] = {}
     for rows in cells.values():
         here = results.campaign.at(tasks[rows[0]])
-        unit = results.campaign.penetration_unit(tasks[rows[0]])
+        axes = results.campaign.curve_axes(tasks[rows[0]])
         modulus = here.material.young / (1 - here.material.poisson**2)
         scale = 0.5 * modulus * (2 * np.pi / here.profile.period) * column["h_max"][rows]
         values = without_detached(
-            unit * results.campaign.loading_penetration,
+            axes["loading"],
             curves["loading_mean_stress"][rows] / scale[:, None],
-            unit * results.campaign.unloading_penetration,
+            axes["unloading"],
             curves["unloading_mean_stress"][rows] / scale[:, None],
             curves["unloading_contact_fraction"][rows] > 0,
         )
@@ -191,14 +191,14 @@ def _turn(
     campaign = results.campaign
     if campaign.at(task).cycle.under_load:
         return [campaign.at(task).cycle.max_stress, None, None, None, None, None]
-    unit = campaign.penetration_unit(task)
-    down = unit * campaign.unloading_penetration
+    axes = campaign.curve_axes(task)
+    down = axes["unloading"]
     load, unload = curve["loading_mean_stress"], curve["unloading_mean_stress"]
     h_max = column["h_max"][row]
     here = campaign.at(task)
     modulus = here.material.young / (1 - here.material.poisson**2)
     scale = 0.5 * modulus * (2 * np.pi / here.profile.period) * h_max  # σ~ = p̄/scale
-    gained = np.trapezoid(load, unit * campaign.loading_penetration) / scale
+    gained = np.trapezoid(load, axes["loading"]) / scale
     whole = gained - np.trapezoid(unload[::-1], down[::-1]) / scale
     # down to Δ = 0, where the axis need not have a place
     last = int(np.argmax(down <= 0))

@@ -122,8 +122,9 @@ def fitted_slope(plan: FieldPlan, density: Array) -> tuple[float, float]:
     half if it is shorter than two decades). NaN if fewer than three bins lie there.
     """
     wave_number = plan.wave_number
-    lowest = plan.lowest_harmonic * 2 * np.pi / plan.period
-    span = min(10.0, float(np.sqrt(plan.highest_harmonic / plan.lowest_harmonic)))
+    profile = plan.campaign.profile
+    lowest = profile.n0 * 2 * np.pi / plan.period
+    span = min(10.0, float(np.sqrt(profile.ratio)))
     chosen = plan.filled & (wave_number <= lowest * span) & (density > 0)
     if np.sum(chosen) < 3:
         return float("nan"), float("nan")

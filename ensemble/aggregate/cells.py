@@ -23,6 +23,7 @@ from adhesis.ensemble.task.row import JUMP_COUNT, NUMBERS, TIMES
 from adhesis.solver.loading.zero_range import RANGES, least_range
 from adhesis.solver.model import problem
 from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 
 Rows = NDArray[np.intp]
@@ -53,7 +54,7 @@ class Cell:
     work_of_adhesion: float
     others: tuple[tuple[str, float], ...]  # names of the further axes, and the values there
     campaign: Campaign  # its tables hold the values of the cell
-    penetration: dict[str, Array]  # Δ/h_max of the curves of each branch
+    penetration: dict[Branch, Array]  # Δ/h_max of the curves of each branch
     plan: FieldPlan  # states with stored fields: their Δ/h_max, wave numbers, positions
     # done, failed, pending, not_needed: numbers of tasks
     done: int
@@ -170,7 +171,7 @@ def read_cells(results: Results) -> list[Cell]:
     columns = {name: results.column(name) for name in _PER_TASK}
     cells = []
     for task, rows_of_cell in tasks.by_cell():
-        of_cell, unit = campaign.at(task), campaign.penetration_unit(task)
+        of_cell = campaign.at(task)
         of_rows = status[rows_of_cell]
         rows = rows_of_cell[of_rows == DONE]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
@@ -193,10 +194,7 @@ def read_cells(results: Results) -> list[Cell]:
                 work_of_adhesion=task.work_of_adhesion,
                 others=task.others,
                 campaign=of_cell,
-                penetration={
-                    "loading": campaign.loading_penetration * unit,
-                    "unloading": campaign.unloading_penetration * unit,
-                },
+                penetration=campaign.curve_axes(task),
                 plan=field_plan(campaign, task),
                 **{name: int(np.sum(of_rows == code)) for name, code in COUNTS.items()},
                 rows=rows,

@@ -124,7 +124,7 @@ def _group(cell: Cell) -> dict[str, Any]:
     if (now := cell.precision) is not None:
         group |= {
             "quantity": now.quantity,
-            "relative_error": finite(now.relative_error),
+            "relative_error": finite(now.estimate.relative_error),
             "interval_low": finite(now.estimate.low),
             "interval_high": finite(now.estimate.high),
             "wanted_relative_error": now.wanted,
@@ -191,7 +191,7 @@ def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
     shown = ""
     if loss is not None:
         loss *= 1e3
-        shown = f"  {loss:.4g}" if error is None else f"  {with_error(loss, 1e3 * error, 0.0)}"
+        shown = f"  {loss:.4g}" if error is None else f"  {with_error(loss, 1e3 * error)}"
     return (
         f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} "
         + "".join(f"{group[name]:{len(heading)}.4g}  " for name, heading in further.items())

@@ -50,8 +50,7 @@ def _extends(key: str, was: Any, now: Any) -> bool:
         return bool(now > was)
     if key == "stop.relative_error":
         return was is not None and now is not None and bool(now < was)
-    axis = KEYS[key].metadata["axis"] is not None
-    if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not axis:
+    if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not KEYS[key].metadata["axis"]:
         return False
     # All turning points of a profile belong together: they do not become more.
     if key in [f"cycle.{name}" for name in TURNING_POINTS]:

@@ -160,7 +160,7 @@ def _read_table(
     values = {}
     for key, value in entries.items():
         metadata, where = known[key].metadata, f"[{name}] {key}"
-        if metadata["axis"] is not None and isinstance(value, list):
+        if metadata["axis"] and isinstance(value, list):
             several = list_of(metadata["rule"])(where, value)
             values[key] = min(several)
             if len(several) > 1:

@@ -21,17 +21,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from adhesis.ensemble.interval import Estimate, estimates
+from adhesis.ensemble.interval import Array, Estimate, estimates
 from adhesis.ensemble.quantities import percent
 from adhesis.solver.checks import counted
 
 LEAST = 32
 LOOKS_IN_A_ROW = 4
 MOST_LISTED = 20  # cells in the closing lines of a run and among the findings of a report
-
-Array = NDArray[np.float64]
 
 
 def looks(first: int, batch: int, most: int) -> list[int]:
@@ -60,14 +57,9 @@ class Precision:
     finished: bool = True  # whether no realisation of the cell is still to be computed
 
     @property
-    def relative_error(self) -> float:
-        """Distance of the further end of the interval over the mean; infinite without one."""
-        return self.estimate.relative_error
-
-    @property
     def narrow(self) -> bool:
         """Whether the interval is narrow enough, over enough realisations."""
-        return self.estimate.n >= LEAST and self.relative_error <= self.wanted
+        return self.estimate.n >= LEAST and self.estimate.relative_error <= self.wanted
 
     @property
     def met(self) -> bool | None:
@@ -76,10 +68,10 @@ class Precision:
 
     def __str__(self) -> str:
         known = f"{self.quantity}: interval unknown"
-        if np.isfinite(self.relative_error):
+        if np.isfinite(self.estimate.relative_error):
             known = (
                 f"{self.quantity} {self.estimate.low:.4g} to {self.estimate.high:.4g} "
-                f"(± {percent(self.relative_error, digits=3)})"
+                f"(± {percent(self.estimate.relative_error, digits=3)})"
             )
         verdict = {True: "met", False: "not met", None: "not finished"}[self.met]
         if self.met is False and self.estimate.n < LEAST:

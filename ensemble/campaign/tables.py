@@ -27,60 +27,62 @@ from adhesis.ensemble.campaign.rules import (
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import HEIGHT
 from adhesis.solver import checks
+from adhesis.solver.checks import Bounds
+from adhesis.solver.model.jump import BRANCHES, Branch
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
 
+# Units of bounds as UDUNITS reads them; numbers without a unit and in units of h_max have "1".
+_UDUNITS = {"m": "m", "m²": "m2", "Pa": "Pa", "Pa/m of nominal area": "Pa m-1", "J/m²": "J m-2"}
+
 
 def _key(
-    rule: Rule,
+    rule: Rule | Bounds,
     meaning: str,
     default: Any = MISSING,
     *,
     free: bool = False,
-    axis: str | None = None,
+    axis: bool = False,
 ) -> Any:
-    """Return a dataclass field for one key.
+    """Return a dataclass field for one key; its rule is that of a number if bounds are given.
 
     ``free`` marks a key that cannot change a result: it may differ when a file is resumed.
-    ``axis`` is the unit (as UDUNITS reads it) of a number that may be a list, and then is an axis.
+    ``axis`` marks a number that may be a list, and then is an axis.
     """
+    rule = number_in(rule) if isinstance(rule, Bounds) else rule
     metadata = {"rule": rule, "meaning": meaning, "free": free, "axis": axis}
     return field(default=default, metadata=metadata)
 
 
 # The far side of a stiffness may go beyond 1; at a fixed separation the file's rules refuse that.
-_DISPLACEMENT = checks.Bounds(0.0, checks.FAR_DISPLACEMENT.high, without_low=True)
+_DISPLACEMENT = Bounds(0.0, checks.FAR_DISPLACEMENT.high, without_low=True)
 # Penetrations at which fields are stored.
-_STORED = checks.Bounds(-1000, 1, without_low=True, without_high=True)
+_STORED = Bounds(-1000, 1, without_low=True, without_high=True)
 
 
 @dataclass(frozen=True)
 class ProfileTable:
     """``[profile]``: the rough profile, by the spectral method."""
 
-    period: float = _key(number_in(checks.LENGTH), "period λ in m", axis="m")
-    n0: int = _key(
-        number_in(checks.HARMONIC), "lowest harmonic: its wave number is n0 · 2π/λ", axis="1"
-    )
-    ratio: int = _key(
-        number_in(checks.HARMONIC), "highest over lowest wave number, q_max/q_min", axis="1"
-    )
+    period: float = _key(checks.LENGTH, "period λ in m", axis=True)
+    n0: int = _key(checks.HARMONIC, "lowest harmonic: its wave number is n0 · 2π/λ", axis=True)
+    ratio: int = _key(checks.HARMONIC, "highest over lowest wave number, q_max/q_min", axis=True)
     rolloff: float = _key(
-        number_in(checks.ROLLOFF),
+        checks.ROLLOFF,
         "roll-off over lowest wave number, q_r/q_min: the spectrum is flat below",
         1.0,
-        axis="1",
+        axis=True,
     )
     h_rms: float | None = _key(
-        number_in(NORMALISATIONS["h_rms"], HEIGHT), "root mean square height in m", None, axis="m"
+        number_in(NORMALISATIONS["h_rms"], HEIGHT), "root mean square height in m", None, axis=True
     )
-    m2: float | None = _key(number_in(NORMALISATIONS["m2"]), "mean square slope", None, axis="1")
+    m2: float | None = _key(NORMALISATIONS["m2"], "mean square slope", None, axis=True)
     c0: float | None = _key(
-        number_in(NORMALISATIONS["c0"]),
+        NORMALISATIONS["c0"],
         "|a_n0|² in m², the same for every H (C0 of the spectrum)",
         None,
-        axis="m2",
+        axis=True,
     )
     amplitudes: Amplitudes = _key(  # noqa: RUF009  # a field
         choice(*get_args(Amplitudes)),
@@ -99,25 +101,25 @@ class ProfileTable:
 class MaterialTable:
     """``[material]``: the elastic half-space, and the strength of the interface."""
 
-    young: float = _key(number_in(checks.YOUNG), "Young's modulus E in Pa", axis="Pa")
-    poisson: float = _key(number_in(checks.POISSON), "Poisson's ratio ν", axis="1")
+    young: float = _key(checks.YOUNG, "Young's modulus E in Pa", axis=True)
+    poisson: float = _key(checks.POISSON, "Poisson's ratio ν", axis=True)
     adhesion_range: float | None = _key(
-        number_in(checks.ADHESION_RANGE),
+        checks.ADHESION_RANGE,
         "range δ of adhesion in m: surfaces touch at a gap of δ, and patches open from inside at "
         "the strength γ/δ (method sharp alone); by default zero, "
         "so that they never do",
         None,
-        axis="m",
+        axis=True,
     )
     strength: float | None = _key(
-        number_in(checks.STRENGTH), "instead of adhesion_range, the strength in Pa", None, axis="Pa"
+        checks.STRENGTH, "instead of adhesion_range, the strength in Pa", None, axis=True
     )
     work_of_adhesion_open: float | None = _key(
-        number_in(checks.WORK_OF_ADHESION),
+        checks.WORK_OF_ADHESION,
         "work of adhesion in J/m² where an edge recedes, at least γ, at which it advances; between "
         "both it is pinned. By default γ",
         None,
-        axis="J m-2",
+        axis=True,
     )
     measure: Measure = _key(  # noqa: RUF009  # a field
         choice(*get_args(Measure)),
@@ -125,17 +127,17 @@ class MaterialTable:
         "arc",
     )
     stripes: int | None = _key(
-        number_in(checks.HARMONIC),
+        checks.HARMONIC,
         "the work of adhesion varies so many times along the period, about γ: "
         "γ (1 + stripe_amplitude cos(2π stripes x/λ + stripe_phase))",
         None,
-        axis="1",
+        axis=True,
     )
     stripe_amplitude: float | None = _key(
-        number_in(checks.SHARE), "share of γ by which it varies", None, axis="1"
+        checks.SHARE, "share of γ by which it varies", None, axis=True
     )
     stripe_phase: float = _key(
-        number_in(checks.FINITE), "phase of the stripes at x = 0, in rad", 0.0, axis="1"
+        checks.FINITE, "phase of the stripes at x = 0, in rad", 0.0, axis=True
     )
 
     @property
@@ -175,35 +177,35 @@ class CycleTable:
         "Δ~max, the penetration in units of h_max at which unloading starts; with a preload, at "
         "which it starts at the latest",
         None,
-        axis="1",
+        axis=True,
     )
     max_stress: float | None = _key(
-        number_in(checks.MAX_STRESS),
+        checks.MAX_STRESS,
         "mean stress in Pa at which unloading starts under a load, instead of max_penetration",
         None,
-        axis="Pa",
+        axis=True,
     )
     preload: float | None = _key(
-        number_in(checks.MAX_STRESS),
+        checks.MAX_STRESS,
         "mean stress in Pa that a machine reaches before it unloads; max_penetration is then the "
         "latest turning point, and the end of the curves (by default 0.999; needed with a "
         "stiffness)",
         None,
-        axis="Pa",
+        axis=True,
     )
     control: PathControl = _key(  # noqa: RUF009  # a field
         choice(*get_args(PathControl)), "what is prescribed along the path", "separation"
     )
-    load_steps: int = _key(number_in(checks.LOAD_STEPS), "equal steps of the loading branch")
+    load_steps: int = _key(checks.LOAD_STEPS, "equal steps of the loading branch")
     stiffness: float | None = _key(
-        number_in(checks.SPRING),
+        checks.SPRING,
         "stiffness k of what holds the half-space, in Pa/m of nominal area; by default the "
         "separation is fixed. With it, penetrations of the path and of curves are u_tot/h_max",
         None,
-        axis="Pa m-1",
+        axis=True,
     )
     unloading_until: float = _key(
-        number_in(checks.Bounds(-1000, 0.0, without_high=True)),
+        Bounds(-1000, 0.0, without_high=True),
         "end of the stored unloading curve, in units of h_max (the loop itself ends at detachment)",
         -8.0,
     )
@@ -240,17 +242,12 @@ class SolverTable:
     method: MethodName = _key(  # noqa: RUF009  # a field
         choice(*METHOD_NAMES), "how contact states are found; auto chooses", "auto"
     )
-    accuracy: float = _key(number_in(checks.ACCURACY), "wanted relative error of the loss", 1e-3)
+    accuracy: float = _key(checks.ACCURACY, "wanted relative error of the loss", 1e-3)
     nodes_per_wave: int | None = _key(
-        number_in(checks.NODES_PER_WAVE),
-        "nodes per shortest wave, instead of those of accuracy",
-        None,
+        checks.NODES_PER_WAVE, "nodes per shortest wave, instead of those of accuracy", None
     )
     time_limit: float | None = _key(
-        number_in(checks.Bounds(1e-30, 1e30, unit="s")),
-        "longest time of one task in s",
-        None,
-        free=True,
+        Bounds(1e-30, 1e30, unit="s"), "longest time of one task in s", None, free=True
     )
 
 
@@ -284,7 +281,7 @@ class StopTable:
     """``[stop]``: realisations in batches until a mean of every cell is known well enough."""
 
     relative_error: float | None = _key(
-        number_in(checks.Bounds(0, 1, without_low=True, without_high=True)),
+        Bounds(0, 1, without_low=True, without_high=True),
         "how far the 95 % interval of the mean of the quantity may reach from it, over it",
         None,
     )
@@ -298,7 +295,7 @@ class StopTable:
 
 
 Table = Literal["profile", "material", "sweep", "cycle", "solver", "output", "stop"]
-_SWEEP_UNITS = {"sweep.hurst": "1", "sweep.work_of_adhesion": "J m-2"}
+_SWEPT = ("sweep.hurst", "sweep.work_of_adhesion")
 TABLES: dict[Table, type] = {
     "profile": ProfileTable,
     "material": MaterialTable,
@@ -313,7 +310,7 @@ KEYS: dict[str, Field[Any]] = {
 }
 """Every key ("cycle.load_steps") with its rule, meaning and default."""
 # Those that may have several values, in the order of the axes; H and γ always are axes.
-_AXES = (*_SWEEP_UNITS, *(key for key, entry in KEYS.items() if entry.metadata["axis"] is not None))
+_AXES = (*_SWEPT, *(key for key, entry in KEYS.items() if entry.metadata["axis"]))
 
 
 @dataclass(frozen=True)
@@ -341,13 +338,14 @@ class Campaign:
     @cached_property
     def _groups(self) -> list[list[Axis]]:
         given = {f"{table}.{name}": values for table, name, values in self.lists}
-        given |= {key: self.value(key) for key in _SWEEP_UNITS}
+        given |= {key: self.value(key) for key in _SWEPT}
         axes = []
         for key in _AXES:
             if key in given:
-                table, name = key.split(".")
-                unit = _SWEEP_UNITS.get(key) or KEYS[key].metadata["axis"]
-                axes.append(Axis(table, name, given[key], unit, KEYS[key].metadata["meaning"]))
+                (table, name), about = key.split("."), KEYS[key].metadata
+                bounds = about["rule"].bounds
+                unit = _UDUNITS.get(bounds.unit, "1") if bounds else "1"
+                axes.append(Axis(table, name, given[key], unit, about["meaning"]))
         return aligned(axes, self.sweep.zip)
 
     @cached_property
@@ -441,7 +439,7 @@ class Campaign:
     def identity(self, task: Task) -> tuple[Any, ...]:
         """Return what identifies the cell of a task, also in a campaign that grew new axes."""
         here = self.at(task)
-        rest = map(here.value, _AXES[len(_SWEEP_UNITS) :])
+        rest = map(here.value, _AXES[len(_SWEPT) :])
         return (task.hurst, task.work_of_adhesion, *rest)
 
     def tasks(self, part: Part = WHOLE) -> Tasks:
@@ -493,10 +491,11 @@ class Campaign:
     def _top(self) -> float:
         return 1.0 if self.has_axis("max_penetration") else self.cycle.deepest
 
-    def penetration_unit(self, task: Task) -> float:
-        """Return the factor that turns the penetration axes of the results file into Δ/h_max."""
+    def curve_axes(self, task: Task) -> dict[Branch, Array]:
+        """Return Δ/h_max of the curves of a task, which share the axes of the results file."""
         several = self.has_axis("max_penetration")
-        return self.at(task).cycle.turning_point if several else 1.0
+        unit = self.at(task).cycle.turning_point if several else 1.0
+        return {branch: unit * getattr(self, f"{branch}_penetration") for branch in BRANCHES}
 
     def value(self, key: str) -> Any:
         """Return the value in the tables of a key ("cycle.load_steps")."""

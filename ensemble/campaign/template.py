@@ -70,7 +70,7 @@ def _table(name: Table) -> str:
 
 def _entry(key: str, entry: Field[Any]) -> str:
     rule = entry.metadata["rule"].text
-    if entry.metadata["axis"] is not None:
+    if entry.metadata["axis"]:
         rule += "; or a list of them"
     lines = [f"# {line}" for line in textwrap.wrap(entry.metadata["meaning"], _WIDTH)]
     lines += [f"#   {line}" for line in textwrap.wrap(rule, _WIDTH)]

@@ -28,11 +28,10 @@ from adhesis.ensemble.report.further_axes import (
 from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached, why_beyond
+from adhesis.solver.loading.equilibrium_path import STEEP
 from adhesis.solver.loading.zero_range import ANY_RANGE
 from adhesis.solver.method import BRANCHES
 
-# Root mean square slope above which linear elasticity of small slopes is doubtful.
-STEEP = 0.3
 _MOST_LISTED = 4
 _STRESS_AND_AREA = ("mean_stress_dimensionless", "contact_fraction")
 

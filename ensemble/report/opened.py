@@ -277,8 +277,7 @@ class CampaignResults:
                 if d not in schema.TASK_DATASETS and d is not schema.STATUS:
                     values[empty] = d.fill
                 dims = [_RENAMED.get(dim, dim) for dim in d.dims[1:]]
-                about = {"units": d.unit, "long_name": d.meaning, **d.attributes}
-                found[d.name] = (("task", *dims), values, about)
+                found[d.name] = (("task", *dims), values, d.described)
                 for dim, name in zip(d.dims[1:], dims, strict=True):
                     scale = known[dim]
                     label = list(BRANCHES) if name == "branch" else scale.values

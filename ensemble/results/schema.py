@@ -43,28 +43,22 @@ ERROR_LENGTH = 512
 ORIGIN_LENGTH = 160
 
 
-def _task(name: str, dtype: str, unit: str, meaning: str, **attributes: object) -> Dataset:
-    return Dataset(name, ("task",), dtype, unit, meaning, attributes)
-
-
 # What the task is, known before it runs.
 TASK_DATASETS: tuple[Dataset, ...] = (
-    _task("hurst", FLOAT, "1", "Hurst exponent H"),
-    _task("work_of_adhesion", FLOAT, "J m-2", "work of adhesion"),
-    _task("realisation", COUNT, "1", "realisation of the profile"),
-    _task("seed", "i8", "1", "seed of the profile's phases"),
+    Dataset("hurst", "1", "Hurst exponent H"),
+    Dataset("work_of_adhesion", "J m-2", "work of adhesion"),
+    Dataset("realisation", "1", "realisation of the profile", COUNT),
+    Dataset("seed", "1", "seed of the profile's phases", "i8"),
 )
-STATUS = _task("status", "u1", "1", "state of the task", **flags(_STATES, "u1"))
-CHECKSUM = _task("checksum", "u4", "1", "CRC-32 of the row; not of a pending one")
-ORIGIN = _task(
-    *("computed_by", f"S{ORIGIN_LENGTH}", "1"),
-    "versions and processor that computed the task (UTF-8)",
-)
+STATUS = Dataset("status", "1", "state of the task", "u1", attributes=flags(_STATES, "u1"))
+CHECKSUM = Dataset("checksum", "1", "CRC-32 of the row; not of a pending one", "u4")
+_ORIGIN = "versions and processor that computed the task (UTF-8)"
+ORIGIN = Dataset("computed_by", "1", _ORIGIN, f"S{ORIGIN_LENGTH}")
 # How it went; the status is written last.
 RUN_DATASETS: tuple[Dataset, ...] = (
     STATUS,
-    _task("error", f"S{ERROR_LENGTH}", "1", "why the task failed (UTF-8)"),
-    _task("rank", COUNT, "1", "rank that computed the task"),
+    Dataset("error", "1", "why the task failed (UTF-8)", f"S{ERROR_LENGTH}"),
+    Dataset("rank", "1", "rank that computed the task", COUNT),
     ORIGIN,
     CHECKSUM,
 )
@@ -81,11 +75,11 @@ def axis_datasets(campaign: Campaign) -> tuple[Dataset, ...]:
     A key that a result is called after ("h_rms") has "wanted" before its name.
     """
     return tuple(
-        _task(
+        Dataset(
             axis.name if axis.name not in _NAMES else f"wanted_{axis.name}",
-            COUNT if all(isinstance(value, int) for value in axis.values) else FLOAT,
             axis.unit,
             axis.meaning,
+            COUNT if all(isinstance(value, int) for value in axis.values) else FLOAT,
         )
         for axis in campaign.axes[2:]
     )
@@ -137,7 +131,7 @@ def members(campaign: Campaign, part: Part = WHOLE) -> list[Member]:
         known[dataset.name] = partial(tasks.column, axis)
     found = []
     for s in laid_out:
-        scale = Dataset(s.name, (), s.values.dtype.str, s.unit, s.meaning)
+        scale = Dataset(s.name, s.unit, s.meaning, s.values.dtype.str, ())
         found.append(Member(scale, s.values.shape, partial(np.asarray, s.values)))
     for d in (*TASK_DATASETS, *further, *RUN_DATASETS, *RESULT_DATASETS):
         found.append(Member(d, (sizes[d.dims[0]], *row_shape(d, sizes)), known.get(d.name)))

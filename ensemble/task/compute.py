@@ -100,11 +100,7 @@ class Runner:
         self._last = this
         axes: dict[Branch, Array] | None = None
         if key != task or here.cycle.turns_at_stress:  # its load steps are not the curves' axes
-            unit = campaign.penetration_unit(task)
-            axes = {
-                "loading": unit * campaign.loading_penetration,
-                "unloading": unit * campaign.unloading_penetration,
-            }
+            axes = campaign.curve_axes(task)
         row = row_of(loop, sizes_of(row_scales(campaign)), axes)
         keep = task.realisation < campaign.output.field_realisations
         row |= field_row(plan, branch.method, loop, keep=keep)
@@ -126,7 +122,8 @@ def _branch(campaign: Campaign, task: Task) -> LoadingBranch:
 
 def _marks(plan: FieldPlan) -> list[float]:
     """Return the prescribed values of the states whose fields are kept, if these are prescribed."""
-    if plan.preload is not None:
+    cycle = plan.campaign.cycle
+    if cycle.preload is not None:
         return []
-    marks: list[float] = (plan.penetration * (plan.max_stress or 1.0)).tolist()
+    marks: list[float] = (plan.penetration * (cycle.max_stress or 1.0)).tolist()
     return marks

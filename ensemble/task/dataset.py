@@ -21,10 +21,10 @@ class Dataset:
     """One dataset, a row for each task."""
 
     name: str
-    dims: tuple[str, ...]  # names of the dimensions, ``task`` or ``field_task`` first
-    dtype: str  # numpy's name of the type
     unit: str  # as UDUNITS reads it; "1" if there is none
     meaning: str  # for the attribute ``long_name``
+    dtype: str = FLOAT  # numpy's name of the type
+    dims: tuple[str, ...] = ("task",)  # names of the dimensions, ``task`` or ``field_task`` first
     attributes: Mapping[str, Any] = field(default_factory=dict)  # further attributes
     # How its row is taken from a loop (:mod:`adhesis.ensemble.task.row`); None where it is not
     value: Callable[..., Any] | None = field(default=None, compare=False)

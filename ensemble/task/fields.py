@@ -13,7 +13,6 @@ gap, so that the density of the gap integrates to the fraction out of contact.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,27 +44,20 @@ HEIGHT_BINS: Array = 0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:])
 class FieldPlan:
     """States of which a campaign keeps fields, and bins of their statistics."""
 
+    campaign: Campaign  # its tables hold the values of the task, if the plan is that of one
     period: float  # λ in m
-    # lowest_harmonic, highest_harmonic: of the profile
-    lowest_harmonic: int
-    highest_harmonic: int
     finest_harmonic: int  # highest harmonic of all profiles of the campaign
     # Δ/h_max; under a load and at a preload 1, and then all penetrations here are mean stresses
     # over max_stress or preload
     max_penetration: float
-    load_steps: int
-    wanted: tuple[float, ...]  # penetrations Δ/h_max as the campaign gives them
-    max_nodes: int  # largest number of nodes of a stored field
-    # max_stress, preload: in Pa, under a load, and at a preload
-    max_stress: float | None = None
-    preload: float | None = None
 
     @cached_property
     def penetration(self) -> Array:
         """Δ/h_max of the states, ascending: the wanted ones moved to the nearest load step."""
-        step = self.max_penetration / self.load_steps
-        index = {round(value / step) for value in self.wanted}
-        return np.array([step * k for k in sorted(index)])
+        top, wanted = self.max_penetration, self.campaign.output.field_penetrations
+        step = top / self.campaign.cycle.load_steps
+        wanted = (top / 3, 2 * top / 3, top) if wanted is None else wanted
+        return np.array([step * k for k in sorted({round(value / step) for value in wanted})])
 
     @cached_property
     def nodes(self) -> int:
@@ -76,7 +68,7 @@ class FieldPlan:
     def stride(self) -> int:
         """Distance of the nodes of a stored field, in nodes of the computed one; a power of two."""
         stride = 1
-        while self.nodes // stride > self.max_nodes:
+        while self.nodes // stride > self.campaign.output.field_nodes:
             stride *= 2
         return stride
 
@@ -97,7 +89,8 @@ class FieldPlan:
     def filled(self) -> NDArray[np.bool_]:
         """Bins of the spectra in which the profile has every harmonic, shape (bins,)."""
         first, last = self.harmonic_edges[:-1], self.harmonic_edges[1:] - 1
-        return np.asarray((first >= self.lowest_harmonic) & (last <= self.highest_harmonic))
+        n0, ratio = self.campaign.profile.n0, self.campaign.profile.ratio
+        return np.asarray((first >= n0) & (last <= n0 * ratio))
 
     @cached_property
     def wave_number(self) -> Array:
@@ -114,22 +107,20 @@ class FieldPlan:
         return np.asarray(total / np.diff(edges))
 
 
-def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale, ...]:
-    """Return the dimensions of the datasets of fields.
-
-    Lengths are in units of the keys that have ``several`` values.
-    """
-    if "period" in several:
+def field_scales(plan: FieldPlan) -> tuple[Scale, ...]:
+    """Return the dimensions of the datasets of fields, lengths in units of keys with a list."""
+    campaign = plan.campaign
+    if campaign.has_axis("period"):
         waves = Scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
         positions = Scale("field_position", plan.position, "1", "q0 times the position of a node")
     else:
         waves = Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin")
         meaning = "position of a node of a kept field"
         positions = Scale("field_position", plan.position, "m", meaning)
-    depth = f"penetration/{'max_penetration' if 'max_penetration' in several else 'h_max'}"
-    if plan.max_stress is not None:
+    depth = f"penetration/{'max_penetration' if campaign.has_axis('max_penetration') else 'h_max'}"
+    if campaign.cycle.under_load:
         depth = "mean stress/max_stress"
-    if plan.preload is not None:
+    if campaign.cycle.preload is not None:
         depth = "mean stress/preload"
     return (
         waves,
@@ -141,36 +132,24 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
     )
 
 
-_STATES = ("field_branch", "field_penetration")
+def _field(name: str, unit: str, meaning: str, *dims: str) -> Dataset:
+    return Dataset(name, unit, meaning, FIELD, dims)
 
 
-def _reduced(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Dataset:
-    return Dataset(name, ("task", *dims), FIELD, unit, meaning)
-
-
-def _kept(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Dataset:
-    return Dataset(name, (KEPT, *dims, "field_position"), FIELD, unit, meaning)
-
-
+_SPECTRUM = "two-sided spectral density of the"
+_BINNED = ("task", "field_branch", "field_penetration")
+_SHAPE = (KEPT, "field_branch", "field_penetration", "field_position")
 FIELD_DATASETS = (
-    _reduced("psd_height", ("wave_number",), "m3", "two-sided spectral density of the profile"),
-    _reduced("height_density", ("height_bin",), "1", "probability density of height/h_rms"),
-    _reduced(
-        "psd_displacement",
-        (*_STATES, "wave_number"),
-        "m3",
-        "two-sided spectral density of the deformed surface",
+    _field("psd_height", "m3", f"{_SPECTRUM} profile", "task", "wave_number"),
+    _field("height_density", "1", "probability density of height/h_rms", "task", "height_bin"),
+    _field("psd_displacement", "m3", f"{_SPECTRUM} deformed surface", *_BINNED, "wave_number"),
+    _field(
+        "gap_density", "1", "probability density of gap/h_max out of contact", *_BINNED, "gap_bin"
     ),
-    _reduced(
-        "gap_density",
-        (*_STATES, "gap_bin"),
-        "1",
-        "probability density of gap/h_max out of contact",
-    ),
-    _kept("field_height", (), "m", "height of the rigid profile"),
-    _kept("field_displacement", _STATES, "m", "displacement of the elastic surface"),
-    _kept("field_stress", _STATES, "Pa", "stress, compression positive"),
-    _kept("field_gap", _STATES, "m", "gap"),
+    _field("field_height", "m", "height of the rigid profile", KEPT, "field_position"),
+    _field("field_displacement", "m", "displacement of the elastic surface", *_SHAPE),
+    _field("field_stress", "Pa", "stress, compression positive", *_SHAPE),
+    _field("field_gap", "m", "gap", *_SHAPE),
 )
 
 
@@ -180,25 +159,13 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
     All tasks have the spectral bins of the finest profile of the campaign.
     """
     here = campaign if task is None else campaign.at(task)
-    profile, cycle, output = here.profile, here.cycle, here.output
-    top, period = 1.0 if cycle.turns_at_stress else cycle.turning_point, profile.period
+    cycle, period = here.cycle, here.profile.period
+    top = 1.0 if cycle.turns_at_stress else cycle.turning_point
     if task is None and campaign.has_axis("max_penetration"):
         top = 1.0
     if task is None and campaign.has_axis("period"):
         period = 2 * np.pi
-    wanted = output.field_penetrations
-    return FieldPlan(
-        period=period,
-        lowest_harmonic=profile.n0,
-        highest_harmonic=profile.n0 * profile.ratio,
-        finest_harmonic=campaign.finest_harmonic,
-        max_penetration=top,
-        load_steps=cycle.load_steps,
-        wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,
-        max_nodes=output.field_nodes,
-        max_stress=cycle.turning_point if cycle.under_load else None,
-        preload=cycle.preload,
-    )
+    return FieldPlan(here, period, campaign.finest_harmonic, top)
 
 
 def field_row(
@@ -220,7 +187,8 @@ def field_row(
     row["height_density"][:] = count / (np.diff(HEIGHT_EDGES) * height.size)
     if keep:
         row["field_height"][:] = height[pick]
-    found = _at_penetrations(plan, loop) if plan.preload is None else _at_stresses(plan, loop)
+    at_preload = plan.campaign.cycle.preload is not None
+    found = _at_stresses(plan, loop) if at_preload else _at_penetrations(plan, loop)
     for place, state in found.items():
         fields = method.fields(state, plan.nodes)
         row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
@@ -245,10 +213,9 @@ def _at_penetrations(plan: FieldPlan, loop: LoopResult) -> _Found:
         if not state.patches or not plan.penetration.size:
             continue
         # with a stiffness, the penetration of the far side
-        if plan.max_stress is None:
-            penetration = problem.penetration(problem.prescribed_in(state))
-        else:
-            penetration = state.mean_stress / plan.max_stress
+        penetration = problem.penetration(problem.prescribed_in(state))
+        if plan.campaign.cycle.under_load:
+            penetration = state.mean_stress / plan.campaign.cycle.turning_point
         distance = np.abs(plan.penetration - penetration)
         nearest = int(np.argmin(distance))
         # States between load steps differ from the axis by far more than rounding.
@@ -259,11 +226,10 @@ def _at_penetrations(plan: FieldPlan, loop: LoopResult) -> _Found:
 
 def _at_stresses(plan: FieldPlan, loop: LoopResult) -> _Found:
     """Find the states at the parts of the preload; none that the loop lacks."""
-    assert plan.preload is not None
     found: _Found = {}
     for number, part in enumerate(plan.penetration.tolist()):
         for branch in BRANCHES:
             with suppress(ValueError):  # the preload was not reached
-                state = loop.at_stress(part * plan.preload, branch).state
+                state = loop.at_stress(part * plan.campaign.cycle.turning_point, branch).state
                 found[BRANCHES.index(branch), number] = state
     return found

@@ -25,27 +25,21 @@ Row = dict[str, Any]
 """Values of one task by dataset; those of kept fields only where the task keeps them."""
 
 
-def _dataset(
-    name: str,
-    dtype: str,
-    unit: str,
-    meaning: str,
-    value: str | Callable[..., Any] = "",
-    dims: tuple[str, ...] = ("task",),
-    **attributes: Any,
+def _number(
+    name: str, unit: str, meaning: str, value: str | Callable[..., Any] = "", **options: Any
 ) -> Dataset:
-    """Return a dataset; its value is taken by a function, or by the name of an attribute.
+    """Return a dataset; its value is taken by a function, or by the path of an attribute.
 
-    Without either, the attribute has the name of the dataset.
+    Without either, the attribute has the name of the dataset. ``options`` are those of a dataset.
     """
     take = value if callable(value) else attrgetter(value or name)
-    return Dataset(name, dims, dtype, unit, meaning, attributes, take)
+    return Dataset(name, unit, meaning, value=take, **options)
 
 
 def _curves(branch: Branch) -> tuple[Dataset, ...]:
     dims = ("task", f"{branch}_penetration")
     return tuple(
-        _dataset(f"{branch}_{name}", dtype, unit, meaning, name, dims)
+        _number(f"{branch}_{name}", unit, meaning, name, dtype=dtype, dims=dims)
         for name, dtype, unit, meaning in (
             ("mean_stress", FLOAT, "Pa", "mean stress, compression positive"),
             ("contact_fraction", FLOAT, "1", "contact fraction A/A0"),
@@ -55,122 +49,113 @@ def _curves(branch: Branch) -> tuple[Dataset, ...]:
     )
 
 
-def _jump(name: str, dtype: str, unit: str, meaning: str, *value: Any, **flags_: Any) -> Dataset:
+def _jump(name: str, unit: str, meaning: str, value: Any = None, **options: Any) -> Dataset:
     """Return a dataset of the catalogue of jumps, whose value is taken from loop and jump."""
-    take = value[0] if value else lambda loop, jump: getattr(jump, name)
-    dims = ("task", "jump")
-    return _dataset(f"jump_{name}", dtype, unit, meaning, take, dims, **flags_)
+    take = value or (lambda loop, jump: getattr(jump, name))
+    return _number(f"jump_{name}", unit, meaning, take, dims=("task", "jump"), **options)
+
+
+def _flag(name: str, meaning: str, names: tuple[str, ...]) -> Dataset:
+    """Return :func:`_jump` for an attribute that is one of some names."""
+    options: Any = {"dtype": FLAG, "attributes": flags(names, FLAG)}
+    return _jump(name, "1", meaning, lambda loop, jump: names.index(getattr(jump, name)), **options)
 
 
 def _of_interior(name: str) -> Callable[[LoopResult], float]:
     return lambda loop: float(getattr(loop.interior, name, np.nan))
 
 
-TIMES = (
-    _dataset("wall_time", FLOAT, "s", "wall time"),
-    _dataset("cpu_time", FLOAT, "s", "CPU time"),
-)
+def _reached(loop: LoopResult) -> float:
+    return np.nan if loop.preload_reached is None else float(loop.preload_reached)
+
+
+_SMALL, _LARGE = (methodcaller("drops", small_scale=small) for small in (True, False))
+TIMES = (_number("wall_time", "s", "wall time"), _number("cpu_time", "s", "CPU time"))
 # Of each loop, one number.
 NUMBERS = (
-    _dataset("h_max", FLOAT, "m", "height of the highest point", "problem.profile.h_max"),
-    _dataset("h_rms", FLOAT, "m", "root mean square height", "problem.profile.h_rms"),
-    _dataset("m0", FLOAT, "m2", "mean square height", "problem.profile.m0"),
-    _dataset("m2", FLOAT, "1", "mean square slope", "problem.profile.m2"),
-    _dataset("m4", FLOAT, "m-2", "mean square curvature", "problem.profile.m4"),
-    _dataset("loss", FLOAT, "J m-2", "loop integral of the mean stress per nominal area"),
-    _dataset("loss_dimensionless", FLOAT, "1", "loop integral of dimensionless stress"),
-    _dataset("loss_from_drops", FLOAT, "J m-2", "energy drops at jumps, and friction between them"),
-    _dataset(
-        *("loss_small_scale", FLOAT, "J m-2", "energy drops of edges running inside a patch"),
-        methodcaller("drops", small_scale=True),
+    _number("h_max", "m", "height of the highest point", "problem.profile.h_max"),
+    _number("h_rms", "m", "root mean square height", "problem.profile.h_rms"),
+    _number("m0", "m2", "mean square height", "problem.profile.m0"),
+    _number("m2", "1", "mean square slope", "problem.profile.m2"),
+    _number("m4", "m-2", "mean square curvature", "problem.profile.m4"),
+    _number("loss", "J m-2", "loop integral of the mean stress per nominal area"),
+    _number("loss_dimensionless", "1", "loop integral of dimensionless stress"),
+    _number("loss_from_drops", "J m-2", "energy drops at jumps, and friction between them"),
+    _number("loss_small_scale", "J m-2", "energy drops of edges running inside a patch", _SMALL),
+    _number("loss_large_scale", "J m-2", "energy drops of patches that come and go", _LARGE),
+    _number("friction", "J m-2", "part of the loss that edges dissipate as they recede"),
+    _number("gamma_open", "J m-2", "work of adhesion at which edges recede", "problem.gamma_open"),
+    _number("audit_residual", "1", "(loss - loss_from_drops) / loss"),
+    _number("loss_error", "J m-2", "estimated numerical error of the loss"),
+    _number("zone_error", "J m-2", "estimated change of the loss by zones at edges"),
+    _number(
+        "races", "1", "jumps that another rule of descent would have ended elsewhere", dtype=COUNT
     ),
-    _dataset(
-        *("loss_large_scale", FLOAT, "J m-2", "energy drops of patches that come and go"),
-        methodcaller("drops", small_scale=False),
-    ),
-    _dataset("friction", FLOAT, "J m-2", "part of the loss that edges dissipate as they recede"),
-    _dataset(
-        *("gamma_open", FLOAT, "J m-2", "work of adhesion at which edges recede"),
-        "problem.gamma_open",
-    ),
-    _dataset("audit_residual", FLOAT, "1", "(loss - loss_from_drops) / loss"),
-    _dataset("loss_error", FLOAT, "J m-2", "estimated numerical error of the loss"),
-    _dataset("zone_error", FLOAT, "J m-2", "estimated change of the loss by zones at edges"),
-    _dataset("races", COUNT, "1", "jumps that another rule of descent would have ended elsewhere"),
-    _dataset("energy_at_stake", FLOAT, "J m-2", "energy between the ends of those jumps"),
+    _number("energy_at_stake", "J m-2", "energy between the ends of those jumps"),
     # below the least of four ranges of adhesion the zero-range limit holds
-    _dataset("valid_range", FLOAT, "m", "range of adhesion below which no patch opens from inside"),
-    _dataset("edge_range", FLOAT, "m", "range whose cohesive zone is as long as what pins edges"),
-    _dataset("touch_range", FLOAT, "m", "range that changes the loss by 0.01 by earlier touches"),
-    _dataset("turn_range", FLOAT, "m", "way beyond the turn in which jumps take 0.01 of the loss"),
-    _dataset("largest_interior_tension", FLOAT, "Pa", "largest tension inside patches"),
-    _dataset(
-        *("interior_tension_position", FLOAT, "m", "position of that tension"),
-        _of_interior("position"),
-    ),
-    _dataset(
-        *("interior_tension_penetration", FLOAT, "1", "penetration/h_max at that tension"),
+    _number("valid_range", "m", "range of adhesion below which no patch opens from inside"),
+    _number("edge_range", "m", "range whose cohesive zone is as long as what pins edges"),
+    _number("touch_range", "m", "range that changes the loss by 0.01 by earlier touches"),
+    _number("turn_range", "m", "way beyond the turn in which jumps take 0.01 of the loss"),
+    _number("largest_interior_tension", "Pa", "largest tension inside patches"),
+    _number("interior_tension_position", "m", "position of that tension", _of_interior("position")),
+    _number(
+        "interior_tension_penetration",
+        "1",
+        "penetration/h_max at that tension",
         _of_interior("penetration"),
     ),
-    _dataset(
-        *("opening_strength", FLOAT, "Pa", "strength at which patches open from inside"),
-        "problem.strength",
+    _number(
+        "opening_strength", "Pa", "strength at which patches open from inside", "problem.strength"
     ),
-    _dataset("openings", FLOAT, "1", "jumps that begin with a gap that opens inside a patch"),
-    _dataset("barrier", FLOAT, "J m-2", "energy up to the cracks that open patches"),
+    _number("openings", "1", "jumps that begin with a gap that opens inside a patch"),
+    _number("barrier", "J m-2", "energy up to the cracks that open patches"),
     # where the loop turned
-    _dataset(
-        *("turning_penetration", FLOAT, "1", "penetration/h_max at the turning point"),
-        "max_penetration",
+    _number(
+        "turning_penetration", "1", "penetration/h_max at the turning point", "max_penetration"
     ),
-    _dataset("turning_stress", FLOAT, "Pa", "mean stress at the turning point"),
-    _dataset(
-        *("preload_reached", FLOAT, "1", "1 if the mean stress reached the preload, 0 if not"),
-        lambda loop: np.nan if loop.preload_reached is None else float(loop.preload_reached),
-    ),
-    _dataset("work_gained", FLOAT, "J m-2", "work gained on loading per nominal area"),
-    _dataset("work_spent", FLOAT, "J m-2", "work spent on unloading per nominal area"),
-    _dataset("largest_contact_fraction", FLOAT, "1", "largest contact fraction A/A0 of the loop"),
-    _dataset(
-        *("full_contact_energy", FLOAT, "J m-2", "elastic energy of full contact"),
+    _number("turning_stress", "Pa", "mean stress at the turning point"),
+    _number("preload_reached", "1", "1 if the mean stress reached the preload, 0 if not", _reached),
+    _number("work_gained", "J m-2", "work gained on loading per nominal area"),
+    _number("work_spent", "J m-2", "work spent on unloading per nominal area"),
+    _number("largest_contact_fraction", "1", "largest contact fraction A/A0 of the loop"),
+    _number(
+        "full_contact_energy",
+        "J m-2",
+        "elastic energy of full contact",
         "problem.full_contact_energy",
     ),
-    _dataset(
-        "pull_off_penetration", FLOAT, "1", "penetration/h_max where the last contact is lost"
-    ),
-    _dataset("pull_off_stress", FLOAT, "Pa", "largest mean tension on unloading"),
-    _dataset(
-        *("states", COUNT, "1", "states that the loop passed through"),
+    _number("pull_off_penetration", "1", "penetration/h_max where the last contact is lost"),
+    _number("pull_off_stress", "Pa", "largest mean tension on unloading"),
+    _number(
+        "states",
+        "1",
+        "states that the loop passed through",
         lambda loop: len(loop.branch),
+        dtype=COUNT,
     ),
 )
 # Of each branch, values on its axis.
 CURVES = {branch: _curves(branch) for branch in BRANCHES}
-JUMP_COUNT = _dataset(
-    "jump_count", COUNT, "1", "number of jumps, kept or not", lambda loop: len(loop.jumps)
+JUMP_COUNT = _number(
+    "jump_count", "1", "number of jumps, kept or not", lambda loop: len(loop.jumps), dtype=COUNT
 )
 # Of each jump that the catalogue holds, one number.
 JUMPS = (
+    _flag("branch", "branch", BRANCHES),
+    _flag("kind", "kind of the jump", JUMP_KINDS),
     _jump(
-        *("branch", FLAG, "1", "branch"),
-        lambda loop, jump: BRANCHES.index(jump.branch),
-        **flags(BRANCHES, FLAG),
-    ),
-    _jump(
-        *("kind", FLAG, "1", "kind of the jump"),
-        lambda loop, jump: JUMP_KINDS.index(jump.kind),
-        **flags(JUMP_KINDS, FLAG),
-    ),
-    _jump(
-        *("penetration", FLOAT, "1", "penetration/h_max of the jump"),
+        "penetration",
+        "1",
+        "penetration/h_max of the jump",
         lambda loop, jump: loop.problem.penetration(jump.separation),
     ),
-    _jump("energy_drop", FLOAT, "J m-2", "energy drop per nominal area"),
-    _jump("patch_length", FLOAT, "m", "largest patch, before or after the jump"),
-    _jump("contact_before", FLOAT, "1", "contact fraction before the jump"),
-    _jump("contact_after", FLOAT, "1", "contact fraction after the jump"),
-    _jump("patches_before", COUNT, "1", "patches before the jump"),
-    _jump("patches_after", COUNT, "1", "patches after the jump"),
+    _jump("energy_drop", "J m-2", "energy drop per nominal area"),
+    _jump("patch_length", "m", "largest patch, before or after the jump"),
+    _jump("contact_before", "1", "contact fraction before the jump"),
+    _jump("contact_after", "1", "contact fraction after the jump"),
+    _jump("patches_before", "1", "patches before the jump", dtype=COUNT),
+    _jump("patches_after", "1", "patches after the jump", dtype=COUNT),
 )
 RESULT_DATASETS: tuple[Dataset, ...] = (
     *TIMES,
@@ -192,7 +177,7 @@ def row_scales(campaign: Campaign) -> tuple[Scale, ...]:
             "unloading_penetration", campaign.unloading_penetration, "1", f"{depth} on unloading"
         ),
         Scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
-        *field_scales(field_plan(campaign), {axis.name for axis in campaign.axes[2:]}),
+        *field_scales(field_plan(campaign)),
     )
 
 

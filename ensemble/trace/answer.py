@@ -175,7 +175,7 @@ class Answer(ByValue):
     def __repr__(self) -> str:
         """One line: the loss with its uncertainty, and the warnings counted."""
         return (
-            f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty, 0.0)} J/m², "
+            f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty)} J/m², "
             f"{checks.counted(len(self.plan.runs), 'loop')}, "
             f"{checks.counted(len(self.warnings), 'warning')})"
         )

@@ -141,11 +141,10 @@ def _loop(answer: Answer) -> tuple[Figure, str]:
     unit, size = shown_unit("mean_stress", float(np.abs(stress).max()))
     figure = style.new_figure(1, 2, style.TWO_COLUMNS, 2.5)
     left, right = figure.axes
-    for name, colour in (("loading", _BLUE), ("unloading", _ORANGE)):
+    for name, look in style.LOOK_OF_BRANCH.items():
         rows = branch == name
-        line = style.LINE_OF_BRANCH[name]
-        left.plot(depth[rows], stress[rows] / size, ls=line, color=colour, label=name)
-        right.plot(depth[rows], contact[rows], ls=line, color=colour, label=name)
+        left.plot(depth[rows], stress[rows] / size, label=name, **look)
+        right.plot(depth[rows], contact[rows], label=name, **look)
     left.axhline(0, color="0.5", lw=0.5)
     left.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel=rf"mean stress $\bar p$ ({unit})")
     right.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel="contact fraction $A/A_0$")

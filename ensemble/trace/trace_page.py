@@ -193,7 +193,7 @@ def table_of_runs(answer: Answer) -> Any:
 def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) -> str:
     """Return a quantity that is not negative, with its interval."""
     unit = f" {unit}" if unit else ""
-    known = with_error(by * quantity.value, by * quantity.uncertainty, 0.0, most)
+    known = with_error(by * quantity.value, by * quantity.uncertainty, most)
     share = f" (± {rounded_percent(quantity.relative, 0)})" if "±" in known else ""
     return f"{known}{unit}{share}"
 
@@ -291,6 +291,6 @@ def _sweep_rows(answer: Answer) -> list[list[str]]:
             (1e3 * r["loss"], answer.loss),
             (1e-3 * r["pull_off_stress"], answer.pull_off_stress),
         ]
-        known = [with_error(value, abs(value) * of.relative, 0.0) for value, of in cells]
+        known = [with_error(value, abs(value) * of.relative) for value, of in cells]
         table.append([f"{g:g}", f"{d:g}", *known, f"{r['contact_fraction']:.3f}", f"{r['jumps']}"])
     return table

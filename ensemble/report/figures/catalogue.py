@@ -55,10 +55,6 @@ def _several(name: str) -> Callable[[Aggregate], bool]:
     return lambda data: len({getattr(cell, name) for cell in data.cells if cell.done}) > 1
 
 
-def _with_fields(data: Aggregate) -> bool:
-    return any(map(has_fields, data.cells))
-
-
 _ENDS = (
     "Loops that turn at one mean stress turn at different penetrations: a curve ends where the "
     "first of its realisations turns, and its branches need not meet."
@@ -84,7 +80,12 @@ LOOPS = (
         at_stress=_ENDS,
     ),
 )
-_STATES = "Loops turn at a mean stress, and states are at parts of it instead of penetrations."
+# A figure of states of which fields are kept.
+_of_states = partial(
+    Illustration,
+    at_stress="Loops turn at a mean stress, and states are at parts of it instead of penetrations.",
+    is_worth=lambda data: any(map(has_fields, data.cells)),
+)
 _BELOW = "A caret at 0 marks an interval that goes on below."
 LOSSES = (
     Illustration(
@@ -120,7 +121,7 @@ FIELDS = (
         "h_rms = 1 µm, so the states here are those that the campaign kept.",
         is_worth=lambda data: bool(shown_penetrations(data, 1) and cells_with_shape(data)),
     ),
-    Illustration(
+    _of_states(
         "fig4_spectra_of_branches",
         "Spectral density on both branches",
         "Two-sided, mean over the realisations in contact, at one penetration. Thin lines: slopes "
@@ -129,30 +130,24 @@ FIELDS = (
         shapes_and_spectra.spectra_of_branches,
         "Fig. 4",
         paper.FIGURE_4,
-        at_stress=_STATES,
-        is_worth=_with_fields,
     ),
-    Illustration(
+    _of_states(
         "fig5a_spectra_loading",
         "Spectral density on loading",
         "As before, at several penetrations.",
         shapes_and_spectra.spectra_on_loading,
         "Fig. 5(a)",
         paper.FIGURE_5,
-        at_stress=_STATES,
-        is_worth=_with_fields,
     ),
-    Illustration(
+    _of_states(
         "fig5b_spectra_unloading",
         "Spectral density on unloading",
         "As on loading. At the largest penetration both branches are one state.",
         shapes_and_spectra.spectra_on_unloading,
         "Fig. 5(b)",
         paper.FIGURE_5,
-        at_stress=_STATES,
-        is_worth=_with_fields,
     ),
-    Illustration(
+    _of_states(
         "fig8_gap_density",
         "Probability density of the separation",
         "Gap t outside contact, in units of each realisation's h_max; the integral is the fraction "
@@ -164,8 +159,6 @@ FIELDS = (
         shapes_and_spectra.gap_density,
         "Fig. 8",
         paper.FIGURE_8,
-        at_stress=_STATES,
-        is_worth=_with_fields,
     ),
     Illustration(
         "fig9_height_density",

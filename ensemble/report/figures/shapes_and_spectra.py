@@ -35,8 +35,6 @@ Panel = tuple[AveragedCell | None, str, Sequence[tuple[int, int, str, dict[str, 
 _LEAST_DENSITY = 1e-6
 # Shapes on fewer nodes are interpolated, with so many nodes beyond the ends of a part.
 _FEWEST_NODES, _BEYOND = 1000, 4
-# Colour of a branch where both are drawn over the rigid profile.
-_COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 # Signs of :func:`state_sign` in formulas, without their index.
 _SIGNS = {
     "Δ/h_max": r"\Delta/h",
@@ -81,7 +79,9 @@ def shapes(data: Aggregate) -> style.PublishedFigure:
         style.label_panel(detail, "detail")
     figure.label("position $x$ (mm)", "height (µm)")
     handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h$")]
-    handles += [style.key(f"elastic surface $v + s$, {b}", **_look_of(b)) for b in BRANCHES]
+    handles += [
+        style.key(f"elastic surface $v + s$, {b}", **style.LOOK_OF_BRANCH[b]) for b in BRANCHES
+    ]
     figure.legend_above(handles, 3)
     return figure
 
@@ -91,9 +91,9 @@ def spectra_of_branches(data: Aggregate) -> style.PublishedFigure:
     panels: list[Panel] = []
     for cell in cells_of(data, paper.FIGURE_4):
         k = state_of(cell.plan, paper.FIGURE_4)
-        lines = [(b, k, branch, _look_of(branch)) for b, branch in enumerate(BRANCHES)]
+        lines = [(b, k, branch, style.LOOK_OF_BRANCH[branch]) for b, branch in enumerate(BRANCHES)]
         panels.append((cell, f", {_depth(data, cell, k)}", lines))
-    return _spectra(panels, [style.key(b, **_look_of(b)) for b in BRANCHES])
+    return _spectra(panels, [style.key(b, **style.LOOK_OF_BRANCH[b]) for b in BRANCHES])
 
 
 def spectra_on_loading(data: Aggregate) -> style.PublishedFigure:
@@ -175,11 +175,6 @@ def _spectra_of_branch(data: Aggregate, b: int) -> style.PublishedFigure:
     return _spectra(panels, _penetration_handles(data, chosen))
 
 
-def _look_of(branch: str) -> dict[str, Any]:
-    """Return the look of a branch where both are drawn over the rigid profile."""
-    return {"color": _COLOUR_OF_BRANCH[branch], "linestyle": style.LINE_OF_BRANCH[branch]}
-
-
 def _spectra(panels: Sequence[Panel], handles: list[Line2D]) -> style.PublishedFigure:
     """Draw states over the rigid profile and the reference slopes; nothing without a cell."""
     height = (16 + 52 * len(panels)) * style.MM
@@ -231,7 +226,7 @@ def _draw_shape(
         if np.all(np.isfinite(gap)):
             # monotone between nodes: contact stays contact, and nothing overlaps
             surface = rigid + 1e6 * PchipInterpolator(wide, gap[inside])(nodes)
-            axes.plot(x, surface, linewidth=0.9, label=branch, **_look_of(branch))
+            axes.plot(x, surface, linewidth=0.9, label=branch, **style.LOOK_OF_BRANCH[branch])
     axes.set_xlim(x[0], x[-1])
 
 
@@ -311,7 +306,7 @@ def beside_paper(data: Aggregate, figure: PaperFigure) -> str:
     gammas = tuple(cell.work_of_adhesion for cell in cells)
     shown = f"The paper's figure is at {_place(figure.hurst, figure.works_of_adhesion, at)}"
     # A state is stored at the load step that is nearest to the penetration that was asked for.
-    half = 0.5 * plan.max_penetration / plan.load_steps
+    half = 0.5 * plan.max_penetration / plan.campaign.cycle.load_steps
     near = at is None or drawn is None or abs(drawn - at) <= 1.001 * half
     if (cells[0].hurst, gammas, near) == (figure.hurst, figure.works_of_adhesion, True):
         return f"{shown}."

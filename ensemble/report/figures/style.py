@@ -55,6 +55,11 @@ LINES: tuple[Any, ...] = (
     (0, (4, 1, 1, 1, 1, 1)),
 )
 LINE_OF_BRANCH: dict[str, Any] = {"loading": "-", "unloading": LINES[1]}
+# Where one loop is drawn, or both branches over the rigid profile.
+LOOK_OF_BRANCH: dict[str, dict[str, Any]] = {
+    "loading": {"color": "#0072B2", "linestyle": LINE_OF_BRANCH["loading"]},
+    "unloading": {"color": "#D55E00", "linestyle": LINE_OF_BRANCH["unloading"]},
+}
 
 
 # Okabe & Ito's colours, in an order in which the darkness of neighbours differs, and markers.

@@ -196,7 +196,7 @@ def precision(data: Aggregate) -> Table:
         TableColumn("ci_high", "precision.estimate.high", "to", number()),
         TableColumn(
             "relative_error",
-            lambda cell: finite(cell.precision.relative_error),
+            lambda cell: finite(cell.precision.estimate.relative_error),
             *("±, further side", three_digits),
         ),
         TableColumn("wanted_relative_error", "precision.wanted", "wanted", three_digits),
