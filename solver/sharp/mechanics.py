@@ -161,8 +161,8 @@ class EdgeMechanics:
         self.newton_tolerance = min(NEWTON_TOLERANCE, BY_FIELD * tolerance) * self.wave
         self.field_error = max(self.newton_tolerance, FIELD_ERROR * tolerance * self.wave)
         self.longest_step = LONGEST_STEP * self.wave
-        # far below the width at which a patch on the sharpest crest first comes to rest,
-        # (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8, where adhesion is weakest
+        # far below the half-width at which a patch on the sharpest crest first comes to rest,
+        # nearly (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8, where adhesion is weakest
         weakest = critical**2 * self.adhesion.least
         self.surface = np.pi * weakest / 8  # Γ
         seed = (2 * weakest / source.sharpest**2) ** (1 / 3)
