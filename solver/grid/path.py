@@ -15,8 +15,8 @@ from adhesis.solver.model.problem import Problem
 # Relative error of a drop times the number of nodes in half the first equilibrium width on a crest
 # of rms curvature. How often it holds: docs/methods.md, "How far the reported error holds".
 _COARSE = 0.6
-# Drop of a patch that comes or goes, over γ times that half-width: 0.6 on a parabola, and more where
-# surfaces that touch are flatter than crests are.
+# Drop of a patch that comes or goes, over γ times that half-width: up to 1.5 at the touch of a
+# parabola, and more where surfaces that touch are flatter than crests are.
 _UNSEEN = 2.0
 _OVERLAP = 1e-6  # of h_max: a smaller overlap counts as touch
 _NEAREST = 1e-8  # of the range: resolution of the location of first touch
