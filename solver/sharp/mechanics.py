@@ -261,7 +261,7 @@ class EdgeMechanics:
         ends = gaps.ravel()
         apart = (ends - theta - half * np.array([[-1.0], [1.0]]) + np.pi) % (2 * np.pi) - np.pi
         nearest = np.abs(apart).argmin(axis=1)
-        opening = self.field(gaps, prescribed).opening.ravel()[nearest]
+        opening = self.field(gaps, prescribed).edge_opening.ravel()[nearest]
         work = np.array([self.adhesion.work(end, False)[0] for end in ends[nearest]])
         return np.asarray(np.maximum(opening, 0.0) ** 2 / (self.critical**2 * work))
 
@@ -281,9 +281,9 @@ class EdgeMechanics:
         ψ_e = C_e dn_e/dd. In first order the fold is moved to where ψ·(δC + δd ∂C/∂d) = 0.
         """
         finer = self.solve_finer(point)
-        change = finer.opening - point.field.solution.opening
+        change = finer.edge_opening - point.field.solution.edge_opening
         _, _, by_prescribed = finer.by_prescribed()  # ∂C/∂d at fixed edges
-        left = point.field.opening.ravel() * point.rate
+        left = point.field.edge_opening.ravel() * point.rate
         if not left.any():
             return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))

@@ -46,7 +46,7 @@ def dense_residual(
     gaps: Array, prescribed: float, edges: EdgeMechanics, orders: Integers | None = None
 ) -> Array:
     """Compute C_e - C_c at all edges."""
-    opening = solve_densely(gaps, prescribed, edges.model, orders).opening
+    opening = solve_densely(gaps, prescribed, edges.model, orders).edge_opening
     return np.asarray(opening - edges.law.critical_of(gaps, opening))
 
 
