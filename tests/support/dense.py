@@ -17,7 +17,7 @@ class DenseSolution(NamedTuple):
     pressure: float
     separation: float
     unit_mean: float
-    opening: Array
+    edge_opening: Array
 
 
 def solve_densely(
