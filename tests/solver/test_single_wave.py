@@ -254,7 +254,7 @@ def test_strong_adhesion_runs_to_full_contact_under_load():
 
 @pytest.mark.parametrize("alpha", [1e-4, 1e-3, 1e-2, 0.05, 0.1])
 def test_a_narrow_patch_first_comes_to_rest_near_the_half_width_without_load(alpha):
-    """b = (16 Γ/(π κ²))^(1/3) is half of a width: seeds and the errors of ``grid`` go by it."""
+    """The length (16 Γ/(π κ²))^(1/3), by which seeds and errors of ``grid`` go, is a half-width."""
     w = wave(alpha)
     curvature = A * (2 * np.pi / PERIOD) ** 2
     b = (32 * w.work_of_adhesion / (np.pi * MODULUS * curvature**2)) ** (1 / 3)
