@@ -1,6 +1,6 @@
 """Write a sample trace, as a stylus would measure it, to try ``adhesis trace`` with.
 
-It is synthetic: 1 mm in steps of 1 µm, rough down to 20 µm, with tilt, bow, noise and drop-outs.
+It is synthetic: 1 mm in steps of 1 µm, rough down to 20 µm, with tilt, bow, noise, dust, drop-outs.
 """
 
 from __future__ import annotations

@@ -139,11 +139,11 @@ def _numerical(data: Aggregate) -> str:
         shares = np.divide(_all(data, name), np.abs(loss), out=0 * loss, where=loss != 0)
         return percent(shares.max())
 
-    elsewhere = "no jump would have ended elsewhere by another rule of descent"
+    elsewhere = "no jump would have ended elsewhere by another rule of descent, or order"
     if raced := int(np.sum(races > 0)):
         elsewhere = (
-            f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
-            f"elsewhere (at most {most('energy_at_stake')} of a loop's loss at stake)"
+            f"in {raced} of {loss.size} loops another rule of descent, or order, would have ended "
+            f"a jump elsewhere (at most {most('energy_at_stake')} of a loop's loss at stake)"
         )
     return (
         f"The estimated numerical error of a loss is at most {most('loss_error')} of it; the "

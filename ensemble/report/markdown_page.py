@@ -84,7 +84,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
     out += [
         "## Mechanisms",
         "A jump is *small scale* if edges only run inside existing patches (spreading, receding), "
-        "and *large scale* if patches come or go (snap-in, merging, splitting, vanishing, "
+        "and *large scale* if patches come or go (snap-in, merging, splitting, opening, vanishing, "
         f"pull-off).{fall if data.campaign.cycle.under_load else ''}",
         mechanism_tables.mechanisms(data).markdown(),
         *show("mechanisms"),

@@ -215,12 +215,12 @@ class CampaignResults:
 
     @cached_property
     def spectra(self) -> xr.Dataset:
-        """Spectral densities, and densities of heights and gaps, of every loop."""
+        """Spectral densities in m³, and densities of heights and gaps, of every loop."""
         return self._arranged([d for d in FIELD_DATASETS if d.dims[0] != KEPT])
 
     @cached_property
     def fields(self) -> xr.Dataset:
-        """Profile, displacement, stress and gap of the first realisations, as far as kept."""
+        """Profile, displacement and gap in m, stress in Pa, of the first realisations, if kept."""
         return self._arranged([d for d in FIELD_DATASETS if d.dims[0] == KEPT])
 
     @cached_property

@@ -121,8 +121,8 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
     axes.legend(loc="best")
     return figure, (
         "Power spectrum with Hann's window, averaged over bands, before and after levelling, and "
-        "of the profile that is used. Where it meets the noise or bends down at its end, it is no "
-        "longer that of the surface."
+        "of the profile that is used; its integral over q is π times the mean square height. Where "
+        "it meets the noise or bends down at its end, it is no longer that of the surface."
     )
 
 

@@ -82,8 +82,8 @@ class Prepared(ByValue):
     Attributes
     ----------
     trace : Trace
-    filled : array, shape (n,)
-        Heights in m without outliers and gaps, not yet level.
+    filled, gaps : array, shape (n,)
+        Heights in m without outliers and gaps, not yet level; whether each of them was filled in.
     start : float
         Position of the first of them in the trace, in m: 0 unless heights are missing there.
     excluded : tuple

@@ -90,7 +90,7 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         "--max-penetration",
         metavar="D[,D…]",
         help="turning points in h_max (default 0.9); with --stiffness those of the far side, "
-        "u_tot/h_max; with --preload, where a loop turns at the latest",
+        "u_tot/h_max; with --preload, where a loop turns at the latest (default 0.999)",
     )
     group.add_argument(
         "--preload",

@@ -223,8 +223,8 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
         "## The loop",
         images.get("loop"),
         "## How far it can be trusted",
-        "Each doubt is measured by running the loop with the decision made otherwise, and its "
-        "standard uncertainty is the root mean square of the changes. The interval is about this "
+        "Each doubt is the root mean square of the changes by loops with the decision made "
+        "otherwise; cut-offs from × 2 on are drawn, and do not count. The interval is about this "
         "trace, closed to one period; other places of the same surface have other losses.",
         markdown_table(*_doubt_rows(answer), left_columns=1),
         markdown_table(*_variant_rows(answer), left_columns=1),

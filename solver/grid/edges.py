@@ -77,9 +77,9 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
     s_grow, s_recede = np.array(grow), np.array(recede)
 
     if contact.response is not None:
-        factor, opening = lattice.extra_compliance(contact, outer)
-        s_grow += factor * opening**2
-        s_recede += factor * opening**2  # with the opening of the free node next to the one removed
+        factor, gap_rate = lattice.extra_compliance(contact, outer)
+        s_grow += factor * gap_rate**2
+        s_recede += factor * gap_rate**2  # with that of the free node next to the one removed
     t = lattice.gap(contact, outer)
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < overlap_below

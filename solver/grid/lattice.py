@@ -76,8 +76,8 @@ class Lattice:
         if contact.response is None or not contact.mask.any():
             return 0.0, np.zeros(nodes.size)
         k, per_separation = self.control.stiffness, total(contact.response.stress) / self.n
-        opening = 1 - contact.response.displacement[nodes]
-        return self.dx / (self.elastic.period * (k + per_separation)), opening
+        gap_rate = 1 - contact.response.displacement[nodes]
+        return self.dx / (self.elastic.period * (k + per_separation)), gap_rate
 
     def conjugate(self, contact: Contact) -> float:
         """Compute Y of ``control``: p̄ in Pa, under a load s - h_max in m."""

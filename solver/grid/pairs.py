@@ -46,7 +46,7 @@ def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     width, left, right = edges.width[:count], edges.gap[:count], edges.gap[count:]
     t = lattice.gap(contact, edges.outer)
     pull = contact.stress[edges.inner]
-    factor, opening = lattice.extra_compliance(contact, edges.outer)
+    factor, gap_rate = lattice.extra_compliance(contact, edges.outer)
     found: list[Pair] = []
 
     def may_release(one: int, two: int, cost: Array, nodes: Indices) -> bool:
@@ -57,7 +57,7 @@ def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     def add(one: int, two: int, direction: int, s: Array) -> None:
         nodes = edges.outer if direction > 0 else edges.inner
         adhesive = float(adhesion[nodes[one]] + adhesion[nodes[two]])
-        g1, g2 = float(opening[one]), float(opening[two])
+        g1, g2 = float(gap_rate[one]), float(gap_rate[two])
         s11, s22 = float(s[0, 0]) + factor * g1 * g1, float(s[1, 1]) + factor * g2 * g2
         s12 = float(s[0, 1]) + factor * g1 * g2
         if direction > 0:

@@ -12,11 +12,11 @@ from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 
-# Relative error of a drop times the number of nodes in the first equilibrium width on a crest of
-# rms curvature. How often the estimate holds: docs/methods.md, "How far the reported error holds".
+# Relative error of a drop times the number of nodes in half the first equilibrium width on a crest
+# of rms curvature. How often it holds: docs/methods.md, "How far the reported error holds".
 _COARSE = 0.6
-# Drop of a patch that comes or goes, over γ times that width: 0.6 on a parabola, and more where
-# surfaces that touch are flatter than crests are.
+# Drop of a patch that comes or goes, over γ times that half-width: up to 1.5 at the touch of a
+# parabola, and more where surfaces that touch are flatter than crests are.
 _UNSEEN = 2.0
 _OVERLAP = 1e-6  # of h_max: a smaller overlap counts as touch
 _NEAREST = 1e-8  # of the range: resolution of the location of first touch
@@ -62,12 +62,12 @@ class Steps:
         # Relative error of a drop, and size in J/m² of the drop in which a patch appears.
         self.coarse = self.least_drop = 0.0
         if self.adhesion_scale:
-            # the first equilibrium width of a patch on a crest of rms curvature κ, which is
+            # half of the first equilibrium width of a patch on a crest of rms curvature κ, nearly
             # (16 Γ/(π κ²))^(1/3) in units of 1/q0, Γ = 2γq0/E* (docs/methods.md, "Resolution")
             rigidity = problem.half_space.modulus * problem.profile.m4
-            width = float(np.cbrt(32 * problem.work_of_adhesion / (np.pi * rigidity)))
-            self.coarse = _COARSE * self.lattice.dx / width
-            self.least_drop = _UNSEEN * problem.work_of_adhesion * width / self.period
+            half_width = float(np.cbrt(32 * problem.work_of_adhesion / (np.pi * rigidity)))
+            self.coarse = _COARSE * self.lattice.dx / half_width
+            self.least_drop = _UNSEEN * problem.work_of_adhesion * half_width / self.period
         # Displacement, in nodes, beyond which an edge has run and two end states are different
         # minima.
         wave = problem.shortest_wavelength / self.lattice.dx

@@ -163,7 +163,7 @@ Matrix tangent_between(LinearResponse& r, const Vector& ends, const Integers& so
 using WorkFunction = nb::typed<nb::callable, std::pair<double, double>(double, bool)>;
 using IntegralFunction = nb::typed<nb::callable, double(double, bool)>;
 
-// A law of Python functions.
+// A law of adhesion of Python functions.
 class PythonAdhesion : public Adhesion {
  public:
   const WorkFunction work_function;
@@ -277,7 +277,7 @@ void bind_field(nb::module_& m) {
       .def_ro("pressure", &Field::pressure)
       .def_ro("separation", &Field::separation)
       .def_ro("unit_mean", &Field::unit_mean)
-      .def_ro("opening", &Field::opening)
+      .def_ro("edge_opening", &Field::edge_opening)
       .def_prop_ro("orders", [](const Field& f) { return f.nodes.orders; })
       .def_prop_ro("offset", [](const Field& f) { return f.nodes.offset; })
       .def_prop_ro("theta", [](const Field& f) { return f.nodes.theta; })
@@ -382,7 +382,7 @@ void bind_response(nb::module_& m) {
       .def_prop_ro("gap_count", &LinearResponse::gap_count)
       .def_prop_ro("orders", [](const LinearResponse& r) { return r.nodes.orders; })
       .def_prop_ro(
-          "opening", [](const LinearResponse& r) { return each(r.edges, &Edge::opening); },
+          "edge_opening", [](const LinearResponse& r) { return each(r.edges, &Edge::opening); },
           "C of every edge in its reference.")
       .def_prop_ro(
           "charges", [](const LinearResponse& r) { return each(r.tree.runs, &Run::rank); },

@@ -113,7 +113,7 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
   field.scaled_opening.resize(n);
   for (int i = 0; i < n; ++i)
     field.scaled_opening[i] = -field.solved[0][i] - field.pressure * field.solved[1][i];
-  field.opening = edge_openings(field.scaled_opening, nodes, field.equations, true);
+  field.edge_opening = edge_openings(field.scaled_opening, nodes, field.equations, true);
   return field;
 }
 
@@ -151,7 +151,7 @@ Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const 
   field.pressure = pressure + more;
   add_scaled(-more, by_pressure.data(), f.data(), n);
   field.separation = compliance != 0 ? (mean - more * unit_mean) / (2 * pi) : prescribed;
-  field.opening = edge_openings(f, nodes, field.equations, true);
+  field.edge_opening = edge_openings(f, nodes, field.equations, true);
   field.scaled_opening = f;
   return field;
 }

@@ -18,7 +18,7 @@ struct Field {
   double pressure = not_a_number;    // p; NaN if there is no field
   double separation = not_a_number;  // q0 s
   Vector scaled_opening;             // f: the openings over sqrt(1-η²)
-  Vector opening;                    // C at each edge
+  Vector edge_opening;               // C at each edge
 
   explicit Field(const FieldModel& model) : model(model) {}
 };

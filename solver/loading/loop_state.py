@@ -20,7 +20,7 @@ _NODES_PER_WAVE = 32
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopState(ByValue):
-    """A state in contact of a loop, with the method that computes its fields.
+    """A state in contact of a loop, with the method that computes its fields (docs/preload.md).
 
     Attributes
     ----------

@@ -21,8 +21,8 @@ class AdhesionPattern(ByValue):
 
         γ(x)/γ = 1 + Σ_m c_m exp(i m q0 x),   c_-m = conj(c_m),   c_0 = 0
 
-    It belongs to the rigid profile: where the soft solid slides along it, γ(x) stays behind. Two
-    patterns are equal if all their coefficients are.
+    It belongs to the rigid profile: where the soft solid slides along it, γ(x) stays behind
+    (docs/work-of-adhesion.md). Two patterns are equal if all their coefficients are.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class AdhesionPattern(ByValue):
 
 
 def stripes(count: int, amplitude: float, phase: float = 0.0) -> AdhesionPattern:
-    """Make the pattern γ(x) = γ (1 + ε cos(n q0 x + φ)).
+    """Make the pattern γ(x) = γ (1 + ε cos(n q0 x + φ)) (docs/work-of-adhesion.md).
 
     Parameters
     ----------

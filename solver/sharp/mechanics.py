@@ -161,8 +161,8 @@ class EdgeMechanics:
         self.newton_tolerance = min(NEWTON_TOLERANCE, BY_FIELD * tolerance) * self.wave
         self.field_error = max(self.newton_tolerance, FIELD_ERROR * tolerance * self.wave)
         self.longest_step = LONGEST_STEP * self.wave
-        # far below the width at which a patch on the sharpest crest first comes to rest,
-        # (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8, where adhesion is weakest
+        # far below the half-width at which a patch on the sharpest crest first comes to rest,
+        # nearly (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8, where adhesion is weakest
         weakest = critical**2 * self.adhesion.least
         self.surface = np.pi * weakest / 8  # Γ
         seed = (2 * weakest / source.sharpest**2) ** (1 / 3)
@@ -261,7 +261,7 @@ class EdgeMechanics:
         ends = gaps.ravel()
         apart = (ends - theta - half * np.array([[-1.0], [1.0]]) + np.pi) % (2 * np.pi) - np.pi
         nearest = np.abs(apart).argmin(axis=1)
-        opening = self.field(gaps, prescribed).opening.ravel()[nearest]
+        opening = self.field(gaps, prescribed).edge_opening.ravel()[nearest]
         work = np.array([self.adhesion.work(end, False)[0] for end in ends[nearest]])
         return np.asarray(np.maximum(opening, 0.0) ** 2 / (self.critical**2 * work))
 
@@ -281,9 +281,9 @@ class EdgeMechanics:
         ψ_e = C_e dn_e/dd. In first order the fold is moved to where ψ·(δC + δd ∂C/∂d) = 0.
         """
         finer = self.solve_finer(point)
-        change = finer.opening - point.field.solution.opening
+        change = finer.edge_opening - point.field.solution.edge_opening
         _, _, by_prescribed = finer.by_prescribed()  # ∂C/∂d at fixed edges
-        left = point.field.opening.ravel() * point.rate
+        left = point.field.edge_opening.ravel() * point.rate
         if not left.any():
             return 0.0  # all edges are pinned
         return -float(left @ change / (left @ by_prescribed))

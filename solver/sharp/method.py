@@ -150,8 +150,8 @@ class SharpMethod(Method):
         if adhesion is not None:
             check_adhesion(adhesion, problem, source)
         symmetry = symmetry_of(problem, adhesion, OTHER_MINIMUM * 2 * np.pi / source.top)
-        law = adhesion or adhesion_of(problem, source)
-        self.edges = EdgeMechanics(source, critical, tolerance, device, law, symmetry)
+        adhesion = adhesion or adhesion_of(problem, source)
+        self.edges = EdgeMechanics(source, critical, tolerance, device, adhesion, symmetry)
         self.states = States(problem, self.edges)
         limit = max(FIELD_RESOLVES * tolerance, ROUNDING)
         self.resolution = Resolution(

@@ -20,7 +20,7 @@ FIELD_ERROR = 10.0
 SMALLEST_LENGTH = 0.005
 """λ_min. Narrower patches and gaps are removed."""
 SMALLEST_OF_SEED = 0.05
-"""Likewise, of the width at which a patch on the sharpest crest first comes to rest."""
+"""Likewise, of the half-width at which a patch on the sharpest crest first comes to rest."""
 
 # ---------------------------------------------------------------- descent in energy
 

@@ -30,12 +30,12 @@ class Solved(NamedTuple):
 
     @property
     def residual(self) -> np.ndarray:
-        opening = self.solution.opening
+        opening = self.solution.edge_opening
         return opening - self.edges.law.critical_of(self.gaps, opening)
 
     def openings(self, motion: np.ndarray) -> np.ndarray:
         gaps = self.gaps + (motion * np.tile([1.0, -1.0], len(self.gaps))).reshape(-1, 2)
-        return self.with_gaps(gaps).solution.opening
+        return self.with_gaps(gaps).solution.edge_opening
 
     def with_gaps(self, gaps: np.ndarray) -> Solved:
         solution = solve_densely(gaps, self.separation, self.edges.model)
@@ -70,7 +70,7 @@ def rough() -> Solved:
 def test_edges_open_as_half_plane_cracks_that_interact(rough):
     """Error of the model: second order in the motions, and small over a whole shortest wave."""
     motion = WAVE * np.array([1.0, 0.1, -0.4, 0.3, 0.0, 1.0, -0.7, 0.2, 0.5, -1.0])
-    before = rough.solution.opening
+    before = rough.solution.edge_opening
     lengths = np.array([0.05, 0.1, 0.2, 1.0])
     errors, changes = [], []
     for length in lengths:
@@ -95,7 +95,7 @@ def test_openings_beside_a_narrow_patch_or_gap(rough, narrow, motion):
     here = rough.with_gaps(np.array(gaps))
     motions = np.zeros(10)
     motions[[e, f]] = motion * WAVE
-    before, exact = here.solution.opening, here.openings(motions)
+    before, exact = here.solution.edge_opening, here.openings(motions)
     error = np.abs(here.model_openings(motions, 10) - exact).max()
     assert error < 0.2 * np.abs(exact - before).max()
 

@@ -1,4 +1,4 @@
-"""A law of edges that is written here alone: what the contract in ``edge_law.hpp`` promises."""
+"""A law of adhesion that is written here alone: what the contract in ``edge_law.hpp`` promises."""
 
 import pickle
 from typing import Any

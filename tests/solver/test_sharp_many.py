@@ -46,8 +46,8 @@ def test_field_equals_the_dense_one(profile, gaps, tolerance):
     ends = random_gaps(*gaps)
     tree, model = solved(source, ends, separation, tolerance)
     dense = solve_densely(ends, separation, model)
-    scale = np.abs(dense.opening).max()
-    assert np.abs(tree.opening - dense.opening).max() < 2 * tolerance * scale
+    scale = np.abs(dense.edge_opening).max()
+    assert np.abs(tree.edge_opening - dense.edge_opening).max() < 2 * tolerance * scale
     assert tree.pressure == pytest.approx(dense.pressure, rel=2 * tolerance)
     assert tree.unit_mean == pytest.approx(dense.unit_mean, rel=2 * tolerance)
 
@@ -80,10 +80,10 @@ def test_newton_step_and_stability_equal_the_dense_ones(profile):
     for seed in range(12):
         gaps = random_gaps(6, 0.1 + 0.06 * seed, 0.1, seed)
         solution = solve_densely(gaps, separation, edges.model)
-        assert solution.opening.min() > 0
+        assert solution.edge_opening.min() > 0
         tangent = dense_tangent(gaps, separation, edges)
         step = np.linalg.solve(tangent, -dense_residual(gaps, separation, edges))
-        by_edge = solution.opening[:, None] * tangent
+        by_edge = solution.edge_opening[:, None] * tangent
         stable = bool(np.linalg.eigvalsh(by_edge + by_edge.T)[0] > 0)
         response = set_up_response(gaps, separation, edges.law, edges.model)
         found = response.solve(separation, edges.law, edges.model)
@@ -158,8 +158,8 @@ def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(many_gaps
     assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.field_error
     assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
     assert back.field.nearly[0] == pytest.approx(anew.field.nearly[0], rel=1e-6)
-    scale = np.abs(anew.field.opening).max()
-    assert np.abs(back.field.opening - anew.field.opening).max() < 1e-5 * scale
+    scale = np.abs(anew.field.edge_opening).max()
+    assert np.abs(back.field.edge_opening - anew.field.edge_opening).max() < 1e-5 * scale
 
 
 def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gaps):

@@ -250,3 +250,16 @@ def test_strong_adhesion_runs_to_full_contact_under_load():
     assert SingleWave.with_alpha(0.569, 1e-6, 1e-3, 1e6).loop_under(0.0).loss > 0
     with pytest.raises(ValueError, match="stable contact needs"):
         SingleWave.with_alpha(0.5705, 1e-6, 1e-3, 1e6).loop_under(0.0)
+
+
+@pytest.mark.parametrize("alpha", [1e-4, 1e-3, 1e-2, 0.05, 0.1])
+def test_a_narrow_patch_first_comes_to_rest_near_the_half_width_without_load(alpha):
+    """The length (16 Γ/(π κ²))^(1/3), by which seeds and errors of ``grid`` go, is a half-width."""
+    w = wave(alpha)
+    curvature = A * (2 * np.pi / PERIOD) ** 2
+    b = (32 * w.work_of_adhesion / (np.pi * MODULUS * curvature**2)) ** (1 / 3)
+    assert 0.85 < w.touch_half_width / b < 0.96
+    assert parabola_load(b, 1 / curvature, MODULUS, w.work_of_adhesion) == pytest.approx(
+        0, abs=1e-9
+    )
+    assert 1.2 < w.loop.touch_drop * PERIOD / (w.work_of_adhesion * b) < 1.5

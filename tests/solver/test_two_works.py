@@ -34,7 +34,7 @@ def test_a_saddle_is_left_by_edges_that_are_not_pinned(half_width, ways):
     edges = method.edges
     gaps, memory = (np.array([[a, 2 * np.pi - a]]) for a in (half_width, 0.9 * half_width))
     law = edges.law_at(memory)
-    here, there = (edges.solution(gaps, d).opening for d in (0.0, 1e-3))
+    here, there = (edges.solution(gaps, d).edge_opening for d in (0.0, 1e-3))
     d = 1e-3 * ((law.critical_of(gaps, here) - here) / (there - here))[0]
     assert len(method.jumps.descents.ways_off_saddle(gaps, d, law)) == ways
 

@@ -17,7 +17,7 @@ class DenseSolution(NamedTuple):
     pressure: float
     separation: float
     unit_mean: float
-    opening: Array
+    edge_opening: Array
 
 
 def solve_densely(
@@ -46,7 +46,7 @@ def dense_residual(
     gaps: Array, prescribed: float, edges: EdgeMechanics, orders: Integers | None = None
 ) -> Array:
     """Compute C_e - C_c at all edges."""
-    opening = solve_densely(gaps, prescribed, edges.model, orders).opening
+    opening = solve_densely(gaps, prescribed, edges.model, orders).edge_opening
     return np.asarray(opening - edges.law.critical_of(gaps, opening))
 
 

@@ -174,7 +174,7 @@ MECHANISMS = (
         "loss_by_mechanism",
         "Loss by mechanism",
         "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
-        "large scale: patches appear, merge, split, vanish or pull off. Figures above the bars: "
+        "large scale: patches appear, merge, split, open, vanish or pull off. Above the bars: "
         f"share of the small scale. Error bars: 95 % interval of the mean of either part. {_BELOW}",
         loss_figures.loss_by_mechanism,
     ),

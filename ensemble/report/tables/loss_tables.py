@@ -104,7 +104,7 @@ def losses(data: Aggregate) -> Table:
             lambda cell: int(cell.values["races"].sum()) if cell.done else None,
             "races",
             only_if_any=True,
-            note="races: jumps that another rule of descent would have ended elsewhere, all loops",
+            note="races: jumps of all loops that another rule or order would have ended elsewhere",
         ),
         *estimated("energy_at_stake_dimensionless"),
         TableColumn(

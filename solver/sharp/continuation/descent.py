@@ -187,7 +187,7 @@ class Descents:
         if not at_fold and near.solve(prescribed, law, edges.model).stable:
             return []
         tangent = near.tangent_between(gaps, free, prescribed, law, edges.model)
-        by_edge = near.opening[free, None] * tangent
+        by_edge = near.edge_opening[free, None] * tangent
         limit = step_limits(gaps, law.longest_step)[free]
         order = positions(gaps, edges.source.highest)[free]
         found = leaving_step(by_edge + by_edge.T, limit, order, EQUAL if at_fold else 0.0)
@@ -206,7 +206,7 @@ class Descents:
 
     def _force_along(self, gaps: Array, step: Array, prescribed: float, law: EdgeLaw) -> float:
         """Compute the force along a ``step`` at its end: positive where the energy falls."""
-        opening = self._edges.solution(gaps, prescribed).opening
+        opening = self._edges.solution(gaps, prescribed).edge_opening
         residual = opening - law.critical_of(gaps, opening)
         return -float((residual * (2 * opening - residual)) @ step)
 
@@ -235,7 +235,7 @@ class Descents:
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
         minimum: the flow stands still there. A minimum draws the edge back.
         """
-        opening = self._edges.solution(gaps, prescribed).opening
+        opening = self._edges.solution(gaps, prescribed).edge_opening
         residual = opening - law.critical_of(gaps, opening)
         e = int(np.argmax(np.abs(residual)))
         step = np.zeros(gaps.size)

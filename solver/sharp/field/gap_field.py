@@ -132,9 +132,9 @@ class GapField:
         return self.solution.separation
 
     @property
-    def opening(self) -> Array:
+    def edge_opening(self) -> Array:
         """C at each gap end, shape (L, 2)."""
-        return self.solution.opening.reshape(-1, 2)
+        return self.solution.edge_opening.reshape(-1, 2)
 
     def fine_opening(self, k: int, per_wave: float = SHAPE_NODES) -> GapOpening:
         """Evaluate the opening T of gap k at fine nodes."""

@@ -5,12 +5,12 @@ nucleates; where it is not at the end of a trail of points, :func:`locate` finds
 which on it is not. :class:`Nucleation` is the criterion of touches (docs/methods.md, rules 4 and
 11), ``crack.Cracks`` that of gaps that open inside patches.
 
-With adhesion a touching point grows at once to its first equilibrium; on the parabola κx²/2 that is
-(16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width, but no longer
-than ``LONGEST_STEP``, is put there; the descent does the rest. Without adhesion a patch has no
-width at first touch: its seed is put when the overlap is large enough for the narrowest patch that
-is followed. With a finite range of adhesion a seed is put that grows: G stays below γ by a tenth at
-both edges.
+With adhesion a touching point grows at once to its first equilibrium; on the parabola κx²/2 half
+its width is nearly b = (16 Γ/(π κ²))^(1/3), Γ = 2γ q0/E* (lengths in 1/q0). A seed b/2 wide, but no
+longer than ``LONGEST_STEP``, is put there; the descent does the rest. Without adhesion a patch
+has no width at first touch: its seed is put when the overlap is large enough for the narrowest
+patch that is followed. With a finite range of adhesion a seed is put that grows: G stays below γ by
+a tenth at both edges.
 """
 
 from __future__ import annotations
