@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 
 import numpy as np
 
@@ -15,9 +14,6 @@ from adhesis.ensemble.trace.reading.missing_heights import without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_column, refuse_uneven_rows
 from adhesis.solver.model.profile import Array
-
-# A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
-_POSSIBLE_UNIT = re.compile(r"[(\[<{]\s*([^\W\d_]{1,3})\s*[)\]>}]")
 
 # The ends do not meet where the step from the last height to the first is more than this many times
 # the largest step within. Over a period the steps add up to zero: a profile that is resolved, or
@@ -120,12 +116,10 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
                 "wrong one"
             )
         return given
-    words = () if found else filter(None, map(_POSSIBLE_UNIT.search, table.header))
-    unclear = stated.unclear or next((word[0] for word in words), None)
-    if unclear and found != "m":
+    if stated.unclear and found != "m":
         raise InputError(
-            f"the header of {source} has {unclear!r}, from which the unit of the heights is not "
-            "clear: give --unit, as in --unit um"
+            f"the header of {source} has {stated.unclear!r}, from which the unit of the heights is "
+            "not clear: give --unit, as in --unit um"
         )
     return found
 

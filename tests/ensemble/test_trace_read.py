@@ -251,8 +251,8 @@ def test_a_trace_is_made_of_heights_and_a_step() -> None:
 
 @pytest.mark.parametrize(
     "gap",
-    ["", "NaN", "---", "*****", "BAD", "-9999", "1e38", "-nan(ind)", "1.#QNAN0", "Infinity", "n.a.",
-     "(no data)", "Over range", "#WERT!", "#DIV/0!", "#N/A"],
+    ["", "NaN", "---", "*****", "*", "x", "BAD", "-9999", "1e38", "-nan(ind)", "1.#QNAN0",
+     "Infinity", "n.a.", "(no data)", "Over range", "#WERT!", "#DIV/0!", "#N/A"],
 )  # fmt: skip
 def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -> None:
     lines = rows(";", ".")

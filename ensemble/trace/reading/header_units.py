@@ -76,6 +76,8 @@ _OTHER = re.compile(
     r"|m?rad|counts?|cts|a\.?u\.?|arb\.?( units)?|px|pixels?|%|ppm|dB|bits?|LSB|digits?|Ohm|Ω|1|-)"
     rf"|(?(1)[^)\]>}}]*|(?:{_WORD}))[/^][^)\]>}}]*)(?(1)\s*[)\]>}}])\s*"
 )
+# A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
+_POSSIBLE_UNIT = re.compile(r"[(\[<{]\s*[^\s\d)\]>}]{1,3}\s*[)\]>}]")
 _NUMBERED = re.compile(r"\b(channel|kanal|profile|profil|column|trace|line|scan) \d\b")
 _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
 # A label and a value name no column: "Unit:", "0.5 µm", "Tip radius 2 um", "Cut-off (mm): 0.8".
@@ -101,6 +103,7 @@ _OF_STEP = _set(
 )
 _BESIDE_STEP = _OF_STEP | _set("in of the size between axis direction de d")
 _FIRST_NUMBER = re.compile(_NUMBER, re.IGNORECASE)
+_POINT_OF_THOUSANDS = re.compile(r"[1-9]\d{0,2}\.\d{3}")  # beside decimal commas
 # "about 0.4 um", and points per length.
 _NOT_THE_STEP = re.compile(r"[~≈≤≥±]|<\s*$|\bpoints?\s*/")
 _LENGTH = re.compile(r"[\s,;:=()\[\]<>{}/]*([^\W\d]*)[\s)\]>},;.]*")
@@ -230,12 +233,16 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
         return found[-1]
     units = [next(iter(names)) if len(names) == 1 else None for names in known]
     alone = bool(fields) and len(fields[0]) == 1
-    return HeaderUnits((units[1] if alone else units[0], units[1]))
+    possible = (word[0] for row in fields for text in row if (word := _POSSIBLE_UNIT.search(text)))
+    return HeaderUnits(
+        (units[1] if alone else units[0], units[1]),
+        unclear="" if any(known) else next(possible, ""),
+    )
 
 
 def _row_of_units(row: Sequence[_Column], above: Sequence[_Column] | None) -> HeaderUnits | None:
     """Return what a row states, with the names above it if it holds units alone."""
-    if any(_VALUE.search(column.text) for column in row):
+    if any(_VALUE.search(column.plain) for column in row):
         return None
     if not any(column.has_unit for column in row):
         return None
@@ -294,6 +301,8 @@ def _step(text: str, decimal: str, counts: bool) -> float | None:
     inside = _COLUMN.fullmatch(unicodedata.normalize("NFKC", label))
     named = unit[1] or next(filter(None, inside.groups()[1:] if inside else ()), "")
     if not named or named in ("a", "A") or not _names_step(_words(label), counts):
+        return None
+    if decimal == "," and _POINT_OF_THOUSANDS.fullmatch(number[0]):
         return None
     try:
         metres = LENGTH.units[LENGTH.unit_named(named)]

@@ -457,7 +457,8 @@ def _from_table(
     if slope > _STEEPEST:
         raise InputError(
             f"{name} would rise by {slope:.3g} times its step from point to point: are positions "
-            f"and heights in the same unit ({parameter('unit')} X,Z)?"
+            f"and heights in the same unit ({parameter('unit')} X,Z), and is a "
+            f"{parameter('step')} that is given or stated right?"
         )
     return trace
 
@@ -481,6 +482,8 @@ def _chosen(
             )
     elif len(picked) > 2:
         rows = f", or {parameter('row')} K, a row of a map" if len(picked) >= MIN_POINTS else ""
+        if not rows and not fields and len(picked) > 3:
+            rows = "; heights that go on from row to row are to be written in one column"
         raise InputError(
             f"{name} has {len(picked)} columns: give {parameter('columns')} X,Z, those of "
             f"positions and heights{rows}"
@@ -648,15 +651,20 @@ def _units(
             f"{name} states no unit that is clear, with {found.unclear!r} in its header: give "
             f"{parameter('unit')}, as in {'mm,um' if len(columns) == 2 else 'um'}, if the numbers "
             f"are {' and '.join(_KINDS[2 - len(columns) :])}"
+            f"{', in this order' if len(columns) == 2 else ''}"
         )
     if stated[0] is not None and stated[1] is not None:
         return (stated[0], stated[1]), "header"
     if stated[0] is not None or stated[1] is not None:
         known = "positions" if stated[0] else "heights"
-        count = f", or {parameter('step')} if the first column counts the points"
+        mend = ""
+        if _counts_points(columns[0]):
+            mend = f", or {parameter('step')} if the first column counts the points"
+        elif stated[0] is None:
+            mend = ", or take signs of thousands out if all numbers are heights"
         raise InputError(
             f"the header of {name} states the unit of the {known} alone: give {parameter('unit')} "
-            f"X,Z, as in mm,um{count if _counts_points(columns[0]) else ''}"
+            f"X,Z, as in mm,um{mend}"
         )
     if _sure_to_be_metres(columns, step):
         return ("m", "m"), "numbers"

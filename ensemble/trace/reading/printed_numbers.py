@@ -22,7 +22,7 @@ _MISSING = frozenset(
 )  # fmt: skip
 _SIGNS = re.compile(r"[-+*.()\s]")  # about such a word, or as wide as the number that is missing
 _PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE)  # #NAME?, 1.#INF
-_FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’_]*")  # of a line
+_FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’`´٬_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 # "0,5,1,3" and "0,5, 1,3": four numbers, or two
 _DECIMALS = r"\d*(?:e[+\-]?\d+)?"
@@ -153,7 +153,9 @@ def find_form(
     has_names = not LENGTH.spellings.keys() & set(fields)
     is_named = has_names and len(fields) == len(split(sample[0], ","))
     is_doubtful = decimal is None and best[0] == "," and not is_named
-    if is_doubtful and all(map(_PAIRS.fullmatch, sample)):
+    # Fewer names than numbers, none of which has a point
+    has_few_names = 1 < len(fields) < len(split(sample[0], ",")) and "." not in "".join(sample)
+    if is_doubtful and (has_few_names or all(map(_PAIRS.fullmatch, sample))):
         _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
 

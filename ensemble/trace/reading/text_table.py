@@ -38,6 +38,7 @@ from adhesis.solver.model.profile import Array
 
 _ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with, or one that is as long as a trace
 _LONG_ROW = 32
+_SHARE_OF_ROWS = 0.05  # that are as long as the table is wide
 _SAMPLE = 400  # lines that the form of a file is judged by
 _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searching more takes long
 # Numbers at each end that are held to all others; others that it needs; share of one printed form.
@@ -45,7 +46,11 @@ _ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
 _DIGIT = re.compile(r"[+\-]?[.,]?\d")
 _PAGE_BREAK = re.compile(r"^\f+\r*\n|\f", re.MULTILINE)
-_FACTOR = re.compile(r"\s*[\d.,eE+\-]+\s*[*×x]\s*")  # above the numbers, as Matlab prints it
+# A power of ten above the numbers, as Matlab prints it
+_FACTOR = re.compile(r"\s*(?:[\d.]+[eE][+\-]?\d+|10+(?:\.0*)?|0?\.0*1)\s*[*×x]\s*")
+# Words of a column that marks rows, as numbers
+_MARKS = dict.fromkeys(("true", "yes", "ja", "ok", "good"), 1.0)
+_MARKS |= dict.fromkeys(("false", "no", "nein", "ng"), 0.0)
 # What people and programs write for the minus sign.
 _MARK = "\ufeff"  # of a text in UTF-8
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
@@ -163,6 +168,8 @@ class _Reader:
         while len(fields) > self.count and not fields[-1]:
             fields.pop()
         values = [value(field, self.decimal) for field in fields]
+        if self.count > 2:  # of more than positions and heights one may mark rows
+            values = [_MARKS.get(f.lower(), v) for f, v in zip(fields, values, strict=True)]
         if len(fields) > self.count or None in values:
             return None
         lacking = self.count - len(fields)
@@ -209,15 +216,21 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         place = max(range(len(lines)), key=lambda k: sum(sign.isdigit() for sign in lines[k]))
         raise InputError(
             f"{source} holds no line of numbers: most digits stand on line {place + 1}, "
-            f"{shown_line(lines[place])}"
+            f"{shown_line(lines[place])}; take words, brackets and quotes about the numbers out"
         )
     spread = sample[:: max(1, len(sample) // _SAMPLE)]
     is_given = decimal is not None
     above = "".join(lines[: lines.index(sample[0])][-1:])
     delimiter, decimal = find_form(source, spread, delimiter, decimal, above)
-    count = Counter(len(split(line, delimiter)) for line in spread).most_common(1)[0][0]
+    # The shorter one of two traces ends first: its rows are not the shape of the table.
+    counts = Counter(len(split(line, delimiter)) for line in spread)
+    count = max(k for k, times in counts.items() if times >= _SHARE_OF_ROWS * len(spread))
     reader = _Reader(source, lines, delimiter, decimal, count)
     start = _first_row(reader)
+    if start is not None and _holds_numbered_names(reader, start):
+        lines[start] = COMMENT[0] + lines[start]
+        reader = _Reader(source, lines, delimiter, decimal, count)
+        start = _first_row(reader)
     if start is None:
         _refuse_no_rows(reader, len(sample))
     places = _block(reader, start)
@@ -264,6 +277,20 @@ def _first_row(reader: _Reader) -> int | None:
     return None
 
 
+def _holds_numbered_names(reader: _Reader, start: int) -> bool:
+    """Return whether the first row has the names that pandas gives to columns: "0,1" or ",0".
+
+    Its numbers do not continue those below, which are no whole ones.
+    """
+    first, *below = [row for place, row in reader.rows.items() if place >= start][:_ROWS_TO_BEGIN]
+    names = first.fields[not first.fields[0] :]
+    if reader.count == 1 or names != [str(k) for k in range(len(names))]:
+        return False
+    steps = np.diff([row.values[0] for row in (first, *below)])
+    has_decimals = all(any(printed_form(field)[0] for field in row.fields) for row in below)
+    return has_decimals and (not first.fields[0] or abs(np.ptp(steps)) > 0.1 * abs(steps[-1]))
+
+
 def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
     source = reader.source
     for place, line in enumerate(reader.lines):
@@ -273,8 +300,8 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
             raise InputError(
                 f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
                 f"{'comma' if reader.decimal == ',' else 'point'}: take signs of thousands, units "
-                "within cells, remarks and quotes about rows out, or give "
-                f"{parameter('decimal')} and {parameter('delimiter')}"
+                "within cells, remarks and quotes about rows out, write all numbers with one "
+                f"decimal sign, or give {parameter('decimal')} and {parameter('delimiter')}"
             )
     raise InputError(
         f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} of one "
@@ -358,11 +385,16 @@ def _refuse_odd_ends(
     several columns only the last row is judged, in which the file may end too early.
     """
     n = len(column)
-    # Noughts and codes of missing heights are written as they please.
+    # Noughts and codes of missing heights are written as they please; but pandas writes the name
+    # "0" above a column without one.
+    rises = np.abs(np.diff(numbers))
+    may_be_name = is_lone and column[0] == "0" and n > 1 and rises[0] == np.fmax.reduce(rises)
     forms = {
         k: printed_form(column[k])
         for k in range(n)
-        if isfinite(numbers[k]) and (numbers[k] or k == n - 1) and not may_be_code(numbers[k])
+        if isfinite(numbers[k])
+        and (numbers[k] or k == n - 1 or (k == 0 and may_be_name))
+        and not may_be_code(numbers[k])
     }
     inner = [form for k, form in forms.items() if _ENDS <= k < n - _ENDS]
     if len(inner) < _TO_JUDGE:
@@ -376,11 +408,12 @@ def _refuse_odd_ends(
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
         is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
         is_odd = form != usual if has_one_form else is_cut
+        is_odd |= k == 0 and may_be_name and fewest > 0
         if is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
             raise InputError(
                 f"line {places[k] + 1} of {source} has {column[k]!r}, at the end of a column: "
-                "remove it if it is a count, a length, a step or a checksum, or was cut off; the "
-                "numbers of a column have as many decimals"
+                "remove it if it is a name, a count, a length, a step or a checksum, or was cut "
+                "off; the numbers of a column have as many decimals"
             )
 
 
@@ -430,6 +463,8 @@ def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tupl
         fields.pop()
     if filled[-1] < len(fields) <= count:
         return tuple(fields + [""] * (count - len(fields)))
+    if len(fields) == count - 1 and '"' in line:  # R names no column of the numbers of rows
+        return ("", *fields)
     for sign in DELIMITERS:
         fields = _split_names(line, sign)
         if len(fields) == count:
