@@ -418,7 +418,7 @@ def _from_table(
             notes.append(f"the first column counts the points{left_out}")
     if len(columns) == 1 and (empty := int(np.sum(np.diff(places) - 1))):
         notes.append(f"{counted(empty, 'empty row')} left out")
-    (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
+    (x_unit, z_unit), given_by = units_of_columns(name, found, unit, columns, step)
     heights = columns[-1] * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
@@ -621,10 +621,13 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
 # ---------------------------------------------------------------------- units
 
 
-def _units(
+def units_of_columns(
     name: str, found: HeaderUnits, unit: str | None, columns: Array, step: float | None
 ) -> tuple[tuple[str, str], str]:
-    """Return the units of positions and heights, and what states them."""
+    """Return the units of positions and heights, or of heights alone, and what states them.
+
+    InputError if header and option do not state them, and the numbers need not be metres.
+    """
     kinds = range(2 - len(columns), 2)  # of heights alone the second
     for kind in kinds:
         if found.other[kind]:
@@ -671,13 +674,13 @@ def _units(
     low, high = np.nanmin(columns[0]), np.nanmax(columns[0])
     raise InputError(
         f"{name} states no unit, and {_KINDS[2 - len(columns)]} from {low:g} to {high:g} need not "
-        f"be metres: give {parameter('unit')}, as in um"
+        f"be metres: give {parameter('unit')}, as in um (m, if they are)"
     )
 
 
 def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     heights = columns[-1][np.isfinite(columns[-1])]
-    if heights.size == 0 or np.percentile(heights, 99) - np.percentile(heights, 1) > HEIGHT.largest:
+    if heights.size and np.ptp(np.percentile(heights, [1, 99])) > HEIGHT.largest:
         return False
     if len(columns) == 1:
         return step is not None
