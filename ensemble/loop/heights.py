@@ -48,26 +48,24 @@ def read_heights(
             "that holds zero bytes (UTF-16 without a mark) is to be saved as UTF-8"
         )
     found = HeaderUnits()
-    if source.is_npy:
+    table = None if source.is_npy else read_column(source, delimiter, decimal)
+    if table is None:
         array = load_array(source)
         if array.ndim == 2 and 1 not in array.shape:
             raise InputError(_not_one_column(source, *array.shape))
         heights = array.reshape(-1)
-        places: Array = np.arange(heights.size)
-        place = "at index"
     else:
-        table = read_column(source, delimiter, decimal)
         if len(table.filled) > 1:
             raise InputError(_not_one_column(source, table.columns.shape[1], len(table.filled)))
         refuse_uneven_rows(source, table.lines)
         found = units_of_header(table.header, table.fields)
         heights = table.columns[table.filled[0]]
-        places, place = table.lines, "on line"
     missing = np.flatnonzero(~np.isfinite(heights))
     if missing.size:
+        where = f"on line {table.lines[missing[0]]}" if table else f"at index {missing[0]}"
         raise InputError(
-            f"{path} has no finite height {place} {places[missing[0]]}: --heights needs every "
-            "height of the period (adhesis trace fills gaps)"
+            f"{path} has no finite height {where}: --heights needs every height of the period "
+            "(adhesis trace fills gaps)"
         )
     codes = without_codes(heights, known_alone=True)[1]
     if codes:

@@ -30,7 +30,6 @@ Z = 1e-6 * np.array(ZS, dtype=float)
 PAIRS = list(zip(XS, ZS, strict=True))
 UM = "x (um),z (um)"
 TWO = [f"{x},{z}" for x, z in PAIRS]
-SEMICOLONS = [f"{x};{z}" for x, z in PAIRS]
 RU = [row.replace(",", ";").replace(".", ",") for row in TWO]
 
 
@@ -126,11 +125,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         Z_UM,
     ),
     "a label, a value and a unit in quotes": (['"Z Calibration","1","nm"', "Height", *ZS], Z_UM),
-    "a second trace that is the shorter half": (
-        ["x1;z1;x2;z2", *(f"{x};{z};{x};{z}" for x, z in PAIRS[:90]), *SEMICOLONS[90:]],
-        {"unit": "um", "columns": [1, 2]},
-    ),
-    "labels that begin with a digit": ([*(f"{k} = {k / 7:.2f}" for k in range(600)), UM, *TWO], {}),
     "words that mark rows": (
         ["x (um),z (um),valid", *(f"{row},{k < N}" for k, row in enumerate(TWO))],
         {"columns": [1, 2]},

@@ -38,7 +38,6 @@ from adhesis.solver.model.profile import Array
 
 _ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with, or one that is as long as a trace
 _LONG_ROW = 32
-_SHARE_OF_ROWS = 0.05  # that are as long as the table is wide
 _SAMPLE = 400  # lines that the form of a file is judged by
 _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searching more takes long
 # Numbers at each end that are held to all others; others that it needs; share of one printed form.
@@ -222,9 +221,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     is_given = decimal is not None
     above = "".join(lines[: lines.index(sample[0])][-1:])
     delimiter, decimal = find_form(source, spread, delimiter, decimal, above)
-    # The shorter one of two traces ends first: its rows are not the shape of the table.
-    counts = Counter(len(split(line, delimiter)) for line in spread)
-    count = max(k for k, times in counts.items() if times >= _SHARE_OF_ROWS * len(spread))
+    count = Counter(len(split(line, delimiter)) for line in spread).most_common(1)[0][0]
     reader = _Reader(source, lines, delimiter, decimal, count)
     start = _first_row(reader)
     if start is not None and _holds_numbered_names(reader, start):
