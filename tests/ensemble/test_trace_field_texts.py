@@ -114,7 +114,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
     "ruled comments": (["####", "# x", "####", UM, *TWO], {}),
     "blank lines before": ([*(5000 * [""]), UM, *TWO], {}),
     "a delimiter before": (["\tx (um)\tz (um)", *(f"\t{x}\t{z}" for x, z in PAIRS)], {}),
-    "names by number": (["0,1", *TWO], {"unit": "um"}),
     "names by number beside an index": (
         [",0,1", *(f"{k},{row}" for k, row in enumerate(TWO))],
         {"unit": "um", "columns": [2, 3]},
@@ -129,6 +128,7 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["x (um),z (um),valid", *(f"{row},{k < N}" for k, row in enumerate(TWO))],
         {"columns": [1, 2]},
     ),
+    "a nought without decimals at the first place": (["x (um),z (um)", f"0,{ZS[0]}", *TWO[1:]], {}),
     "page breaks": ([f"\f{z}" if k % 60 == 59 else z for k, z in enumerate(ZS)], Z_UM),
 }  # fmt: skip
 
@@ -448,6 +448,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         "the first column of .* may count the points: give step",
     ),
+    "names by number": (["0,1", *TWO[1:]], {"unit": "um"}, "line 1 of .* has '1', .* it is a name"),
     "a name by number": (["0", *ZS], Z_UM, "line 1 of .* has '0', at the end .* if it is a name"),
     "columns in another order": (
         ["z (um);x (um)", *(f"{z};{x}" for x, z in PAIRS)],

@@ -166,6 +166,8 @@ class _Reader:
         fields = [plain] if is_missing(plain) else split(line, self.delimiter)
         while len(fields) > self.count and not fields[-1]:
             fields.pop()
+        if _are_names(fields):
+            return None
         values = [value(field, self.decimal) for field in fields]
         if self.count > 2:  # of more than positions and heights one may mark rows
             values = [_MARKS.get(f.lower(), v) for f, v in zip(fields, values, strict=True)]
@@ -197,7 +199,7 @@ class _Reader:
         if place in self.rows:
             return adjoins or self.is_whole(place)
         line = self.lines[place].strip()
-        if not line or line[0] in COMMENT:
+        if not line or line[0] in COMMENT or _are_names(split(line, self.delimiter)):
             return False
         return adjoins and (_DIGIT.match(line) is not None or is_without_words(line))
 
@@ -206,6 +208,11 @@ class _Reader:
         raise InputError(
             f"line {place + 1} of {self.source} is {shown_line(self.lines[place])}{sentence}"
         )
+
+
+def _are_names(fields: list[str]) -> bool:
+    """Return whether pandas names the columns beside an index so: ",0,1"."""
+    return len(fields) > 1 and fields == ["", *map(str, range(len(fields) - 1))]
 
 
 def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
@@ -224,10 +231,6 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     count = Counter(len(split(line, delimiter)) for line in spread).most_common(1)[0][0]
     reader = _Reader(source, lines, delimiter, decimal, count)
     start = _first_row(reader)
-    if start is not None and _holds_numbered_names(reader, start):
-        lines[start] = COMMENT[0] + lines[start]
-        reader = _Reader(source, lines, delimiter, decimal, count)
-        start = _first_row(reader)
     if start is None:
         _refuse_no_rows(reader, len(sample))
     places = _block(reader, start)
@@ -239,7 +242,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         refuse_thousands(source, columns, decimal)
     for k, column in zip(filled, columns, strict=True):
         numbers = [row.values[k] for row in rows]
-        _refuse_odd_ends(source, column, numbers, places, is_lone=len(filled) == 1)
+        _refuse_odd_ends(source, column, numbers, places, str(k), is_lone=len(filled) == 1)
         if len(filled) == 1:
             _refuse_dashes(reader, column, places)
     header = [line[:_LONGEST_HEADER_LINE].strip(" \r\n").lstrip(COMMENT) for line in lines[:start]]
@@ -272,20 +275,6 @@ def _first_row(reader: _Reader) -> int | None:
         if len(found) == needed:
             return found[0]
     return None
-
-
-def _holds_numbered_names(reader: _Reader, start: int) -> bool:
-    """Return whether the first row has the names that pandas gives to columns: "0,1" or ",0".
-
-    Its numbers do not continue those below, which are no whole ones.
-    """
-    first, *below = [row for place, row in reader.rows.items() if place >= start][:_ROWS_TO_BEGIN]
-    names = first.fields[not first.fields[0] :]
-    if reader.count == 1 or names != [str(k) for k in range(len(names))]:
-        return False
-    steps = np.diff([row.values[0] for row in (first, *below)])
-    has_decimals = all(any(printed_form(field)[0] for field in row.fields) for row in below)
-    return has_decimals and (not first.fields[0] or abs(np.ptp(steps)) > 0.1 * abs(steps[-1]))
 
 
 def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
@@ -374,18 +363,19 @@ def _refuse_odd_ends(
     column: Sequence[str],
     numbers: Sequence[float],
     places: Sequence[int],
+    name: str,
     is_lone: bool,
 ) -> None:
     """Refuse counts, steps and checksums at the ends of a lone column, and a number cut off.
 
     They are printed otherwise than all numbers between, or the first one counts the others. Of
-    several columns only the last row is judged, in which the file may end too early.
+    several columns only the last row is judged, in which the file may end too early, and the number
+    that pandas gives to a column as its ``name``.
     """
     n = len(column)
-    # Noughts and codes of missing heights are written as they please; but pandas writes the name
-    # "0" above a column without one.
     rises = np.abs(np.diff(numbers))
-    may_be_name = is_lone and column[0] == "0" and n > 1 and rises[0] == np.fmax.reduce(rises)
+    may_be_name = column[0] == name and n > 2 and rises[0] > 1.1 * np.fmax.reduce(rises[1:])
+    # Noughts and codes of missing heights are written as they please.
     forms = {
         k: printed_form(column[k])
         for k in range(n)
@@ -400,13 +390,13 @@ def _refuse_odd_ends(
     has_one_form = times >= (_ONE_FORM if is_lone else 1.0) * len(inner)
     fewest, shortest = (min(counts) for counts in zip(*inner, strict=True))
     for k, form in forms.items():
-        if k < n - 1 and (not is_lone or _ENDS <= k < n - _ENDS):
+        is_name = k == 0 and may_be_name and fewest > 0
+        if k < n - 1 and not is_name and (not is_lone or _ENDS <= k < n - _ENDS):
             continue
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
         is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
         is_odd = form != usual if has_one_form else is_cut
-        is_odd |= k == 0 and may_be_name and fewest > 0
-        if is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
+        if is_name or is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
             raise InputError(
                 f"line {places[k] + 1} of {source} has {column[k]!r}, at the end of a column: "
                 "remove it if it is a name, a count, a length, a step or a checksum, or was cut "
