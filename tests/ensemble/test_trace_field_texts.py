@@ -98,6 +98,10 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
+    "a line of the heights of a raster": (
+        [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
+        {"columns": [3], "row": 1, **Z_UM},
+    ),
     "an option against a line that names no column": (
         ["Evaluation length in mm", *TWO],
         {"unit": "um"},
@@ -384,6 +388,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a raster": (
         [f"{x},{y},{z}" for y in range(3) for x, z in PAIRS],
         {"unit": "um", "columns": [1, 3]},
+        "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
+    ),
+    "the heights alone of a raster": (
+        [f"{x},{y},{z}" for y in range(3) for x, z in PAIRS],
+        {"columns": [3], **Z_UM},
         "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
     ),
     "another row": (["\t".join(ZS)] * 3, {"row": 3}, "row is 3: .* has the rows 0 to 2"),

@@ -398,7 +398,7 @@ def _from_table(
         places = table.lines[: row + 1]
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
-        columns, lines = _scan_line(name, columns, lines, row, notes)
+        columns, lines = _scan_line(name, table, columns, lines, row, notes)
         places = lines
     if len(columns) == 1:
         refuse_uneven_rows(name, places, has_others=len(table.filled) > 1)
@@ -522,15 +522,18 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
 
 
 def _scan_line(
-    name: str, columns: Array, lines: Array, row: int | None, notes: list[str]
+    name: str, table: Table, columns: Array, lines: Array, row: int | None, notes: list[str]
 ) -> tuple[Array, Array]:
-    """Return one scan line, where the positions of a raster begin anew on each line."""
-    x = columns[0]
-    again = np.flatnonzero((x[1:] == x[:1]) & (x[:-1] != x[:1])) + 1
-    points = int(again[0]) if again.size and len(columns) == 2 else max(x.size, 1)
-    count, rest = divmod(x.size, points)
-    is_raster = count > 1 and not rest and np.array_equal(x, np.tile(x[:points], count))
-    if row is None and is_raster:
+    """Return one scan line, where the positions of a raster begin anew on each line.
+
+    Beside heights alone they may stand in any other column.
+    """
+    columns_of_positions = columns[:1]
+    if len(columns) == 1:
+        others = table.columns[list(table.filled)][:, np.isin(table.lines, lines)]
+        columns_of_positions = others[(others != columns).any(axis=1)]
+    points, count = next(filter(None, map(_raster, columns_of_positions)), (0, 0))
+    if row is None and count:
         raise InputError(
             f"the positions of {name} begin anew on line {lines[points]}: it is a raster of "
             f"{count} lines of {points} points, of which {parameter('row')} K takes one, 0 to "
@@ -538,15 +541,26 @@ def _scan_line(
         )
     if row is None:
         return columns, lines
-    if not is_raster:
+    if not count:
         raise InputError(
             f"{parameter('row')} is {row}: {name} is no map, as its positions do not begin anew on "
-            f"each line ({parameter('columns')} chooses columns)"
+            f"each line, or its lines are not of one length ({parameter('columns')} chooses "
+            "columns)"
         )
     check_row(name, row, count)
     notes.append(f"row {row} of {count}, of {points} points each")
     part = slice(row * points, (row + 1) * points)
     return columns[:, part], lines[part]
+
+
+def _raster(x: Array) -> tuple[int, int] | None:
+    """Return numbers of points and of lines, if positions begin anew on each of several lines."""
+    again = np.flatnonzero((x[1:] == x[:1]) & (x[:-1] != x[:1])) + 1
+    points = int(again[0]) if again.size else max(x.size, 1)
+    count, rest = divmod(x.size, points)
+    rises = np.diff(x[:points])
+    is_raster = count > 1 and not rest and (np.all(rises > 0) or np.all(rises < 0))
+    return (points, count) if is_raster and np.array_equal(x, np.tile(x[:points], count)) else None
 
 
 def _counts_points(x: Array) -> bool:

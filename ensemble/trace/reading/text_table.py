@@ -171,12 +171,11 @@ class _Reader:
         values = [value(field, self.decimal) for field in fields]
         if self.count > 2:  # of more than positions and heights one may mark rows
             values = [_MARKS.get(f.lower(), v) for f, v in zip(fields, values, strict=True)]
-        if len(fields) > self.count or None in values:
+        numbers = [v for v in values if v is not None]
+        if len(fields) > self.count or len(numbers) < len(fields):
             return None
         lacking = self.count - len(fields)
-        return _Row(
-            fields + [""] * lacking, [nan if v is None else v for v in values] + [nan] * lacking
-        )
+        return _Row(fields + [""] * lacking, numbers + [nan] * lacking)
 
     def is_whole(self, place: int) -> bool:
         """Return whether a line holds as many fields as there are columns."""
