@@ -12,7 +12,7 @@ from adhesis.ensemble.quantities import LENGTH, length_text
 from adhesis.ensemble.trace.reading.header_units import HeaderUnits, units_of_header
 from adhesis.ensemble.trace.reading.measured_trace import load_array, units_of_columns
 from adhesis.ensemble.trace.reading.missing_heights import without_codes
-from adhesis.ensemble.trace.reading.source import Source, source_of
+from adhesis.ensemble.trace.reading.source import source_of
 from adhesis.ensemble.trace.reading.text_table import read_column, refuse_uneven_rows
 from adhesis.solver.model.profile import Array
 
@@ -47,19 +47,18 @@ def read_heights(
             or f"{path} is neither text nor .npy: --trace reads files of instruments, and a text "
             "that holds zero bytes (UTF-16 without a mark) is to be saved as UTF-8"
         )
-    found = HeaderUnits()
     table = None if source.is_npy else read_column(source, delimiter, decimal)
-    if table is None:
-        array = load_array(source)
-        if array.ndim == 2 and 1 not in array.shape:
-            raise InputError(_not_one_column(source, *array.shape))
-        heights = array.reshape(-1)
-    else:
-        if len(table.filled) > 1:
-            raise InputError(_not_one_column(source, table.columns.shape[1], len(table.filled)))
+    columns = table.columns[list(table.filled)] if table else np.atleast_2d(load_array(source)).T
+    if 1 not in columns.shape:
+        raise InputError(
+            f"{source} holds {columns.shape[1]} × {columns.shape[0]} numbers: --heights takes one "
+            "column (or one row), the heights of one period; adhesis trace reads positions and "
+            "heights"
+        )
+    found, heights = HeaderUnits(), columns.reshape(-1)
+    if table:
         refuse_uneven_rows(source, table.lines)
         found = units_of_header(table.header, table.fields)
-        heights = table.columns[table.filled[0]]
     missing = np.flatnonzero(~np.isfinite(heights))
     if missing.size:
         where = f"on line {table.lines[missing[0]]}" if table else f"at index {missing[0]}"
@@ -80,13 +79,6 @@ def read_heights(
     found = replace(found, by_name=True, unclear="" if is_clear else found.unclear)
     of_heights = units_of_columns(f"{source}", found, unit, heights[None], step=1.0)[0][-1]
     return np.asarray(heights * LENGTH.units[of_heights])
-
-
-def _not_one_column(source: Source, rows: int, columns: int) -> str:
-    return (
-        f"{source} holds {rows} × {columns} numbers: --heights takes one column (or one row), the "
-        "heights of one period; adhesis trace reads positions and heights"
-    )
 
 
 def heights_warning(heights: Array, name: str) -> str | None:

@@ -534,7 +534,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         "the first column of .* rises or falls throughout, as positions do",
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
-    "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
+    "a delimiter of two signs": ([UM, *TWO], {"delimiter": ";;"}, "it must be one of semicolons"),
     "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "the decimal sign: omit"),
     "decimal commas that are delimiters": (
         ["x (um),z (um)", *(f"{k},{k % 7}" for k in range(99))],

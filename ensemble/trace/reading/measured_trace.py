@@ -699,10 +699,8 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     if len(columns) == 1:
         return step is not None
     x = columns[0][np.isfinite(columns[0])]
-    if x.size < 2:
-        return False
-    length = float(x.max() - x.min())
-    return length <= _LONGEST_IN_METRES and length / (x.size - 1) <= _WIDEST_STEP_IN_METRES
+    longest = min(_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES * (x.size - 1))
+    return x.size > 1 and bool(np.ptp(x) <= longest)
 
 
 def _slope(heights: Array, step: float) -> float:

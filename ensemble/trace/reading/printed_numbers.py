@@ -13,6 +13,7 @@ from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.reading.source import Source
 
 DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
+_NAMED_DELIMITERS = {"\\t": "\t", "tab": "\t", "space": " "}
 COMMENT = "#%!*"
 _SHOWN = 60  # signs of a line that a message quotes
 _MISSING = frozenset(
@@ -121,11 +122,13 @@ def find_form(
 
     InputError if two ways of reading them differ. ``names`` is the line above the numbers.
     """
-    given = (("delimiter", delimiter, tuple(DELIMITERS)), ("decimal", decimal, (".", ",")))
-    for name, sign, known in given:
-        if sign is not None and sign not in known:
-            rule = ", ".join(map(repr, known))
-            raise InputError(f"{parameter(name)} is {sign!r}: it must be one of {rule}")
+    known = {sign: sign for sign in DELIMITERS} | _NAMED_DELIMITERS
+    if delimiter is not None and delimiter not in known:
+        rule = f"{', '.join(DELIMITERS.values())} (; tab , space |)"
+        raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one of {rule}")
+    if decimal not in (None, ".", ","):
+        raise InputError(f"{parameter('decimal')} is {decimal!r}: it must be one of '.', ','")
+    delimiter = known[delimiter] if delimiter else None
     # No number holds one of these; a comma and a blank may stand in or behind a number.
     sure = [s for s in ";\t|" if sum(s in line for line in sample) >= _MOSTLY * len(sample)][:1]
     some = [sign for sign in ";\t|," if any(sign in line for line in sample)]
