@@ -170,6 +170,8 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "-3.2768", 51: "-3.2768", 200: "-3.2768"}, 3),
         ({50: "5.0", 51: "5.0", 52: "5.0", 200: "-5.0", 201: "-5.0", 202: "-5.0"}, 6),
         ({50: "0.800", 51: "0.800", 52: "0.800"}, 0),  # the flat top of a grain
+        ({50: "9.1", 51: "9.2", 52: "9.2", 53: "9.2", 54: "9.3"}, 0),  # one that is high
+        ({k: f"{0.5 * np.sin(np.pi * k / 10):.6g}" for k in range(N)}, 0),  # 40 are 1e-16 or so
         ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
         ({k: ("0.00", "0.11")[k % 2] for k in (50, 61, 70, 81, 90, 101)}, 0),  # rounded heights
     ],

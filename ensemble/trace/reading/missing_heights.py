@@ -15,6 +15,9 @@ from adhesis.solver.model.profile import Array
 # enough.
 _BEYOND, _BEYOND_KNOWN = 5.0, 0.2
 _REPEATED = 3
+_MOST_CODES = (
+    4  # different ones of an instrument; more numbers are heights, such as those of a sine
+)
 _CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 _ENORMOUS = 1e20
 _NINES = re.compile(r"-?9{2,}\.?9+")
@@ -50,15 +53,17 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
         return heights, ""
     low, high = _usual(values[~likely])
     away = np.maximum(low - values, values - high)
-    far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
+    apart = np.minimum(np.diff(values, prepend=-np.inf), np.diff(values, append=np.inf))
+    far = (away > _BEYOND * (high - low)) & (apart > _BEYOND_KNOWN * (high - low))
+    far &= repeated | nines | on_both_sides
     # Where hardly a height occurs twice, a number at the end of the range that does stands for no
     # height if it is apart from all others; so do noughts and nines, more often than all others,
     # even within the range.
     are_single = float(np.median(times)) == 1.0
-    rest = np.flatnonzero(~likely)
-    for end, inner, other in ((0, 1, -2), (-1, -2, 1)):
-        apart, span = np.abs(values[rest[inner]] - values[rest[[end, other]]])
-        far[rest[end]] |= are_single and repeated[rest[end]] and apart > _BEYOND_KNOWN * span
+    ends, rest = np.flatnonzero(~likely)[[0, -1]], values[~likely]
+    are_apart = apart[ends] > _BEYOND_KNOWN * abs(rest[-2] - rest[1])
+    far[ends] |= are_single & repeated[ends] & are_apart
+    far &= far.sum() <= _MOST_CODES
     repeated &= times > times[~likely & (values != 0)].max()
     codes = (known if known_alone else likely) & (away > _BEYOND_KNOWN * (high - low))
     if not known_alone:
