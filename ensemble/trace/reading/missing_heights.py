@@ -15,9 +15,7 @@ from adhesis.solver.model.profile import Array
 # enough.
 _BEYOND, _BEYOND_KNOWN = 5.0, 0.2
 _REPEATED = 3
-_MOST_CODES = (
-    4  # different ones of an instrument; more numbers are heights, such as those of a sine
-)
+_MOST_CODES = 4  # of one instrument; more different numbers are heights, as of a sine
 _CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 _ENORMOUS = 1e20
 _NINES = re.compile(r"-?9{2,}\.?9+")
