@@ -20,8 +20,7 @@ _CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483
 _ENORMOUS = 1e20
 _NINES = re.compile(r"-?9{2,}\.?9+")
 _VALID = re.compile(
-    r"\W*((is|z|data)?[ _]?valid(ity)?|valide|v[aá]lid[oa]|gültig|ok|good|有効|有效|유효)(\b|_)",
-    re.IGNORECASE,
+    r"\W*((is|z|data)?[ _]?valid(ity)?|v[aá]lid[aeo]|gültig|ok|good|有効|有效|유효)(\b|_)", re.I
 )
 
 

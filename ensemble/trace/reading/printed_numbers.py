@@ -13,7 +13,6 @@ from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.reading.source import Source
 
 DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
-_NAMED_DELIMITERS = {"\\t": "\t", "tab": "\t", "space": " "}
 COMMENT = "#%!*"
 _SHOWN = 60  # signs of a line that a message quotes
 _MISSING = frozenset(
@@ -122,17 +121,16 @@ def find_form(
 
     InputError if two ways of reading them differ. ``names`` is the line above the numbers.
     """
-    known = {sign: sign for sign in DELIMITERS} | _NAMED_DELIMITERS
+    known = {sign: sign for sign in DELIMITERS} | {"\\t": "\t", "tab": "\t", "space": " "}
     if delimiter is not None and delimiter not in known:
         rule = f"{', '.join(DELIMITERS.values())} (; tab , space |)"
         raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one of {rule}")
     if decimal not in (None, ".", ","):
         raise InputError(f"{parameter('decimal')} is {decimal!r}: it must be one of '.', ','")
-    delimiter = known[delimiter] if delimiter else None
     # No number holds one of these; a comma and a blank may stand in or behind a number.
     sure = [s for s in ";\t|" if sum(s in line for line in sample) >= _MOSTLY * len(sample)][:1]
     some = [sign for sign in ";\t|," if any(sign in line for line in sample)]
-    signs = [delimiter] if delimiter else sure or [*some, " "]
+    signs = [known[delimiter]] if delimiter else sure or [*some, " "]
     read = {}
     # Without quotes a comma is one of both.
     is_quoted = any('"' in line for line in sample)
@@ -152,12 +150,11 @@ def find_form(
     if most and others and best[0] in ", ":
         return _one_comma(sample) or _refuse_two_ways(source, sample[0])
     # A name stands above each of the numbers; "x, mm, z, um" names two.
-    fields = split(names, ",")
-    has_names = not LENGTH.spellings.keys() & set(fields)
-    is_named = has_names and len(fields) == len(split(sample[0], ","))
+    fields, count = split(names, ","), len(split(sample[0], ","))
+    is_named = len(fields) == count and not LENGTH.spellings.keys() & set(fields)
     is_doubtful = decimal is None and best[0] == "," and not is_named
     # Fewer names than numbers, none of which has a point
-    has_few_names = 1 < len(fields) < len(split(sample[0], ",")) and "." not in "".join(sample)
+    has_few_names = 1 < len(fields) < count and "." not in "".join(sample)
     if is_doubtful and (has_few_names or all(map(_PAIRS.fullmatch, sample))):
         _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
