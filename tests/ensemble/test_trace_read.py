@@ -170,6 +170,15 @@ def test_whole_heights_in_memory_are_no_step_and_no_length() -> None:
     assert read_trace(heights, unit="nm", step=7e-9).points == N
 
 
+def test_rows_that_a_column_of_a_table_marks_are_gaps() -> None:
+    valid = np.arange(N) != 7
+    for marks in (valid, valid.astype(int)):
+        table = FRAME.assign(valid=marks)
+        for columns in ([1, 2], ["x (mm)", "z (um)"]):
+            trace = read_trace(table, columns=columns)
+            assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [7]
+
+
 def test_missing_heights_in_memory_are_gaps() -> None:
     masked = np.ma.masked_array(1e6 * Z, mask=np.arange(N) == 7)
     table = pd.DataFrame({"z (um)": pd.array([None, *(1e6 * Z[1:])], dtype="Float64")})

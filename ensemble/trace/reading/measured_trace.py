@@ -22,7 +22,7 @@ from adhesis.ensemble.trace.reading.header_units import (
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
-from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
+from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, marks_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
 from adhesis.solver import checks
@@ -236,7 +236,9 @@ def read_trace(
         _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
         name, table = in_memory
         form = f"columns {', '.join(table.header)}" if table.header else name
-        return _from_table(name, table, unit, step, None if named else columns, None, form)
+        if named and columns is not None:
+            columns = range(1, len(columns) + 1)
+        return _from_table(name, table, unit, step, columns, None, form)
     source = source_of(source)
     is_text = source.holds_numbers()
     if is_text and channel is not None:
@@ -331,11 +333,12 @@ def _table_of(
     if hasattr(source, "to_frame"):  # a Series is a column
         source = source.to_frame()
     if named and wanted is not None:
-        missing = [name for name in wanted if name not in source.columns]
+        missing = [name for name in wanted if list(source.columns).count(name) != 1]
         if missing:
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
-        source = source[list(wanted)]
+        others = source.select_dtypes(["number", "bool"]).columns
+        source = source[[*wanted, *(n for n in others if n not in wanted and marks_rows(str(n)))]]
     if len(source.columns if wanted is None else wanted) == 1:
         with refused_as_input():
             checks.check_index("the table", source)
@@ -352,7 +355,8 @@ def _table_of(
                 f"column {n!r} of the table has the unit {units[n]} in attrs: correct the wrong one"
             )
     for n, kind in source.dtypes.items():
-        if kind.kind in "bcmM":  # which would become numbers of another meaning
+        # They would become numbers of another meaning.
+        if kind.kind in "cmM" or (kind.kind == "b" and not marks_rows(str(n))):
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
     objects = (k for k, kind in enumerate(source.dtypes) if kind.kind == "O")
     _refuse_units("the table", [source.iloc[:, k].tolist() for k in objects])

@@ -91,6 +91,11 @@ def _usual(values: Array) -> tuple[float, float]:
         low, high = float(inside[0]), float(inside[-1])
 
 
+def marks_rows(name: str) -> bool:
+    """Return whether a column of this name marks which heights are valid."""
+    return bool(_VALID.match(name))
+
+
 def invalid_rows(
     columns: Array, fields: Sequence[Sequence[str]], chosen: Sequence[int]
 ) -> tuple[Array, list[str]]:
@@ -108,7 +113,7 @@ def invalid_rows(
             continue
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
-        if any(_VALID.match(text) for text in names) and numbers[0] <= 0 < numbers[-1]:
+        if any(map(marks_rows, names)) and numbers[0] <= 0 < numbers[-1]:
             marked |= column <= 0
             count = counted(int((column <= 0).sum()), "height")
             notes.append(f"{count} marked {held[0]} in {name} taken as drop-outs")
