@@ -211,7 +211,7 @@ class _Reader:
 
 def _are_names(fields: list[str]) -> bool:
     """Return whether pandas names the columns beside an index so: ",0,1"."""
-    return len(fields) > 1 and fields == ["", *map(str, range(len(fields) - 1))]
+    return fields[:1] == [""] and fields[1:] == [str(k) for k in range(len(fields) - 1)] != []
 
 
 def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
