@@ -75,8 +75,7 @@ def read_heights(
         )
     # No note says that the option overruled a line of the header, so it is refused as a name is;
     # metres are assumed in any case.
-    is_clear = found.units[-1] == "m"
-    found = replace(found, by_name=True, unclear="" if is_clear else found.unclear)
+    found = replace(found, by_name=True, unclear="" if found.units[-1] == "m" else found.unclear)
     of_heights = units_of_columns(f"{source}", found, unit, heights[None], step=1.0)[0][-1]
     return np.asarray(heights * LENGTH.units[of_heights])
 

@@ -177,6 +177,9 @@ def test_rows_that_a_column_of_a_table_marks_are_gaps() -> None:
         for columns in ([1, 2], ["x (mm)", "z (um)"]):
             trace = read_trace(table, columns=columns)
             assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [7]
+    for columns in ([1, 4], ["x (mm)", "valid"]):
+        with pytest.raises(InputError, match="'valid' of the table holds bool"):
+            read_trace(FRAME.assign(valid=valid), columns=columns)
 
 
 def test_missing_heights_in_memory_are_gaps() -> None:

@@ -121,13 +121,14 @@ def parse_units(text: str) -> tuple[str, str]:
 
 
 @dataclass(frozen=True)
-class _Column:
+class Column:
     """A field of a header that may name a column, and its unit."""
 
     text: str
 
     @cached_property
     def plain(self) -> str:
+        """The text in plain signs, without quotes."""
         return unicodedata.normalize("NFKC", self.text).replace('"', "").strip()
 
     @cached_property
@@ -136,6 +137,7 @@ class _Column:
 
     @cached_property
     def unit(self) -> str | None:
+        """The unit of length; None without one that is sure."""
         if self._found is None:
             return None
         name = next(filter(None, self._found.groups()[1:]))
@@ -179,22 +181,17 @@ class _Column:
         known |= _OF_PROFILES if words & {"profile", "profil"} else frozenset()
         return words if words <= known else None
 
+    @property
+    def is_of_positions(self) -> bool:
+        """Whether the name is known, and that of positions."""
+        return bool((self.words or frozenset()) & _X)
+
     def names(self, positions: bool) -> bool:
         """Return whether all words are known, and may name positions, or else heights."""
         own, others = (_X, _Z) if positions else (_Z, _X)
         if self.words is None or self.other or (not positions and "x" in self.words):
             return False
         return bool(self.words & own or not self.words & others)
-
-
-def unit_of_name(text: str) -> str | None:
-    """Return the unit of length in the name of a column, or alone; None without one."""
-    return _Column(text).unit
-
-
-def names_positions(text: str) -> bool:
-    """Return whether a column's name is known, and that of positions."""
-    return bool((_Column(text).words or frozenset()) & _X)
 
 
 @dataclass(frozen=True)
@@ -213,11 +210,11 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
 
     ``fields`` are those of its lines that have as many fields as the data.
     """
-    rows = [list(map(_Column, row)) for row in fields]
+    rows = [list(map(Column, row)) for row in fields]
     found = [row for row in map(_row_of_units, rows, [None, *rows]) if row is not None]
     whole = {row.units for row in found if not row.unclear and None not in row.units}
     known: list[set[str]] = [set(), set()]
-    for column in map(_Column, header):
+    for column in map(Column, header):
         words = column.words or frozenset()
         if column.unit is None:
             continue
@@ -233,18 +230,14 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
         return found[-1]
     units = [next(iter(names)) if len(names) == 1 else None for names in known]
     alone = bool(fields) and len(fields[0]) == 1
-    possible = (word[0] for row in fields for text in row if (word := _POSSIBLE_UNIT.search(text)))
-    return HeaderUnits(
-        (units[1] if alone else units[0], units[1]),
-        unclear="" if any(known) else next(possible, ""),
-    )
+    possible = _POSSIBLE_UNIT.search(" ".join(text for row in fields for text in row))
+    unclear = possible[0] if possible and not any(known) else ""
+    return HeaderUnits((units[1] if alone else units[0], units[1]), unclear=unclear)
 
 
-def _row_of_units(row: Sequence[_Column], above: Sequence[_Column] | None) -> HeaderUnits | None:
+def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> HeaderUnits | None:
     """Return what a row states, with the names above it if it holds units alone."""
-    if any(_VALUE.search(column.plain) for column in row):
-        return None
-    if not any(column.has_unit for column in row):
+    if any(_VALUE.search(column.plain) for column in row) or not any(c.has_unit for c in row):
         return None
     bare = all(column.is_bare for column in row)
     names = above if bare and above else row

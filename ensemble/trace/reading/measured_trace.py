@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,15 +14,14 @@ from adhesis.ensemble.errors import InputError, parameter, reason, refused_as_in
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
+    Column,
     HeaderUnits,
-    names_positions,
     parse_units,
     step_of_header,
-    unit_of_name,
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
-from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, marks_rows, without_codes
+from adhesis.ensemble.trace.reading.missing_heights import VALID, invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
 from adhesis.solver import checks
@@ -338,8 +337,10 @@ def _table_of(
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
         others = source.select_dtypes(["number", "bool"]).columns
-        source = source[[*wanted, *(n for n in others if n not in wanted and marks_rows(str(n)))]]
-    if len(source.columns if wanted is None else wanted) == 1:
+        source = source[[*wanted, *(n for n in others if n not in wanted and VALID.match(str(n)))]]
+        wanted = range(1, len(wanted) + 1)
+    chosen = range(1, len(source.columns) + 1) if wanted is None else wanted
+    if len(chosen) == 1:
         with refused_as_input():
             checks.check_index("the table", source)
     units = source.attrs.get("units", {})
@@ -350,13 +351,13 @@ def _table_of(
         )
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
     for n in filter(units.get, source.columns):
-        if unit_of_name(str(n)) not in (None, unit_of_name(str(units[n]))):
+        if Column(str(n)).unit not in (None, Column(str(units[n])).unit):
             raise InputError(
                 f"column {n!r} of the table has the unit {units[n]} in attrs: correct the wrong one"
             )
-    for n, kind in source.dtypes.items():
+    for k, (n, kind) in enumerate(source.dtypes.items(), 1):
         # They would become numbers of another meaning.
-        if kind.kind in "cmM" or (kind.kind == "b" and not marks_rows(str(n))):
+        if kind.kind in "cmM" or (kind.kind == "b" and (k in chosen or not VALID.match(str(n)))):
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
     objects = (k for k, kind in enumerate(source.dtypes) if kind.kind == "O")
     _refuse_units("the table", [source.iloc[:, k].tolist() for k in objects])
@@ -366,14 +367,13 @@ def _table_of(
         raise InputError(f"the table holds more than numbers: {error}") from None
     # a unit that is given beside the names needs none of them
     names = tuple(str(units.get(n) or name) for n, name in zip(source.columns, header, strict=True))
-    return "the table", replace(_columns_of("the table", values, tuple(header)), fields=(names,))
+    lines, filled = np.arange(1, values.shape[0] + 1), tuple(range(len(names)))
+    return "the table", Table(values.T, filled, tuple(header), (names,), lines, " ", ".")
 
 
-def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table:
+def _columns_of(name: str, values: Array) -> Table:
     values = np.atleast_1d(values)
-    if header:
-        columns = values.T
-    elif values.ndim == 2 and 2 in values.shape:
+    if values.ndim == 2 and 2 in values.shape:
         columns = values if values.shape[0] == 2 else values.T
     elif values.ndim == 1 or 1 in values.shape:
         columns = values.reshape(1, -1)
@@ -382,7 +382,7 @@ def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table
         raise InputError(f"{name} holds {shape} numbers: a trace has one column or two")
     lines = np.arange(1, columns.shape[1] + 1)
     filled = tuple(range(len(columns)))
-    return Table(columns, filled, header, (header,) if header else (), lines, " ", ".")
+    return Table(columns, filled, (), (), lines, " ", ".")
 
 
 def _from_table(
@@ -461,8 +461,7 @@ def _from_table(
     if slope > _STEEPEST:
         raise InputError(
             f"{name} would rise by {slope:.3g} times its step from point to point: are positions "
-            f"and heights in the same unit ({parameter('unit')} X,Z), and is a "
-            f"{parameter('step')} that is given or stated right?"
+            f"and heights in the same unit ({parameter('unit')} X,Z), and is the step right?"
         )
     return trace
 
@@ -548,8 +547,7 @@ def _scan_line(
     if not count:
         raise InputError(
             f"{parameter('row')} is {row}: {name} is no map, as its positions do not begin anew on "
-            f"each line, or its lines are not of one length ({parameter('columns')} chooses "
-            "columns)"
+            f"each line, all of one length ({parameter('columns')} chooses columns)"
         )
     check_row(name, row, count)
     notes.append(f"row {row} of {count}, of {points} points each")
@@ -598,7 +596,7 @@ def _step_beside_count(
     those of the column, of which one may be empty; without any it holds positions.
     """
     is_named = any(_COUNTS.fullmatch(text) for text in names if re.search(r"[\w#]", text))
-    is_foreign = bool(names) and not any(map(names_positions, names))
+    is_foreign = bool(names) and not any(Column(text).is_of_positions for text in names)
     may_count, counts = is_named or is_foreign, _counts_points(column)
     if not counts or (not may_count and np.ptp(column) >= column.size):
         # Names are empty where R and pandas write the numbers of rows. Others that skip numbers may

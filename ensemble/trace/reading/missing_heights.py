@@ -19,7 +19,8 @@ _MOST_CODES = 4  # of one instrument; more different numbers are heights, as of 
 _CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 _ENORMOUS = 1e20
 _NINES = re.compile(r"-?9{2,}\.?9+")
-_VALID = re.compile(
+# The name of a column that marks which heights are valid
+VALID = re.compile(
     r"\W*((is|z|data)?[ _]?valid(ity)?|v[aá]lid[aeo]|gültig|ok|good|有効|有效|유효)(\b|_)", re.I
 )
 
@@ -91,11 +92,6 @@ def _usual(values: Array) -> tuple[float, float]:
         low, high = float(inside[0]), float(inside[-1])
 
 
-def marks_rows(name: str) -> bool:
-    """Return whether a column of this name marks which heights are valid."""
-    return bool(_VALID.match(name))
-
-
 def invalid_rows(
     columns: Array, fields: Sequence[Sequence[str]], chosen: Sequence[int]
 ) -> tuple[Array, list[str]]:
@@ -113,7 +109,7 @@ def invalid_rows(
             continue
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
-        if any(map(marks_rows, names)) and numbers[0] <= 0 < numbers[-1]:
+        if any(map(VALID.match, names)) and numbers[0] <= 0 < numbers[-1]:
             marked |= column <= 0
             count = counted(int((column <= 0).sum()), "height")
             notes.append(f"{count} marked {held[0]} in {name} taken as drop-outs")
