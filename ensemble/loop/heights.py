@@ -66,8 +66,7 @@ def read_heights(
             f"{path} has no finite height {where}: --heights needs every height of the period "
             "(adhesis trace fills gaps)"
         )
-    codes = without_codes(heights, known_alone=True)[1]
-    if codes:
+    if codes := without_codes(heights, known_alone=True)[1]:
         raise InputError(
             f"{source} has {codes.removesuffix(' taken as drop-outs')}, which instruments write "
             "for missing ones: --heights needs every height of the period (adhesis trace fills "

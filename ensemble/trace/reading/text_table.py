@@ -249,11 +249,10 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     names = [
         (line.strip(),) if count == 1 else _names(line, delimiter, count, filled) for line in header
     ]
-    header = [line.strip() for line in header]
     return Table(
         columns=np.array([row.values for row in rows]).T.reshape(count, -1),
         filled=filled,
-        header=tuple(line for line in header if line),
+        header=tuple(filter(None, map(str.strip, header))),
         fields=tuple(row for row in names if len(row) == count and any(row)),
         lines=np.array(places) + 1,
         delimiter=delimiter,
