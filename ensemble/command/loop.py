@@ -19,7 +19,6 @@ from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.trace.options import (
-    delimiter_of,
     given,
     pattern_of,
     prepared_of,
@@ -220,7 +219,7 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     heights = read_heights(
-        args.heights, unit=args.unit, delimiter=delimiter_of(args), decimal=args.decimal
+        args.heights, unit=args.unit, delimiter=args.delimiter, decimal=args.decimal
     )
     known = bool(np.all(np.isfinite(heights)))
     warning = heights_warning(heights, f"{args.heights}") if known else None

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import os
-import re
+from dataclasses import replace
 
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
-from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_header
-from adhesis.ensemble.trace.reading.measured_trace import load_array
+from adhesis.ensemble.quantities import LENGTH, length_text
+from adhesis.ensemble.trace.reading.header_units import HeaderUnits, units_of_header
+from adhesis.ensemble.trace.reading.measured_trace import load_array, units_of_columns
 from adhesis.ensemble.trace.reading.missing_heights import without_codes
-from adhesis.ensemble.trace.reading.source import Source, source_of
-from adhesis.ensemble.trace.reading.text_table import Table, read_column, refuse_uneven_rows
+from adhesis.ensemble.trace.reading.source import source_of
+from adhesis.ensemble.trace.reading.text_table import read_column, refuse_uneven_rows
 from adhesis.solver.model.profile import Array
-
-# A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
-_POSSIBLE_UNIT = re.compile(r"[(\[<{]\s*([^\W\d_]{1,3})\s*[)\]>}]")
 
 # The ends do not meet where the step from the last height to the first is more than this many times
 # the largest step within. Over a period the steps add up to zero: a profile that is resolved, or
@@ -41,7 +38,8 @@ def read_heights(
     Without ``unit`` the header's counts. Without either they are in metres if they range over at
     most 1 mm, and otherwise refused. InputError for anything but one column of finite numbers.
     """
-    given = None if unit is None else _unit(unit)
+    if unit is not None and "," in unit:
+        raise InputError(f"--unit is {unit!r}: with --heights it is one unit, that of the heights")
     source = source_of(path)
     if not source.holds_numbers():
         raise InputError(
@@ -49,85 +47,36 @@ def read_heights(
             or f"{path} is neither text nor .npy: --trace reads files of instruments, and a text "
             "that holds zero bytes (UTF-16 without a mark) is to be saved as UTF-8"
         )
-    if source.is_npy:
-        array = load_array(source)
-        if array.ndim == 2 and 1 not in array.shape:
-            raise InputError(_not_one_column(source, *array.shape))
-        return _in_metres(source, array.reshape(-1), given)
-    table = read_column(source, delimiter, decimal)
-    if len(table.filled) > 1:
-        raise InputError(_not_one_column(source, table.columns.shape[1], len(table.filled)))
-    refuse_uneven_rows(source, table.lines)
-    unit = _unit_of(source, table, given)
-    heights = table.columns[table.filled[0]]
+    table = None if source.is_npy else read_column(source, delimiter, decimal)
+    columns = table.columns[list(table.filled)] if table else np.atleast_2d(load_array(source)).T
+    if 1 not in columns.shape:
+        raise InputError(
+            f"{source} holds {columns.shape[1]} × {columns.shape[0]} numbers: --heights takes one "
+            "column (or one row), the heights of one period; adhesis trace reads positions and "
+            "heights"
+        )
+    found, heights = HeaderUnits(), columns.reshape(-1)
+    if table:
+        refuse_uneven_rows(source, table.lines)
+        found = units_of_header(table.header, table.fields)
     missing = np.flatnonzero(~np.isfinite(heights))
     if missing.size:
+        where = f"on line {table.lines[missing[0]]}" if table else f"at index {missing[0]}"
         raise InputError(
-            f"{path} has no finite height on line {table.lines[missing[0]]}: --heights needs every "
-            "height of the period (adhesis trace fills gaps)"
+            f"{path} has no finite height {where}: --heights needs every height of the period "
+            "(adhesis trace fills gaps)"
         )
-    return _in_metres(source, heights, unit)
-
-
-def _not_one_column(source: Source, rows: int, columns: int) -> str:
-    return (
-        f"{source} holds {rows} × {columns} numbers: --heights takes one column (or one row), the "
-        "heights of one period; adhesis trace reads positions and heights"
-    )
-
-
-def _unit(text: str) -> str:
-    if "," in text:
-        raise InputError(f"--unit is {text!r}: with --heights it is one unit, that of the heights")
-    return parse_units(text)[1]
-
-
-def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
-    """Convert heights to m; without a unit they are taken as metres, if they can be.
-
-    InputError for numbers that instruments write for missing heights.
-    """
-    codes = without_codes(heights, known_alone=True)[1]
-    if codes:
+    if codes := without_codes(heights, known_alone=True)[1]:
         raise InputError(
             f"{source} has {codes.removesuffix(' taken as drop-outs')}, which instruments write "
             "for missing ones: --heights needs every height of the period (adhesis trace fills "
             "gaps; give them in another unit if they are heights)"
         )
-    if unit is not None:
-        return np.asarray(heights * LENGTH.units[unit])
-    size = float(np.ptp(heights)) if heights.size else 0.0
-    if HEIGHT.largest < size < np.inf:
-        raise InputError(
-            f"{source} states no unit, and its heights would range over {length_text(size, 4)}: "
-            "give --unit, as in --unit um (--unit m, if metres are meant)"
-        )
-    return heights
-
-
-def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
-    """Return the unit of the heights, of the option or of the header; None without either."""
-    stated = units_of_header(table.header, table.fields)
-    found = stated.units[-1]
-    if stated.other[-1]:
-        raise InputError(
-            f"{stated.other[-1]!r} in the header of {source} is no length: heights must be"
-        )
-    if given is not None:
-        if found not in (None, given):
-            raise InputError(
-                f"--unit is {given} and the header of {source} has heights in {found}: correct the "
-                "wrong one"
-            )
-        return given
-    words = () if found else filter(None, map(_POSSIBLE_UNIT.search, table.header))
-    unclear = stated.unclear or next((word[0] for word in words), None)
-    if unclear and found != "m":
-        raise InputError(
-            f"the header of {source} has {unclear!r}, from which the unit of the heights is not "
-            "clear: give --unit, as in --unit um"
-        )
-    return found
+    # No note says that the option overruled a line of the header, so it is refused as a name is;
+    # metres are assumed in any case.
+    found = replace(found, by_name=True, unclear="" if found.units[-1] == "m" else found.unclear)
+    of_heights = units_of_columns(f"{source}", found, unit, heights[None], step=1.0)[0][-1]
+    return np.asarray(heights * LENGTH.units[of_heights])
 
 
 def heights_warning(heights: Array, name: str) -> str | None:

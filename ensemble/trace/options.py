@@ -10,15 +10,14 @@ from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
-from adhesis.ensemble.trace.reading.printed_numbers import DELIMITERS
 from adhesis.solver.model.pattern import AdhesionPattern, stripes_of
 
 MAX_PENETRATION = 0.9
 """Turning point Δ/h_max where none is given."""
 
-_OF_READING = ("unit", "step", "decimal", "row", "channel")
+_OF_READING = ("unit", "step", "delimiter", "decimal", "row", "channel")
 _OF_PREPARING = ("degree", "cut_off", "tip_radius", "longest_gap", "keep_outliers", "invert")
-_NAMES = (*_OF_READING, "columns", "delimiter", *_OF_PREPARING, "exclude")
+_NAMES = (*_OF_READING, "columns", *_OF_PREPARING, "exclude")
 
 
 def trace_of(args: argparse.Namespace, path: Path) -> Trace:
@@ -32,17 +31,7 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
                 f"--columns is {args.columns!r}: it must be one or two whole numbers, as in 1,3"
             ) from None
     same = {name: getattr(args, name) for name in _OF_READING}
-    return read_trace(path, columns=columns, delimiter=delimiter_of(args), **same)
-
-
-def delimiter_of(args: argparse.Namespace) -> str | None:
-    """Return the delimiter that the option names; None to detect it."""
-    sign: str | None = args.delimiter
-    delimiter = {"\\t": "\t", "tab": "\t", "space": " "}.get(sign, sign) if sign else sign
-    if delimiter is not None and delimiter not in DELIMITERS:
-        known = ", ".join(DELIMITERS.values())
-        raise InputError(f"--delimiter is {sign!r}: it must be one of {known} (; tab , space |)")
-    return delimiter
+    return read_trace(path, columns=columns, **same)
 
 
 def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:

@@ -139,8 +139,12 @@ def test_a_file_that_may_not_be_read_is_refused(read, tmp_path, monkeypatch):
 
 
 DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
-    "a unit that was damaged": (["z [æm]", *METRES], {}, r"'\[æm\]', from which the unit .*--unit"),
-    "header against option": (["z [µm]", *NM], {"unit": "nm"}, "--unit is nm and the header"),
+    "a unit that was damaged": (["z [æm]", *METRES], {}, r"is clear, with '\[æm\]' in .*give unit"),
+    "header against option": (
+        ["z [µm]", *NM],
+        {"unit": "nm"},
+        "unit is nm for the heights, and the hea",
+    ),
     "two units": (METRES, {"unit": "mm,um"}, "--unit is 'mm,um': with --heights it is one unit"),
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
     "nan": ([*METRES[:5], "nan", *METRES[5:]], {}, "has no finite height on line 6: --heights"),

@@ -313,7 +313,11 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
-        ("nan.npy", [1.0, np.nan, 2.0, 3.0], "heights[1] is nan: every height must be a finite"),
+        (
+            "nan.npy",
+            [1.0, np.nan, 2.0, 3.0],
+            "has no finite height at index 1: --heights needs every",
+        ),
         ("scalar.npy", 1.0, "heights hold 1 value(s): at least 3 are needed"),
         ("grid.npy", np.ones((4, 4)), "holds 4 × 4 numbers: --heights takes one column"),
         ("text.npy", np.array(["a", "b", "c"]), "heights are real numbers"),

@@ -98,6 +98,10 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
+    "a line of the heights of a raster": (
+        [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
+        {"columns": [3], "row": 1, **Z_UM},
+    ),
     "an option against a line that names no column": (
         ["Evaluation length in mm", *TWO],
         {"unit": "um"},
@@ -114,6 +118,21 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
     "ruled comments": (["####", "# x", "####", UM, *TWO], {}),
     "blank lines before": ([*(5000 * [""]), UM, *TWO], {}),
     "a delimiter before": (["\tx (um)\tz (um)", *(f"\t{x}\t{z}" for x, z in PAIRS)], {}),
+    "names by number beside an index": (
+        [",0,1", *(f"{k},{row}" for k, row in enumerate(TWO))],
+        {"unit": "um", "columns": [2, 3]},
+    ),
+    "an index and a name by number": ([",0", *(f"{k},{z}" for k, z in enumerate(ZS))], Z_UM),
+    "numbers of rows that R names nothing": (
+        ['"z"', *(f'"{k}" {z}' for k, z in enumerate(ZS, 1))],
+        Z_UM,
+    ),
+    "a label, a value and a unit in quotes": (['"Z Calibration","1","nm"', "Height", *ZS], Z_UM),
+    "words that mark rows": (
+        ["x (um),z (um),valid", *(f"{row},{k < N}" for k, row in enumerate(TWO))],
+        {"columns": [1, 2]},
+    ),
+    "a nought without decimals at the first place": (["x (um),z (um)", f"0,{ZS[0]}", *TWO[1:]], {}),
     "page breaks": ([f"\f{z}" if k % 60 == 59 else z for k, z in enumerate(ZS)], Z_UM),
 }  # fmt: skip
 
@@ -148,6 +167,11 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "0.000", 51: "0.000", 200: "0.000"}, 3),
         ({50: "12.5", 51: "12.5", 52: "12.5", 200: "-13.5", 201: "-13.5", 202: "-13.5"}, 6),
         ({50: "-9.99", 200: "9.99"}, 2),
+        ({50: "-3.2768", 51: "-3.2768", 200: "-3.2768"}, 3),
+        ({50: "5.0", 51: "5.0", 52: "5.0", 200: "-5.0", 201: "-5.0", 202: "-5.0"}, 6),
+        ({50: "0.800", 51: "0.800", 52: "0.800"}, 0),  # the flat top of a grain
+        ({50: "9.1", 51: "9.2", 52: "9.2", 53: "9.2", 54: "9.3"}, 0),  # one that is high
+        ({k: f"{0.5 * np.sin(np.pi * k / 10):.6g}" for k in range(N)}, 0),  # 40 are 1e-16 or so
         ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
         ({k: ("0.00", "0.11")[k % 2] for k in (50, 61, 70, 81, 90, 101)}, 0),  # rounded heights
     ],
@@ -172,6 +196,17 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
     other = [row.replace("valid", "flag") for row in rows(range(40, 43))]
     trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
     assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
+    for good, bad in ("255", "0"), ("1", "-1"), ("True", "False"), ("ok", "NG"):
+        words = [re.sub(",1$", f",{good}", row) for row in rows(range(40, 43))]
+        words = [re.sub(",0$", f",{bad}", row) for row in words]
+        trace = read_trace(put(tmp_path / "t.csv", words), columns=[1, 2])
+        assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
+        flags = [row.replace("valid", "quality") for row in words]
+        (note,) = read_trace(put(tmp_path / "t.csv", flags), columns=[1, 2]).notes[1:2]
+        assert re.fullmatch(r"column 3 \(quality\) holds .* and .* alone: it is not used", note)
+    empty = [row.removesuffix(",0") for row in rows(range(40, 43))]
+    trace = read_trace(put(tmp_path / "t.csv", empty), columns=[1, 2])
+    assert "column 3 (valid) holds 1 and empty fields alone: it is not used" in trace.notes
     long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
     with pytest.raises(InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"):
         prepare_trace(long)
@@ -268,6 +303,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "no step with its unit"),
     "names of two tables": ([UM, "Lc (mm),Ls (um)", *TWO], {}, "no unit that is clear, with .Lc"),
     "another unit": (["Stylus travel in mm", "Data", *ZS], {"step": STEP}, "states no unit"),
+    "a step with a point of thousands": (
+        ["Schrittweite: 1.000 nm", "Höhe (µm)", *(z.replace(".", ",") for z in ZS)],
+        {},
+        "no step with its unit",
+    ),
     "a speed": (["Step: 0.5 mm/s", "Z (um)", *ZS], {}, "no step with its unit"),
     "a count on top": (["400", *ZS], Z_UM, "line 1 of .* has '400', at the end of a column"),
     "a step on top": (["0.500", *ZS], Z_UM, r"line 1 of .* has '0\.500', at the end of a column"),
@@ -304,6 +344,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "SDF, spaced": (["aBCR - 1.0", *SDF], {}, r"a variant of SDF \(ISO 25178-71\)"),
     "SDF of another version": (["aBCR-1.0", *SDF], {}, r"a variant of SDF \(ISO 25178-71\)"),
     "Korean": ("\n".join(["위치(㎛),높이(㎛)", *TWO]).encode("cp949"), {}, "states no unit"),
+    "thousands by blanks in one column": (
+        ["z (nm)", *(f"{2e4 + 1e4 * float(z):,.2f}".replace(",", " ") for z in ZS)],
+        {},
+        "unit of the heights alone: .* or take signs of thousands out if all numbers are heights",
+    ),
+    "other signs of thousands": (["x (nm);z (nm)", *grouped("`")], {}, "line 4 .* of thousands"),
     "thousands by blanks": (["x (nm);z (nm)", *grouped("\u202f")], {}, "line 4 .* of thousands"),
     "thousands by points": (
         [f"{500 * k:,};{1e3 * float(z):.0f}".replace(",", ".") for k, z in enumerate(ZS)],
@@ -346,6 +392,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um", "columns": [1, 3]},
         "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
     ),
+    "the heights alone of a raster": (
+        [f"{x},{y},{z}" for y in range(3) for x, z in PAIRS],
+        {"columns": [3], **Z_UM},
+        "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
+    ),
     "another row": (["\t".join(ZS)] * 3, {"row": 3}, "row is 3: .* has the rows 0 to 2"),
     "a map": (["\t".join(ZS)] * 3, {}, "has 400 columns: give columns X,Z, .* or row K, a row"),
     "a count for positions": (
@@ -382,6 +433,38 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         ["1.0e-03 *", *(f"{k}.5 {z}" for k, z in enumerate(ZS))],
         {"unit": "um"},
         r"line 1 .* is '1.0e-03 \*': multiply the numbers",
+    ),
+    "whole numbers and decimal commas": (
+        ["x (nm),z (um)", *(f"{500 * k},{z.replace('.', ',')}" for k, z in enumerate(ZS))],
+        {},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
+    "two decimal signs": (
+        ["x (um);z (um)", *(f"{x};{z.replace('.', ',')}" for x, z in PAIRS)],
+        {},
+        "line 2 .* write all numbers with one decimal sign",
+    ),
+    "a unit that was lost": (
+        ["x (?m);z (?m)", *(f"{1e-5 * k:.5f};{1e-5 * float(z):.9f}" for k, z in enumerate(ZS))],
+        {},
+        r"no unit that is clear, with '\(\?m\)' in its header",
+    ),
+    "rows that go on": (
+        [" ".join(ZS[k : k + 10]) for k in range(0, N, 10)],
+        Z_UM,
+        "has 10 columns: .*; heights that go on from row to row are to be written in one column",
+    ),
+    "numbers of rows of R without a step": (
+        ['"z"', *(f'"{k}" {z}' for k, z in enumerate(ZS, 1))],
+        {"unit": "um"},
+        "the first column of .* may count the points: give step",
+    ),
+    "names by number": (["0,1", *TWO[1:]], {"unit": "um"}, "line 1 of .* has '1', .* it is a name"),
+    "a name by number": (["0", *ZS], Z_UM, "line 1 of .* has '0', at the end .* if it is a name"),
+    "columns in another order": (
+        ["z (um);x (um)", *(f"{z};{x}" for x, z in PAIRS)],
+        {},
+        "if the numbers are positions and heights, in this order",
     ),
     "pairs of decimal commas": (
         [f"{x}, {z}".replace(".", ",") for x, z in PAIRS],
@@ -453,7 +536,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         "the first column of .* rises or falls throughout, as positions do",
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
-    "a delimiter of two signs": ([UM, *TWO], {"delimiter": "\\t"}, "it must be one of ';', "),
+    "a delimiter of two signs": ([UM, *TWO], {"delimiter": ";;"}, "it must be one of semicolons"),
     "a comma as both": ([UM, *TWO], {"delimiter": ",", "decimal": ","}, "the decimal sign: omit"),
     "decimal commas that are delimiters": (
         ["x (um),z (um)", *(f"{k},{k % 7}" for k in range(99))],
@@ -467,7 +550,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     ),
     "no delimiter": ([UM, *TWO], {"delimiter": ""}, "delimiter is '': it must be one of"),
     "a wrong decimal sign": ([UM, *TWO], {"decimal": "x"}, "'x': it must be one of '.', ','"),
-    "a column of words": ([f"{row},yes" for row in TWO], {}, "line 1 .* 'yes', which is no number"),
+    "a column of words": ([f"{row},up" for row in TWO], {}, "line 1 .* 'up', which is no number"),
     "thousands with a given form": (
         [f"{500 * k:,};{z}" for k, z in enumerate(ZS)],
         {"decimal": ".", "delimiter": ";"},
@@ -571,11 +654,12 @@ def test_the_shorter_one_of_two_traces_ends_where_it_does(gap: str, tmp_path: Pa
         np.testing.assert_allclose(trace.heights, Z[:points], rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize("first", [["400"], ["0.500"], ["199.5", "400"]])
+@pytest.mark.parametrize("first", [["400"], ["0.500"], ["199.5", "400"], ["0"]])
 def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_path):
     with pytest.raises(InputError, match=r"line 1 of .*, at the end of a column: remove it"):
         read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
-    assert read_heights(put(tmp_path / "h.csv", ["0", *ZS]), unit="um").size == N + 1
+    others = ZS[int(np.argmin(np.abs(Z))) :]  # which begin near nought
+    assert read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um").size == len(others) + 1
 
 
 NAMED = [

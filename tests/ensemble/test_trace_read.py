@@ -170,6 +170,18 @@ def test_whole_heights_in_memory_are_no_step_and_no_length() -> None:
     assert read_trace(heights, unit="nm", step=7e-9).points == N
 
 
+def test_rows_that_a_column_of_a_table_marks_are_gaps() -> None:
+    valid = np.arange(N) != 7
+    for marks in (valid, valid.astype(int)):
+        table = FRAME.assign(valid=marks)
+        for columns in ([1, 2], ["x (mm)", "z (um)"]):
+            trace = read_trace(table, columns=columns)
+            assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [7]
+    for columns in ([1, 4], ["x (mm)", "valid"]):
+        with pytest.raises(InputError, match="'valid' of the table holds bool"):
+            read_trace(FRAME.assign(valid=valid), columns=columns)
+
+
 def test_missing_heights_in_memory_are_gaps() -> None:
     masked = np.ma.masked_array(1e6 * Z, mask=np.arange(N) == 7)
     table = pd.DataFrame({"z (um)": pd.array([None, *(1e6 * Z[1:])], dtype="Float64")})
@@ -251,8 +263,8 @@ def test_a_trace_is_made_of_heights_and_a_step() -> None:
 
 @pytest.mark.parametrize(
     "gap",
-    ["", "NaN", "---", "*****", "BAD", "-9999", "1e38", "-nan(ind)", "1.#QNAN0", "Infinity", "n.a.",
-     "(no data)", "Over range", "#WERT!", "#DIV/0!", "#N/A"],
+    ["", "NaN", "---", "*****", "*", "x", "BAD", "-9999", "1e38", "-nan(ind)", "1.#QNAN0",
+     "Infinity", "n.a.", "(no data)", "Over range", "#WERT!", "#DIV/0!", "#N/A"],
 )  # fmt: skip
 def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -> None:
     lines = rows(";", ".")

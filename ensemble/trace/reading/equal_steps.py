@@ -36,7 +36,8 @@ def equal_steps(
         return f"point {k} of {name}" if lines is None else f"line {int(lines[k])} of {name}"
 
     if not np.all(np.isfinite(x)):
-        raise InputError(f"{place(int(np.argmin(np.isfinite(x))))} has no position")
+        where = place(int(np.argmin(np.isfinite(x))))
+        raise InputError(f"{where} has no position: write it, or remove the row")
     if np.all(np.diff(x) <= 0):
         x, heights = x[::-1], heights[::-1]
         lines = None if lines is None else lines[::-1]
@@ -53,7 +54,8 @@ def equal_steps(
         back = int(np.argmax(steps <= 0)) + 1
         word = "stand still" if steps[back - 1] == 0 else "turn back"
         raise InputError(
-            f"the positions {word} at {place(back)}: they must rise or fall throughout"
+            f"the positions {word} at {place(back)}: they must rise or fall throughout, so keep "
+            "the rows of one pass, or save them with more decimals if they are rounded"
         )
     if digit is not None and round(float(np.median(steps)) / digit) == 1:
         # Rounding makes double steps, and so do rows that are left out.
@@ -88,7 +90,8 @@ def _on_grid(
         far = int(np.argmax(off)) if is_grid else int(np.argmax(np.abs(steps - middle))) + 1
         raise InputError(
             f"the steps of the positions are unequal: {middle:.4g} m mostly, and "
-            f"{x[far] - x[far - 1]:.4g} m at {place(far)}"
+            f"{x[far] - x[far - 1]:.4g} m at {place(far)}; save them with more decimals if they "
+            "are rounded"
         )
     if index[-1] + 1 > x.size:
         whole = np.full(index[-1] + 1, np.nan)

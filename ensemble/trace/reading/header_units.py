@@ -76,6 +76,8 @@ _OTHER = re.compile(
     r"|m?rad|counts?|cts|a\.?u\.?|arb\.?( units)?|px|pixels?|%|ppm|dB|bits?|LSB|digits?|Ohm|Ω|1|-)"
     rf"|(?(1)[^)\]>}}]*|(?:{_WORD}))[/^][^)\]>}}]*)(?(1)\s*[)\]>}}])\s*"
 )
+# A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
+_POSSIBLE_UNIT = re.compile(r"[(\[<{]\s*[^\s\d)\]>}]{1,3}\s*[)\]>}]")
 _NUMBERED = re.compile(r"\b(channel|kanal|profile|profil|column|trace|line|scan) \d\b")
 _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
 # A label and a value name no column: "Unit:", "0.5 µm", "Tip radius 2 um", "Cut-off (mm): 0.8".
@@ -101,6 +103,7 @@ _OF_STEP = _set(
 )
 _BESIDE_STEP = _OF_STEP | _set("in of the size between axis direction de d")
 _FIRST_NUMBER = re.compile(_NUMBER, re.IGNORECASE)
+_POINT_OF_THOUSANDS = re.compile(r"[1-9]\d{0,2}\.\d{3}")  # beside decimal commas
 # "about 0.4 um", and points per length.
 _NOT_THE_STEP = re.compile(r"[~≈≤≥±]|<\s*$|\bpoints?\s*/")
 _LENGTH = re.compile(r"[\s,;:=()\[\]<>{}/]*([^\W\d]*)[\s)\]>},;.]*")
@@ -118,13 +121,14 @@ def parse_units(text: str) -> tuple[str, str]:
 
 
 @dataclass(frozen=True)
-class _Column:
+class Column:
     """A field of a header that may name a column, and its unit."""
 
     text: str
 
     @cached_property
     def plain(self) -> str:
+        """The text in plain signs, without quotes."""
         return unicodedata.normalize("NFKC", self.text).replace('"', "").strip()
 
     @cached_property
@@ -133,6 +137,7 @@ class _Column:
 
     @cached_property
     def unit(self) -> str | None:
+        """The unit of length; None without one that is sure."""
         if self._found is None:
             return None
         name = next(filter(None, self._found.groups()[1:]))
@@ -176,22 +181,17 @@ class _Column:
         known |= _OF_PROFILES if words & {"profile", "profil"} else frozenset()
         return words if words <= known else None
 
+    @property
+    def is_of_positions(self) -> bool:
+        """Whether the name is known, and that of positions."""
+        return bool((self.words or frozenset()) & _X)
+
     def names(self, positions: bool) -> bool:
         """Return whether all words are known, and may name positions, or else heights."""
         own, others = (_X, _Z) if positions else (_Z, _X)
         if self.words is None or self.other or (not positions and "x" in self.words):
             return False
         return bool(self.words & own or not self.words & others)
-
-
-def unit_of_name(text: str) -> str | None:
-    """Return the unit of length in the name of a column, or alone; None without one."""
-    return _Column(text).unit
-
-
-def names_positions(text: str) -> bool:
-    """Return whether a column's name is known, and that of positions."""
-    return bool((_Column(text).words or frozenset()) & _X)
 
 
 @dataclass(frozen=True)
@@ -210,11 +210,11 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
 
     ``fields`` are those of its lines that have as many fields as the data.
     """
-    rows = [list(map(_Column, row)) for row in fields]
+    rows = [list(map(Column, row)) for row in fields]
     found = [row for row in map(_row_of_units, rows, [None, *rows]) if row is not None]
     whole = {row.units for row in found if not row.unclear and None not in row.units}
     known: list[set[str]] = [set(), set()]
-    for column in map(_Column, header):
+    for column in map(Column, header):
         words = column.words or frozenset()
         if column.unit is None:
             continue
@@ -230,14 +230,14 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
         return found[-1]
     units = [next(iter(names)) if len(names) == 1 else None for names in known]
     alone = bool(fields) and len(fields[0]) == 1
-    return HeaderUnits((units[1] if alone else units[0], units[1]))
+    possible = _POSSIBLE_UNIT.search(" ".join(text for row in fields for text in row))
+    unclear = possible[0] if possible and not any(known) else ""
+    return HeaderUnits((units[1] if alone else units[0], units[1]), unclear=unclear)
 
 
-def _row_of_units(row: Sequence[_Column], above: Sequence[_Column] | None) -> HeaderUnits | None:
+def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> HeaderUnits | None:
     """Return what a row states, with the names above it if it holds units alone."""
-    if any(_VALUE.search(column.text) for column in row):
-        return None
-    if not any(column.has_unit for column in row):
+    if any(_VALUE.search(column.plain) for column in row) or not any(c.has_unit for c in row):
         return None
     bare = all(column.is_bare for column in row)
     names = above if bare and above else row
@@ -294,6 +294,8 @@ def _step(text: str, decimal: str, counts: bool) -> float | None:
     inside = _COLUMN.fullmatch(unicodedata.normalize("NFKC", label))
     named = unit[1] or next(filter(None, inside.groups()[1:] if inside else ()), "")
     if not named or named in ("a", "A") or not _names_step(_words(label), counts):
+        return None
+    if decimal == "," and _POINT_OF_THOUSANDS.fullmatch(number[0]):
         return None
     try:
         metres = LENGTH.units[LENGTH.unit_named(named)]

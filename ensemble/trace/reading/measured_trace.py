@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,15 +14,14 @@ from adhesis.ensemble.errors import InputError, parameter, reason, refused_as_in
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
+    Column,
     HeaderUnits,
-    names_positions,
     parse_units,
     step_of_header,
-    unit_of_name,
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
-from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
+from adhesis.ensemble.trace.reading.missing_heights import VALID, invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
 from adhesis.solver import checks
@@ -236,7 +235,9 @@ def read_trace(
         _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
         name, table = in_memory
         form = f"columns {', '.join(table.header)}" if table.header else name
-        return _from_table(name, table, unit, step, None if named else columns, None, form)
+        if named and columns is not None:
+            columns = range(1, len(columns) + 1)
+        return _from_table(name, table, unit, step, columns, None, form)
     source = source_of(source)
     is_text = source.holds_numbers()
     if is_text and channel is not None:
@@ -331,12 +332,15 @@ def _table_of(
     if hasattr(source, "to_frame"):  # a Series is a column
         source = source.to_frame()
     if named and wanted is not None:
-        missing = [name for name in wanted if name not in source.columns]
+        missing = [name for name in wanted if list(source.columns).count(name) != 1]
         if missing:
             known = ", ".join(map(repr, source.columns))
             raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
-        source = source[list(wanted)]
-    if len(source.columns if wanted is None else wanted) == 1:
+        others = source.select_dtypes(["number", "bool"]).columns
+        source = source[[*wanted, *(n for n in others if n not in wanted and VALID.match(str(n)))]]
+        wanted = range(1, len(wanted) + 1)
+    chosen = range(1, len(source.columns) + 1) if wanted is None else wanted
+    if len(chosen) == 1:
         with refused_as_input():
             checks.check_index("the table", source)
     units = source.attrs.get("units", {})
@@ -347,12 +351,13 @@ def _table_of(
         )
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
     for n in filter(units.get, source.columns):
-        if unit_of_name(str(n)) not in (None, unit_of_name(str(units[n]))):
+        if Column(str(n)).unit not in (None, Column(str(units[n])).unit):
             raise InputError(
                 f"column {n!r} of the table has the unit {units[n]} in attrs: correct the wrong one"
             )
-    for n, kind in source.dtypes.items():
-        if kind.kind in "bcmM":  # which would become numbers of another meaning
+    for k, (n, kind) in enumerate(source.dtypes.items(), 1):
+        # They would become numbers of another meaning.
+        if kind.kind in "cmM" or (kind.kind == "b" and (k in chosen or not VALID.match(str(n)))):
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
     objects = (k for k, kind in enumerate(source.dtypes) if kind.kind == "O")
     _refuse_units("the table", [source.iloc[:, k].tolist() for k in objects])
@@ -362,14 +367,13 @@ def _table_of(
         raise InputError(f"the table holds more than numbers: {error}") from None
     # a unit that is given beside the names needs none of them
     names = tuple(str(units.get(n) or name) for n, name in zip(source.columns, header, strict=True))
-    return "the table", replace(_columns_of("the table", values, tuple(header)), fields=(names,))
+    lines, filled = np.arange(1, values.shape[0] + 1), tuple(range(len(names)))
+    return "the table", Table(values.T, filled, tuple(header), (names,), lines, " ", ".")
 
 
-def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table:
+def _columns_of(name: str, values: Array) -> Table:
     values = np.atleast_1d(values)
-    if header:
-        columns = values.T
-    elif values.ndim == 2 and 2 in values.shape:
+    if values.ndim == 2 and 2 in values.shape:
         columns = values if values.shape[0] == 2 else values.T
     elif values.ndim == 1 or 1 in values.shape:
         columns = values.reshape(1, -1)
@@ -378,7 +382,7 @@ def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table
         raise InputError(f"{name} holds {shape} numbers: a trace has one column or two")
     lines = np.arange(1, columns.shape[1] + 1)
     filled = tuple(range(len(columns)))
-    return Table(columns, filled, header, (header,) if header else (), lines, " ", ".")
+    return Table(columns, filled, (), (), lines, " ", ".")
 
 
 def _from_table(
@@ -398,7 +402,7 @@ def _from_table(
         places = table.lines[: row + 1]
     else:
         columns, names, lines = _chosen(name, table, wanted, notes)
-        columns, lines = _scan_line(name, columns, lines, row, notes)
+        columns, lines = _scan_line(name, table, columns, lines, row, notes)
         places = lines
     if len(columns) == 1:
         refuse_uneven_rows(name, places, has_others=len(table.filled) > 1)
@@ -418,7 +422,7 @@ def _from_table(
             notes.append(f"the first column counts the points{left_out}")
     if len(columns) == 1 and (empty := int(np.sum(np.diff(places) - 1))):
         notes.append(f"{counted(empty, 'empty row')} left out")
-    (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
+    (x_unit, z_unit), given_by = units_of_columns(name, found, unit, columns, step)
     heights = columns[-1] * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
@@ -457,7 +461,7 @@ def _from_table(
     if slope > _STEEPEST:
         raise InputError(
             f"{name} would rise by {slope:.3g} times its step from point to point: are positions "
-            f"and heights in the same unit ({parameter('unit')} X,Z)?"
+            f"and heights in the same unit ({parameter('unit')} X,Z), and is the step right?"
         )
     return trace
 
@@ -481,6 +485,8 @@ def _chosen(
             )
     elif len(picked) > 2:
         rows = f", or {parameter('row')} K, a row of a map" if len(picked) >= MIN_POINTS else ""
+        if not rows and not fields and len(picked) > 3:
+            rows = "; heights that go on from row to row are to be written in one column"
         raise InputError(
             f"{name} has {len(picked)} columns: give {parameter('columns')} X,Z, those of "
             f"positions and heights{rows}"
@@ -519,15 +525,18 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
 
 
 def _scan_line(
-    name: str, columns: Array, lines: Array, row: int | None, notes: list[str]
+    name: str, table: Table, columns: Array, lines: Array, row: int | None, notes: list[str]
 ) -> tuple[Array, Array]:
-    """Return one scan line, where the positions of a raster begin anew on each line."""
-    x = columns[0]
-    again = np.flatnonzero((x[1:] == x[:1]) & (x[:-1] != x[:1])) + 1
-    points = int(again[0]) if again.size and len(columns) == 2 else max(x.size, 1)
-    count, rest = divmod(x.size, points)
-    is_raster = count > 1 and not rest and np.array_equal(x, np.tile(x[:points], count))
-    if row is None and is_raster:
+    """Return one scan line, where the positions of a raster begin anew on each line.
+
+    Beside heights alone they may stand in any other column.
+    """
+    columns_of_positions = columns[:1]
+    if len(columns) == 1:
+        others = table.columns[list(table.filled)][:, np.isin(table.lines, lines)]
+        columns_of_positions = others[(others != columns).any(axis=1)]
+    points, count = next(filter(None, map(_raster, columns_of_positions)), (0, 0))
+    if row is None and count:
         raise InputError(
             f"the positions of {name} begin anew on line {lines[points]}: it is a raster of "
             f"{count} lines of {points} points, of which {parameter('row')} K takes one, 0 to "
@@ -535,15 +544,25 @@ def _scan_line(
         )
     if row is None:
         return columns, lines
-    if not is_raster:
+    if not count:
         raise InputError(
             f"{parameter('row')} is {row}: {name} is no map, as its positions do not begin anew on "
-            f"each line ({parameter('columns')} chooses columns)"
+            f"each line, all of one length ({parameter('columns')} chooses columns)"
         )
     check_row(name, row, count)
     notes.append(f"row {row} of {count}, of {points} points each")
     part = slice(row * points, (row + 1) * points)
     return columns[:, part], lines[part]
+
+
+def _raster(x: Array) -> tuple[int, int] | None:
+    """Return numbers of points and of lines, if positions begin anew on each of several lines."""
+    again = np.flatnonzero((x[1:] == x[:1]) & (x[:-1] != x[:1])) + 1
+    points = int(again[0]) if again.size else max(x.size, 1)
+    count, rest = divmod(x.size, points)
+    rises = np.diff(x[:points])
+    is_raster = count > 1 and not rest and (np.all(rises > 0) or np.all(rises < 0))
+    return (points, count) if is_raster and np.array_equal(x, np.tile(x[:points], count)) else None
 
 
 def _counts_points(x: Array) -> bool:
@@ -577,7 +596,7 @@ def _step_beside_count(
     those of the column, of which one may be empty; without any it holds positions.
     """
     is_named = any(_COUNTS.fullmatch(text) for text in names if re.search(r"[\w#]", text))
-    is_foreign = bool(names) and not any(map(names_positions, names))
+    is_foreign = bool(names) and not any(Column(text).is_of_positions for text in names)
     may_count, counts = is_named or is_foreign, _counts_points(column)
     if not counts or (not may_count and np.ptp(column) >= column.size):
         # Names are empty where R and pandas write the numbers of rows. Others that skip numbers may
@@ -618,10 +637,13 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
 # ---------------------------------------------------------------------- units
 
 
-def _units(
+def units_of_columns(
     name: str, found: HeaderUnits, unit: str | None, columns: Array, step: float | None
 ) -> tuple[tuple[str, str], str]:
-    """Return the units of positions and heights, and what states them."""
+    """Return the units of positions and heights, or of heights alone, and what states them.
+
+    InputError if header and option do not state them, and the numbers need not be metres.
+    """
     kinds = range(2 - len(columns), 2)  # of heights alone the second
     for kind in kinds:
         if found.other[kind]:
@@ -648,36 +670,39 @@ def _units(
             f"{name} states no unit that is clear, with {found.unclear!r} in its header: give "
             f"{parameter('unit')}, as in {'mm,um' if len(columns) == 2 else 'um'}, if the numbers "
             f"are {' and '.join(_KINDS[2 - len(columns) :])}"
+            f"{', in this order' if len(columns) == 2 else ''}"
         )
     if stated[0] is not None and stated[1] is not None:
         return (stated[0], stated[1]), "header"
     if stated[0] is not None or stated[1] is not None:
         known = "positions" if stated[0] else "heights"
-        count = f", or {parameter('step')} if the first column counts the points"
+        mend = ""
+        if _counts_points(columns[0]):
+            mend = f", or {parameter('step')} if the first column counts the points"
+        elif stated[0] is None:
+            mend = ", or take signs of thousands out if all numbers are heights"
         raise InputError(
             f"the header of {name} states the unit of the {known} alone: give {parameter('unit')} "
-            f"X,Z, as in mm,um{count if _counts_points(columns[0]) else ''}"
+            f"X,Z, as in mm,um{mend}"
         )
     if _sure_to_be_metres(columns, step):
         return ("m", "m"), "numbers"
     low, high = np.nanmin(columns[0]), np.nanmax(columns[0])
     raise InputError(
         f"{name} states no unit, and {_KINDS[2 - len(columns)]} from {low:g} to {high:g} need not "
-        f"be metres: give {parameter('unit')}, as in um"
+        f"be metres: give {parameter('unit')}, as in um (m, if they are)"
     )
 
 
 def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     heights = columns[-1][np.isfinite(columns[-1])]
-    if heights.size == 0 or np.percentile(heights, 99) - np.percentile(heights, 1) > HEIGHT.largest:
+    if heights.size and np.ptp(np.percentile(heights, [1, 99])) > HEIGHT.largest:
         return False
     if len(columns) == 1:
         return step is not None
     x = columns[0][np.isfinite(columns[0])]
-    if x.size < 2:
-        return False
-    length = float(x.max() - x.min())
-    return length <= _LONGEST_IN_METRES and length / (x.size - 1) <= _WIDEST_STEP_IN_METRES
+    longest = min(_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES * (x.size - 1))
+    return x.size > 1 and bool(np.ptp(x) <= longest)
 
 
 def _slope(heights: Array, step: float) -> float:

@@ -15,10 +15,14 @@ from adhesis.solver.model.profile import Array
 # enough.
 _BEYOND, _BEYOND_KNOWN = 5.0, 0.2
 _REPEATED = 3
+_MOST_CODES = 4  # of one instrument; more different numbers are heights, as of a sine
 _CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 _ENORMOUS = 1e20
 _NINES = re.compile(r"-?9{2,}\.?9+")
-_VALID = re.compile(r"\W*(valid|validity|is[ _]?valid|gültig)\b", re.IGNORECASE)
+# The name of a column that marks which heights are valid
+VALID = re.compile(
+    r"\W*((is|z|data)?[ _]?valid(ity)?|v[aá]lid[aeo]|gültig|ok|good|有効|有效|유효)(\b|_)", re.I
+)
 
 
 def may_be_code(value: float) -> bool:
@@ -47,10 +51,17 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
         return heights, ""
     low, high = _usual(values[~likely])
     away = np.maximum(low - values, values - high)
-    far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
-    # Where hardly a height occurs twice, noughts and nines that do, and more often than all others,
-    # stand for no height even within the range.
+    apart = np.minimum(np.diff(values, prepend=-np.inf), np.diff(values, append=np.inf))
+    far = (away > _BEYOND * (high - low)) & (apart > _BEYOND_KNOWN * (high - low))
+    far &= repeated | nines | on_both_sides
+    # Where hardly a height occurs twice, a number at the end of the range that does stands for no
+    # height if it is apart from all others; so do noughts and nines, more often than all others,
+    # even within the range.
     are_single = float(np.median(times)) == 1.0
+    ends, rest = np.flatnonzero(~likely)[[0, -1]], values[~likely]
+    are_apart = apart[ends] > _BEYOND_KNOWN * abs(rest[-2] - rest[1])
+    far[ends] |= are_single & repeated[ends] & are_apart
+    far &= far.sum() <= _MOST_CODES
     repeated &= times > times[~likely & (values != 0)].max()
     codes = (known if known_alone else likely) & (away > _BEYOND_KNOWN * (high - low))
     if not known_alone:
@@ -86,19 +97,22 @@ def invalid_rows(
 ) -> tuple[Array, list[str]]:
     """Return which rows a column named "valid" marks with nought, and descriptions.
 
-    Other columns beside the chosen ones that hold noughts and ones are described.
+    Other columns beside the chosen ones that hold two numbers alone are described.
     """
     marked = np.zeros(columns.shape[1], dtype=bool)
     notes = []
     for k, column in enumerate(columns):
-        if k in chosen or set(column[np.isfinite(column)]) != {0.0, 1.0}:
+        numbers = np.unique(column[np.isfinite(column)])
+        held = [f"{number:g}" for number in numbers[:3]]
+        held += ["empty fields"] * bool(len(held) == 1 and np.isnan(column).any())
+        if k in chosen or len(held) != 2:
             continue
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
-        if any(_VALID.match(text) for text in names):
-            marked |= column == 0
-            count = counted(int((column == 0).sum()), "height")
-            notes.append(f"{count} marked 0 in {name} taken as drop-outs")
+        if any(map(VALID.match, names)) and numbers[0] <= 0 < numbers[-1]:
+            marked |= column <= 0
+            count = counted(int((column <= 0).sum()), "height")
+            notes.append(f"{count} marked {held[0]} in {name} taken as drop-outs")
         else:
-            notes.append(f"{name} holds 0 and 1 alone: it is not used")
+            notes.append(f"{name} holds {' and '.join(held)} alone: it is not used")
     return marked, notes

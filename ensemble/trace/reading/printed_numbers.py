@@ -22,7 +22,7 @@ _MISSING = frozenset(
 )  # fmt: skip
 _SIGNS = re.compile(r"[-+*.()\s]")  # about such a word, or as wide as the number that is missing
 _PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE)  # #NAME?, 1.#INF
-_FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’_]*")  # of a line
+_FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’`´٬_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 # "0,5,1,3" and "0,5, 1,3": four numbers, or two
 _DECIMALS = r"\d*(?:e[+\-]?\d+)?"
@@ -121,15 +121,16 @@ def find_form(
 
     InputError if two ways of reading them differ. ``names`` is the line above the numbers.
     """
-    given = (("delimiter", delimiter, tuple(DELIMITERS)), ("decimal", decimal, (".", ",")))
-    for name, sign, known in given:
-        if sign is not None and sign not in known:
-            rule = ", ".join(map(repr, known))
-            raise InputError(f"{parameter(name)} is {sign!r}: it must be one of {rule}")
+    known = {sign: sign for sign in DELIMITERS} | {"\\t": "\t", "tab": "\t", "space": " "}
+    if delimiter is not None and delimiter not in known:
+        rule = f"{', '.join(DELIMITERS.values())} (; tab , space |)"
+        raise InputError(f"{parameter('delimiter')} is {delimiter!r}: it must be one of {rule}")
+    if decimal not in (None, ".", ","):
+        raise InputError(f"{parameter('decimal')} is {decimal!r}: it must be one of '.', ','")
     # No number holds one of these; a comma and a blank may stand in or behind a number.
     sure = [s for s in ";\t|" if sum(s in line for line in sample) >= _MOSTLY * len(sample)][:1]
     some = [sign for sign in ";\t|," if any(sign in line for line in sample)]
-    signs = [delimiter] if delimiter else sure or [*some, " "]
+    signs = [known[delimiter]] if delimiter else sure or [*some, " "]
     read = {}
     # Without quotes a comma is one of both.
     is_quoted = any('"' in line for line in sample)
@@ -149,11 +150,12 @@ def find_form(
     if most and others and best[0] in ", ":
         return _one_comma(sample) or _refuse_two_ways(source, sample[0])
     # A name stands above each of the numbers; "x, mm, z, um" names two.
-    fields = split(names, ",")
-    has_names = not LENGTH.spellings.keys() & set(fields)
-    is_named = has_names and len(fields) == len(split(sample[0], ","))
+    fields, count = split(names, ","), len(split(sample[0], ","))
+    is_named = len(fields) == count and not LENGTH.spellings.keys() & set(fields)
     is_doubtful = decimal is None and best[0] == "," and not is_named
-    if is_doubtful and all(map(_PAIRS.fullmatch, sample)):
+    # Fewer names than numbers, none of which has a point
+    has_few_names = 1 < len(fields) < count and "." not in "".join(sample)
+    if is_doubtful and (has_few_names or all(map(_PAIRS.fullmatch, sample))):
         _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
 

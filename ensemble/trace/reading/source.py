@@ -65,11 +65,6 @@ class Source:
         return printable(self.name).replace("\n", r"\n")
 
     @property
-    def suffix(self) -> str:
-        """Ending of the name, in lower case."""
-        return Path(self.name).suffix.lower()
-
-    @property
     def is_npy(self) -> bool:
         """Whether it is an array of NumPy, whatever its name."""
         return self.beginning().startswith(b"\x93NUMPY")
@@ -143,8 +138,8 @@ class Source:
 
     def container(self) -> str | None:
         """Return a message for a workbook or an archive that is no instrument's file, else None."""
-        begin = self.beginning()
-        if begin.startswith(_COMPOUND) and (self.suffix in _WORKBOOKS or _BOOK in self.read()):
+        begin, suffix = self.beginning(), Path(self.name).suffix.lower()
+        if begin.startswith(_COMPOUND) and (suffix in _WORKBOOKS or _BOOK in self.read()):
             return _of_workbook(self)
         if not begin.startswith(_ZIP):
             return None
@@ -153,12 +148,12 @@ class Source:
                 names = file.namelist()
         except (OSError, zipfile.BadZipFile):
             names = []
-        if self.suffix in _WORKBOOKS or any(re.match(r"xl/|content\.xml", n) for n in names):
+        if suffix in _WORKBOOKS or any(re.match(r"xl/|content\.xml", n) for n in names):
             return _of_workbook(self)
         if names and all(name.endswith(".npy") for name in names):
             return f"{self} is an archive of arrays: save the one of the heights as .npy"
         # Instruments write archives, too.
-        if self.suffix == ".zip" or (names and all(n.endswith((".csv", ".txt")) for n in names)):
+        if suffix == ".zip" or (names and all(n.endswith((".csv", ".txt")) for n in names)):
             return f"{self} is an archive (zip): unpack it first (unzip {shlex.quote(str(self))})"
         return None
 

@@ -45,7 +45,11 @@ _ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
 _DIGIT = re.compile(r"[+\-]?[.,]?\d")
 _PAGE_BREAK = re.compile(r"^\f+\r*\n|\f", re.MULTILINE)
-_FACTOR = re.compile(r"\s*[\d.,eE+\-]+\s*[*×x]\s*")  # above the numbers, as Matlab prints it
+# A power of ten above the numbers, as Matlab prints it
+_FACTOR = re.compile(r"\s*(?:[\d.]+[eE][+\-]?\d+|10+(?:\.0*)?|0?\.0*1)\s*[*×x]\s*")
+# Words of a column that marks rows, as numbers
+_MARKS = dict.fromkeys(("true", "yes", "ja", "ok", "good"), 1.0)
+_MARKS |= dict.fromkeys(("false", "no", "nein", "ng"), 0.0)
 # What people and programs write for the minus sign.
 _MARK = "\ufeff"  # of a text in UTF-8
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
@@ -162,13 +166,16 @@ class _Reader:
         fields = [plain] if is_missing(plain) else split(line, self.delimiter)
         while len(fields) > self.count and not fields[-1]:
             fields.pop()
+        if _are_names(fields):
+            return None
         values = [value(field, self.decimal) for field in fields]
-        if len(fields) > self.count or None in values:
+        if self.count > 2:  # of more than positions and heights one may mark rows
+            values = [_MARKS.get(f.lower(), v) for f, v in zip(fields, values, strict=True)]
+        numbers = [v for v in values if v is not None]
+        if len(fields) > self.count or len(numbers) < len(fields):
             return None
         lacking = self.count - len(fields)
-        return _Row(
-            fields + [""] * lacking, [nan if v is None else v for v in values] + [nan] * lacking
-        )
+        return _Row(fields + [""] * lacking, numbers + [nan] * lacking)
 
     def is_whole(self, place: int) -> bool:
         """Return whether a line holds as many fields as there are columns."""
@@ -191,7 +198,7 @@ class _Reader:
         if place in self.rows:
             return adjoins or self.is_whole(place)
         line = self.lines[place].strip()
-        if not line or line[0] in COMMENT:
+        if not line or line[0] in COMMENT or _are_names(split(line, self.delimiter)):
             return False
         return adjoins and (_DIGIT.match(line) is not None or is_without_words(line))
 
@@ -202,6 +209,11 @@ class _Reader:
         )
 
 
+def _are_names(fields: list[str]) -> bool:
+    """Return whether pandas names the columns beside an index so: ",0,1"."""
+    return fields[:1] == [""] and fields[1:] == [str(k) for k in range(len(fields) - 1)] != []
+
+
 def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
     """Find header and columns in the lines of a file."""
     sample = [line for line in lines if looks_like_numbers(line)]
@@ -209,7 +221,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         place = max(range(len(lines)), key=lambda k: sum(sign.isdigit() for sign in lines[k]))
         raise InputError(
             f"{source} holds no line of numbers: most digits stand on line {place + 1}, "
-            f"{shown_line(lines[place])}"
+            f"{shown_line(lines[place])}; take words, brackets and quotes about the numbers out"
         )
     spread = sample[:: max(1, len(sample) // _SAMPLE)]
     is_given = decimal is not None
@@ -229,7 +241,7 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         refuse_thousands(source, columns, decimal)
     for k, column in zip(filled, columns, strict=True):
         numbers = [row.values[k] for row in rows]
-        _refuse_odd_ends(source, column, numbers, places, is_lone=len(filled) == 1)
+        _refuse_odd_ends(source, column, numbers, places, str(k), is_lone=len(filled) == 1)
         if len(filled) == 1:
             _refuse_dashes(reader, column, places)
     header = [line[:_LONGEST_HEADER_LINE].strip(" \r\n").lstrip(COMMENT) for line in lines[:start]]
@@ -237,11 +249,10 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
     names = [
         (line.strip(),) if count == 1 else _names(line, delimiter, count, filled) for line in header
     ]
-    header = [line.strip() for line in header]
     return Table(
         columns=np.array([row.values for row in rows]).T.reshape(count, -1),
         filled=filled,
-        header=tuple(line for line in header if line),
+        header=tuple(filter(None, map(str.strip, header))),
         fields=tuple(row for row in names if len(row) == count and any(row)),
         lines=np.array(places) + 1,
         delimiter=delimiter,
@@ -273,8 +284,8 @@ def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
             raise InputError(
                 f"line {place + 1} of {source} has {word!r}, which is no number with a decimal "
                 f"{'comma' if reader.decimal == ',' else 'point'}: take signs of thousands, units "
-                "within cells, remarks and quotes about rows out, or give "
-                f"{parameter('decimal')} and {parameter('delimiter')}"
+                "within cells, remarks and quotes about rows out, write all numbers with one "
+                f"decimal sign, or give {parameter('decimal')} and {parameter('delimiter')}"
             )
     raise InputError(
         f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} of one "
@@ -350,19 +361,25 @@ def _refuse_odd_ends(
     column: Sequence[str],
     numbers: Sequence[float],
     places: Sequence[int],
+    name: str,
     is_lone: bool,
 ) -> None:
     """Refuse counts, steps and checksums at the ends of a lone column, and a number cut off.
 
     They are printed otherwise than all numbers between, or the first one counts the others. Of
-    several columns only the last row is judged, in which the file may end too early.
+    several columns only the last row is judged, in which the file may end too early, and the number
+    that pandas gives to a column as its ``name``.
     """
     n = len(column)
+    rises = np.abs(np.diff(numbers))
+    may_be_name = column[0] == name and n > 2 and rises[0] > 1.1 * np.fmax.reduce(rises[1:])
     # Noughts and codes of missing heights are written as they please.
     forms = {
         k: printed_form(column[k])
         for k in range(n)
-        if isfinite(numbers[k]) and (numbers[k] or k == n - 1) and not may_be_code(numbers[k])
+        if isfinite(numbers[k])
+        and (numbers[k] or k == n - 1 or (k == 0 and may_be_name))
+        and not may_be_code(numbers[k])
     }
     inner = [form for k, form in forms.items() if _ENDS <= k < n - _ENDS]
     if len(inner) < _TO_JUDGE:
@@ -371,16 +388,17 @@ def _refuse_odd_ends(
     has_one_form = times >= (_ONE_FORM if is_lone else 1.0) * len(inner)
     fewest, shortest = (min(counts) for counts in zip(*inner, strict=True))
     for k, form in forms.items():
-        if k < n - 1 and (not is_lone or _ENDS <= k < n - _ENDS):
+        is_name = k == 0 and may_be_name and fewest > 0
+        if k < n - 1 and not is_name and (not is_lone or _ENDS <= k < n - _ENDS):
             continue
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
         is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
         is_odd = form != usual if has_one_form else is_cut
-        if is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
+        if is_name or is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
             raise InputError(
                 f"line {places[k] + 1} of {source} has {column[k]!r}, at the end of a column: "
-                "remove it if it is a count, a length, a step or a checksum, or was cut off; the "
-                "numbers of a column have as many decimals"
+                "remove it if it is a name, a count, a length, a step or a checksum, or was cut "
+                "off; the numbers of a column have as many decimals"
             )
 
 
@@ -430,6 +448,8 @@ def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tupl
         fields.pop()
     if filled[-1] < len(fields) <= count:
         return tuple(fields + [""] * (count - len(fields)))
+    if len(fields) == count - 1 and '"' in line:  # R names no column of the numbers of rows
+        return ("", *fields)
     for sign in DELIMITERS:
         fields = _split_names(line, sign)
         if len(fields) == count:
