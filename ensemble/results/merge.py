@@ -95,11 +95,7 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
 def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
     """Refuse a file of another campaign, or of one whose rows have other shapes."""
     growth(part.path, part.campaign, campaign, of)
-    if not schema.same_rows(part.campaign, campaign):
-        raise InputError(
-            f"{part.path} cannot be merged into {of}: the bins of its spectra differ (they follow "
-            "the highest n0 · ratio of the campaign)"
-        )
+    schema.check_same_rows(part.campaign, campaign, f"{part.path} cannot be merged into {of}")
 
 
 def _assign(

@@ -161,9 +161,11 @@ class Writer:
                 ) from error
 
     def _check_place(self) -> None:
-        """Refuse to fill a file that is not at its path any more, and may have no name at all."""
+        """Refuse to fill a file that is not at its path any more, or was cut or copied over."""
         try:
-            moved = not os.path.samestat(os.stat(self.path), self._opened)
+            found = os.stat(self.path)
+            same_size = found.st_size == self._opened.st_size
+            moved = not (same_size and os.path.samestat(found, self._opened))
         except (FileNotFoundError, NotADirectoryError):
             moved = True
         if moved:
