@@ -108,10 +108,8 @@ def scales(campaign: Campaign, part: Part = WHOLE) -> tuple[Scale, ...]:
 
 def check_same_rows(one: Campaign, two: Campaign, refused: str) -> None:
     """Raise InputError if rows of two campaigns differ in dimensions; ``refused`` names what is."""
-    if not all(
-        a.name == b.name and np.array_equal(a.values, b.values)
-        for a, b in zip(row_scales(one), row_scales(two), strict=True)
-    ):
+    pairs = zip(row_scales(one), row_scales(two), strict=True)
+    if not all(a.name == b.name and np.array_equal(a.values, b.values) for a, b in pairs):
         raise InputError(
             f"{refused}: the bins of its spectra would change (they follow the highest n0 · ratio "
             "of the campaign, and the period)"

@@ -181,9 +181,10 @@ def prepare(
             writer.reset(again)
             if plan.batches is not None:
                 spare = plan.batches.not_needed
-                writer.mark([row for row in spare if status[row] == schema.PENDING], needed=False)
+                unneeded = [row for row in spare if status[row] == schema.PENDING]
+                writer.reset(unneeded, schema.NOT_NEEDED)
                 wanted = set(np.flatnonzero(status == schema.NOT_NEEDED).tolist()) - set(spare)
-                writer.mark(sorted(wanted), needed=True)
+                writer.reset(sorted(wanted))
     if is_new:
         say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
         return plan

@@ -19,7 +19,7 @@ from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import WriteError, parameter
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DONE, FAILED, origin_of
+from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.dispatch import Outcome, StopCheck
@@ -239,7 +239,7 @@ class _Session:
             value = math.nan if outcome.error is not None else float(row[steered])
             further, spare = self.plan.batches.finished(outcome.task, value)
             assert self.writer is not None
-            self.writer.mark(spare, needed=False)
+            self.writer.reset(spare, NOT_NEEDED)
             self._counts.total += len(further)
             schedule.add(further)
 
