@@ -225,12 +225,13 @@ def test_a_dry_run_writes_nothing(tmp_path, monkeypatch):
         (
             "session.run_campaign",
             [],
-            "interrupted; what was done is kept, run the same command again to resume",
+            "interrupted; what the file holds is kept, run the same command again to resume",
         ),
         (
             "session.run_campaign",
             ["--redo", "all"],
-            "interrupted; what was done is kept, run the command again without --redo to resume",
+            "interrupted; what the file holds is kept, run the command again without --redo to "
+            "resume",
         ),
     ],
 )

@@ -359,7 +359,7 @@ def test_a_disk_that_fills_while_running(tmp_path):
     words = ("run", tmp_path / "c.toml", "--out", out, "--redo", "all", "--realisation", "1")
     process = adhesis(*words, fake="full=20000")
     assert process.returncode == 74
-    assert "could not be written: File too large; what was done is kept" in process.stderr
+    assert "could not be written: File too large; what the file holds is kept" in process.stderr
     assert "Traceback" not in process.stderr
     assert done_rows(out) == 4
 
