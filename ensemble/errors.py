@@ -65,9 +65,9 @@ class WriteError(_Printable):
 _OF_THE_SYSTEM = {*(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO), errno.EMFILE, errno.ENFILE}
 
 
-def refusal(error: OSError) -> type[InputError | WriteError]:
+def refusal(error: Exception) -> type[InputError | WriteError]:
     """Return the kind of error by which a file that cannot be written is reported."""
-    return WriteError if error.errno in _OF_THE_SYSTEM else InputError
+    return WriteError if getattr(error, "errno", None) in _OF_THE_SYSTEM else InputError
 
 
 class Terminated(KeyboardInterrupt):

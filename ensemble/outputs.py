@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from adhesis.ensemble.errors import InputError, WriteError, reason
+from adhesis.ensemble.errors import InputError, WriteError, reason, refusal
 from adhesis.ensemble.regular_file import irregular
 
 if TYPE_CHECKING:
@@ -127,7 +127,9 @@ def _refusing(option: str, path: Path) -> Iterator[None]:
     except InputError:
         raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise InputError(f"{option} is {path}: it cannot be written ({reason(error)})") from None
+        raise refusal(error)(
+            f"{option} is {path}: it cannot be written ({reason(error)})"
+        ) from None
 
 
 def _check_file(option: str, path: Path) -> None:

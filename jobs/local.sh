@@ -27,7 +27,7 @@ find_adhesis "$here"
 mkdir -p "$out"
 MPIRUN=${MPIRUN:-$(cat "$here/.venv/mpirun" 2>/dev/null || true)}
 command=("$ADHESIS" run "$campaign" --out "$out/$name.h5" "${@:3}")
-if [ "$ranks" -gt 1 ] && [ -n "$MPIRUN" ]; then
+if [ "$ranks" -gt 1 ] 2>/dev/null && [ -n "$MPIRUN" ]; then # adhesis reports what is no number
     allow_ranks "$ranks" "$cores"
     command=("$MPIRUN" -n "$ranks" "${command[@]}")
     set -m # Ctrl-C reaches mpirun through this script alone: it would end the ranks at once

@@ -138,7 +138,7 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
         if sentence:
             resumes = code in (exit_codes.INTERRUPTED, exit_codes.RESUME)
             again = f", {_again(args)}" if resumes else ""
-            sentence = f"adhesis run: {sentence}; what was done is kept{again}"
+            sentence = f"adhesis run: {sentence}; what the file holds is kept{again}"
         _end_job(comm, code, sentence)
         if code == exit_codes.WRITE_FAILED:
             os._exit(code)  # at an orderly exit HDF5 would try to write again, and crash

@@ -7,6 +7,7 @@ import xarray as xr
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.by_blocks import QUANTILES
+from adhesis.ensemble.escape import printable
 from adhesis.solver.method import BRANCHES
 
 # curve -> (unit, what it is)
@@ -34,7 +35,7 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
         coords={name: ("cell", [cell.at[name] for cell in data.cells]) for name in names},
         attrs={
             "title": "Loading-unloading curves averaged over realisations",
-            "source": data.path.name,
+            "source": printable(data.path.name),
             "Conventions": "CF-1.11",
         },
     )

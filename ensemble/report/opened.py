@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import with_units
 from adhesis.ensemble.report.curves_dataset import curves_dataset
 from adhesis.ensemble.report.html import picture_of, table_of
@@ -284,7 +285,7 @@ class CampaignResults:
                     found[name] = (name, label, {"units": scale.unit, "long_name": scale.meaning})
         fills = {d.name: d.fill for d in datasets}
         spread = found.set_index(task=list(self.axes)).unstack("task", fill_value=fills)
-        return spread.transpose(*self.axes, ...).assign_attrs(source=self.path.name)
+        return spread.transpose(*self.axes, ...).assign_attrs(source=printable(self.path.name))
 
 
 def _axes(results: Results) -> dict[str, NDArray[Any]]:

@@ -102,4 +102,5 @@ def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
         *findings.quality(data),
     ):
         print(printable(sentence), file=stream)
-    print(f"report: {directory / 'report.md'}, {directory / 'report.html'}", file=stream)
+    pages = f"{directory / 'report.md'}, {directory / 'report.html'}"
+    print(f"report: {printable(pages)}", file=stream)

@@ -65,7 +65,9 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         first, of = (opened[0], opened[0].path) if there is None else (there, out)
         campaign = first.campaign
         for part in opened:
-            _check_campaign(part, campaign, of)
+            growth(part.path, part.campaign, campaign, of)
+            refused = f"{part.path} cannot be merged into {of}"
+            schema.check_same_rows(part.campaign, campaign, refused)
         if there is not None and len(there) != campaign.task_count:
             raise InputError(f"{out} is part {there.part} of its campaign itself")
         files = opened if there is None else [there, *opened]
@@ -90,16 +92,6 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         taken=taken,
         doubts=tuple(doubts),
     )
-
-
-def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
-    """Refuse a file of another campaign, or of one whose rows have other shapes."""
-    growth(part.path, part.campaign, campaign, of)
-    if not schema.same_rows(part.campaign, campaign):
-        raise InputError(
-            f"{part.path} cannot be merged into {of}: the bins of its spectra differ (they follow "
-            "the highest n0 · ratio of the campaign)"
-        )
 
 
 def _assign(

@@ -100,12 +100,14 @@ def scales(campaign: Campaign, part: Part = WHOLE) -> tuple[Scale, ...]:
     )
 
 
-def same_rows(one: Campaign, two: Campaign) -> bool:
-    """Whether the rows of two campaigns have the same dimensions, value by value."""
-    return all(
-        a.name == b.name and np.array_equal(a.values, b.values)
-        for a, b in zip(row_scales(one), row_scales(two), strict=True)
-    )
+def check_same_rows(one: Campaign, two: Campaign, refused: str) -> None:
+    """Raise InputError if rows of two campaigns differ in dimensions; ``refused`` names what is."""
+    pairs = zip(row_scales(one), row_scales(two), strict=True)
+    if not all(a.name == b.name and np.array_equal(a.values, b.values) for a, b in pairs):
+        raise InputError(
+            f"{refused}: the bins of its spectra would change (they follow the highest n0 · ratio "
+            "of the campaign, and the period)"
+        )
 
 
 class Member(NamedTuple):

@@ -6,7 +6,7 @@ So a row whose status is not "pending" is a whole one, and its checksum is that 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Self
@@ -101,20 +101,13 @@ class Writer:
         values = {"error": schema.encode_text(error), "wall_time": wall_time, "rank": rank}
         self._write(row, values | self._origin_of(rank), schema.FAILED)
 
-    def reset(self, rows: Sequence[int]) -> None:
-        """Make rows pending again; what they held is lost."""
+    def reset(self, rows: Iterable[int], status: int = schema.PENDING) -> None:
+        """Empty rows, which are to be computed, or need not be; what they held is lost."""
         for row in rows:
             # First the status: a row that is being emptied must not be taken for a whole one.
-            self._set_pending(row)
-            self._write(row, {}, schema.PENDING)
-
-    def mark(self, rows: Iterable[int], *, needed: bool) -> None:
-        """Mark rows without a result: they are to be computed, or need not be."""
-        for row in rows:
-            if needed:
-                self._set_pending(row)
-            else:
-                self._write(row, {}, schema.NOT_NEEDED)
+            with self._writing(row):
+                self._put(schema.STATUS, row, schema.PENDING)
+            self._write(row, {}, status)
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
         """Write a row, its checksum, and then its status; what has no value is left empty.
@@ -134,10 +127,6 @@ class Writer:
             covered = schema.CHECKSUM.fill if status == schema.PENDING else checksum(blocks)
             self._put(schema.CHECKSUM, row, covered)
             self._put(schema.STATUS, row, status)
-
-    def _set_pending(self, row: int) -> None:
-        with self._writing(row):
-            self._put(schema.STATUS, row, schema.PENDING)
 
     def _put(self, dataset: Dataset, row: int, value: int) -> None:
         """Write one number of a row, and hand all that was written to the operating system."""
@@ -161,9 +150,11 @@ class Writer:
                 ) from error
 
     def _check_place(self) -> None:
-        """Refuse to fill a file that is not at its path any more, and may have no name at all."""
+        """Refuse to fill a file that is not at its path any more, or was cut or copied over."""
         try:
-            moved = not os.path.samestat(os.stat(self.path), self._opened)
+            found = os.stat(self.path)
+            same_size = found.st_size == self._opened.st_size
+            moved = not (same_size and os.path.samestat(found, self._opened))
         except (FileNotFoundError, NotADirectoryError):
             moved = True
         if moved:

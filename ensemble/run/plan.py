@@ -17,9 +17,9 @@ from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.layout import Source, check_space, create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.batches import Batches
 from adhesis.ensemble.run.interrupt import Deadline
@@ -57,7 +57,9 @@ class Selection:
 
     def rows(self, tasks: Tasks, status: NDArray[np.uint8]) -> list[int]:
         """Return the rows that are selected, by the status of each task."""
-        selected = np.isin(status, (FAILED, DONE) if self.status == "all" else FAILED)
+        selected = np.isin(
+            status, (schema.FAILED, schema.DONE) if self.status == "all" else schema.FAILED
+        )
         for name, chosen in self.values.items():
             if chosen:
                 selected &= np.isin(tasks.column(name), list(chosen))
@@ -155,21 +157,21 @@ def prepare(
         with Results(path) as old:
             grown_keys = _growth(path, old, campaign, part)
             if grown_keys:
-                source = Source(old, campaign, old.status() != DAMAGED)
+                source = Source(old, campaign, old.status() != schema.DAMAGED)
                 lay_out([source], created=old.attributes.get("created"))
                 grown = f", {len(tasks) - len(old)} of them new"
                 if old.damaged().size:
                     say(f"{old.damage()}{_AGAIN}")
     with Results(path) as results:
         status = results.status()
-        again = np.flatnonzero(status == DAMAGED).tolist()
+        again = np.flatnonzero(status == schema.DAMAGED).tolist()
         if again:
             say(f"{results.damage()}{_AGAIN}")
         if redo is not None:
             chosen = redo.rows(results.tasks(), status)
             say(f"{path}: {counted(len(chosen), 'task')} to be computed again")
             again += chosen
-        status[again] = PENDING
+        status[again] = schema.PENDING
         plan = _plan(results, status)
     # where nothing is left, the solver is not loaded
     for task in plan.tasks.chosen(plan.tasks.rows[plan.rows]).of_cells():
@@ -179,9 +181,10 @@ def prepare(
             writer.reset(again)
             if plan.batches is not None:
                 spare = plan.batches.not_needed
-                writer.mark([row for row in spare if status[row] == PENDING], needed=False)
-                wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
-                writer.mark(sorted(wanted), needed=True)
+                unneeded = [row for row in spare if status[row] == schema.PENDING]
+                writer.reset(unneeded, schema.NOT_NEEDED)
+                wanted = set(np.flatnonzero(status == schema.NOT_NEEDED).tolist()) - set(spare)
+                writer.reset(sorted(wanted))
     if is_new:
         say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
         return plan
@@ -205,11 +208,9 @@ def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[s
             f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "
             "parts are merged into does"
         )
-    if grown_keys and not same_rows(old.campaign, campaign):
-        raise InputError(
-            f"{path} cannot grow by {', '.join(grown_keys)}: the bins of its "
-            "spectra would change (they follow the highest n0 · ratio of the campaign)"
-        )
+    if grown_keys:
+        refused = f"{path} cannot grow by {', '.join(grown_keys)}"
+        schema.check_same_rows(old.campaign, campaign, refused)
     return grown_keys
 
 
@@ -217,15 +218,15 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
     tasks = results.tasks()
     times: dict[Group, tuple[float, int]] = {}
     seconds = results.column("wall_time").tolist()
-    for row in np.flatnonzero(status == DONE).tolist():
+    for row in np.flatnonzero(status == schema.DONE).tolist():
         group = results.campaign.branch_of(tasks[row]).cell
         sum_before, count = times.get(group, (0.0, 0))
         times[group] = (sum_before + seconds[row], count + 1)
-    rows, batches = np.flatnonzero(status == PENDING).tolist(), None
+    rows, batches = np.flatnonzero(status == schema.PENDING).tolist(), None
     if results.campaign.stop.relative_error is not None:
         steered = results.column(results.campaign.stop.quantity)
-        values = np.where(status == FAILED, np.nan, steered)
-        known = np.flatnonzero((status == DONE) | (status == FAILED))
+        values = np.where(status == schema.FAILED, np.nan, steered)
+        known = np.flatnonzero((status == schema.DONE) | (status == schema.FAILED))
         batches = Batches(
             results.campaign, tasks, {row: float(values[row]) for row in known.tolist()}
         )
@@ -234,8 +235,8 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         tasks=tasks,
         rows=rows,
         batches=batches,
-        done=int(np.sum(status == DONE)),
-        failed=int(np.sum(status == FAILED)),
+        done=int(np.sum(status == schema.DONE)),
+        failed=int(np.sum(status == schema.FAILED)),
         times=times,
     )
 

@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import h5py
+import numpy as np
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import WriteError, parameter
 from adhesis.ensemble.outputs import target_of
-from adhesis.ensemble.results.schema import origin_of
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.dispatch import Outcome, StopCheck
@@ -105,7 +107,7 @@ def run_campaign(
             writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
         session = _Session(campaign, plan, writer, options, signals, engine, stream)
         stopped = session.run(comm, own_rows)
-    return together(comm, lambda: session.summary(stopped))
+        return together(comm, lambda: session.summary(stopped, path))
 
 
 def _compute(
@@ -186,9 +188,21 @@ class _Session:
         with progress:
             return master.run()
 
-    def summary(self, stopped: str | None) -> Summary:
-        """Return the counts, and how the run has ended."""
+    def summary(self, stopped: str | None, path: Path) -> Summary:
+        """Return the counts, and how the run has ended.
+
+        What a run has finished is read once more: another program may have written to the file
+        (InputError, WriteError).
+        """
         summary, batches = self._counts, self.plan.batches
+        if self.plan.rows and not stopped:
+            with Results(path) as results:
+                held = int(np.isin(results.status(), (DONE, FAILED)).sum())
+            if held < (finished := summary.done + summary.failed):
+                raise WriteError(
+                    f"{path} holds {held} of {finished} finished tasks: another program has "
+                    "changed it while a run wrote to it"
+                )
         summary.seconds = time.monotonic() - self._started
         summary.stopped = stopped if summary.pending else None
         summary.precisions = () if batches is None else tuple(batches.precisions)
@@ -225,7 +239,7 @@ class _Session:
             value = math.nan if outcome.error is not None else float(row[steered])
             further, spare = self.plan.batches.finished(outcome.task, value)
             assert self.writer is not None
-            self.writer.mark(spare, needed=False)
+            self.writer.reset(spare, NOT_NEEDED)
             self._counts.total += len(further)
             schedule.add(further)
 

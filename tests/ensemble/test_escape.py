@@ -3,8 +3,10 @@
 import h5py
 import numpy as np
 import pytest
+import xarray
 from markdown_it import MarkdownIt
 
+import adhesis
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
@@ -16,7 +18,7 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.session import run_campaign
 from tests.support.campaign_support import campaign_text, run_python
-from tests.support.fake_run import fake_engine
+from tests.support.fake_run import fake_engine, write_results
 
 HOSTILE = [
     "![x](/etc/passwd)",
@@ -108,6 +110,21 @@ def test_names_of_files_are_printed_without_control_characters(tmp_path, monkeyp
         assert r"a\x1b[31m\x07" in shown
         assert not {"\x1b", "\x07"} & set(shown)
     assert (tmp_path / f"{name}.json").exists()
+
+
+@pytest.mark.usefixtures("quick_figures")
+def test_a_report_names_a_file_whose_name_is_no_utf_8(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    campaign = parse_campaign(campaign_text())
+    for name in ("\udcff\x1b.h5", "other\udcff.h5"):
+        create(name, campaign)
+        write_results(tmp_path / name, campaign, range(8))
+    assert main(["report", "\udcff\x1b.h5", "--to", "a\x1b", "--beside", "other\udcff.h5"]) == 0
+    assert r"report: a\x1b/report.md" in capsys.readouterr().out
+    assert r"`\udcff\x1b.h5`" in (tmp_path / "a\x1b" / "report.md").read_text().splitlines()[0]
+    assert r"other\udcff.h5," in (tmp_path / "a\x1b" / "beside.csv").read_text()
+    with xarray.open_dataset(tmp_path / "a\x1b" / "curves.nc", engine="h5netcdf") as curves:
+        assert curves.attrs["source"] == adhesis.open("\udcff\x1b.h5").dataset.source
 
 
 def test_images_come_from_the_folder_of_the_page_alone(tmp_path):

@@ -165,8 +165,8 @@ def test_a_rank_that_hangs_ends_the_job_and_the_same_command_goes_on(tmp_path, w
     _, errors = process.communicate(timeout=150)
     assert process.returncode == 75, errors
     assert errors.splitlines()[-1] == (
-        "adhesis run: rank 2 has not answered for 1 s; what was done is kept, run the same command "
-        "again to resume"
+        "adhesis run: rank 2 has not answered for 1 s; what the file holds is kept, run the same "
+        "command again to resume"
     )
     assert goes_on(path, out, whole) >= 2
 
@@ -289,7 +289,7 @@ def test_a_run_that_starts_its_ranks_ends_with_one_sentence(tmp_path):
     assert process.returncode == 74
     last = process.stderr.splitlines()[-1]
     assert "could not be written" in last
-    assert last.endswith("; what was done is kept")
+    assert last.endswith("; what the file holds is kept")
 
 
 def test_waiting_costs_the_master_next_to_nothing(tmp_path):

@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -63,6 +64,17 @@ def test_a_full_disk_costs_one_output_and_neither_the_others_nor_the_loss(ask: A
     ]
     assert np.load("f.npz")["stress"].shape[0] == 8
     assert "</svg>" in Path("f.svg").read_text()
+
+
+def test_a_disk_that_is_full_before_the_work_is_no_bad_input(ask, monkeypatch):
+    def full(**_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
+    for words in (["loop", *LOOP, "--json", "o.json"], ["bench", "--to", "b"]):
+        code, _, error = ask(*words)
+        assert (code, "it cannot be written (No space left on device)" in error) == (74, True)
+    assert [path.name for path in Path().iterdir()] == ["wave.csv"]
 
 
 def test_a_failure_in_the_middle_leaves_the_old_file(ask, monkeypatch, tmp_path):

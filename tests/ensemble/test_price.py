@@ -11,6 +11,7 @@ from adhesis.ensemble.campaign.tasks import Part, Task
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.schema import NOT_NEEDED
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.plan import prior
 from adhesis.ensemble.run.price import price
@@ -185,7 +186,7 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
     create(path, campaign)
     write_results(path, campaign, range(72), cpu_time=7.0)
     with Writer(path) as writer:
-        writer.mark(range(72, 200), needed=False)
+        writer.reset(range(72, 200), NOT_NEEDED)
     reported = price(campaign, path, compute=compute, seconds=-1.0)
     assert reported.done == 72
     assert reported.cells[0].tasks == 0
@@ -224,12 +225,13 @@ def test_a_dry_run_writes_nothing(tmp_path, monkeypatch):
         (
             "session.run_campaign",
             [],
-            "interrupted; what was done is kept, run the same command again to resume",
+            "interrupted; what the file holds is kept, run the same command again to resume",
         ),
         (
             "session.run_campaign",
             ["--redo", "all"],
-            "interrupted; what was done is kept, run the command again without --redo to resume",
+            "interrupted; what the file holds is kept, run the command again without --redo to "
+            "resume",
         ),
     ],
 )

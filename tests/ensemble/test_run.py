@@ -4,6 +4,7 @@ import itertools
 import json
 import os
 import re
+import shutil
 import signal
 import time
 from dataclasses import replace
@@ -157,6 +158,10 @@ def test_a_campaign_on_further_axes(tmp_path):
     process, _ = run(tmp_path, young="[1e6, 2e6]", hurst="[0.7, 0.8]", **axes)
     assert process.returncode == 2
     assert "cannot grow by profile.ratio: the bins of its spectra would change" in process.stderr
+    axes |= {"ratio": "[2, 4]", "period": "[1e-3, 2e-3]"}
+    process, _ = run(tmp_path, young="[1e6, 2e6]", hurst="[0.7, 0.8]", **axes)
+    assert process.returncode == 2
+    assert "would change (they follow the highest n0 · ratio of the campaign, and" in process.stderr
 
 
 def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path, whole):
@@ -310,6 +315,31 @@ def test_two_runs_on_one_file(tmp_path):
     assert json.loads(adhesis_here("status", out, "--json").stdout)["run"] is None
 
 
+COPIED_OVER = {
+    "by zeros": (lambda _, out: out.write_bytes(bytes(out.stat().st_size)), 2, "is damaged"),
+    "by an older copy": (shutil.copyfile, 74, "holds 7 of 8 finished tasks: another program has"),
+}
+
+
+@pytest.mark.parametrize("how", COPIED_OVER)
+def test_a_file_that_is_copied_over_meanwhile_is_no_finished_run(tmp_path, how):
+    """The run would have ended with 0, and rows that it counted be lost."""
+    overwrite, code, sentence = COPIED_OVER[how]
+    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
+    process = start("run", path, "--out", out, fake=f"hold=1 free={free}")
+    wait_until(lambda: out.exists())
+    copy = shutil.copyfile(out, tmp_path / "copy.h5")
+    wait_until(lambda: done_rows(out) >= 1)
+    overwrite(copy, out)
+    free.touch()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == code, errors
+    assert sentence in errors
+    if code == 74:
+        again = adhesis_here("run", path, "--out", out, fake="step=0")
+        assert (again.returncode, done_rows(out)) == (0, 8)
+
+
 def test_processes_of_another_mpi_are_reported_by_rank_0(tmp_path, monkeypatch):
     for place, words in (("0", 1), ("1", 0)):
         monkeypatch.setattr(
@@ -329,7 +359,7 @@ def test_a_disk_that_fills_while_running(tmp_path):
     words = ("run", tmp_path / "c.toml", "--out", out, "--redo", "all", "--realisation", "1")
     process = adhesis(*words, fake="full=20000")
     assert process.returncode == 74
-    assert "could not be written: File too large; what was done is kept" in process.stderr
+    assert "could not be written: File too large; what the file holds is kept" in process.stderr
     assert "Traceback" not in process.stderr
     assert done_rows(out) == 4
 

@@ -422,11 +422,12 @@ TAKEN_AWAY = {
     "moved": lambda path: path.rename(path.with_name("old.h5")),
     "moved with its folder": lambda path: path.parent.rename(f"{path.parent}-old"),
     "replaced": _replace,
+    "cut": lambda path: os.truncate(path, 1000),
 }
 
 
 @pytest.mark.parametrize("how", TAKEN_AWAY)
-def test_no_row_is_written_into_a_file_that_is_not_at_its_path(path, campaign, how):
+def test_no_row_is_written_into_a_file_that_is_not_there_as_it_was(path, campaign, how):
     """The rows would have been counted as done, and be lost with the file."""
     row = fake_result(campaign, campaign.tasks()[0])
     with Writer(path) as writer:

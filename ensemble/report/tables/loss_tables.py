@@ -11,6 +11,7 @@ import numpy as np
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.companions import difference
+from adhesis.ensemble.escape import printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
@@ -297,7 +298,7 @@ def profiles(data: Aggregate) -> Table:
 def companions(data: Aggregate) -> Table:
     """Losses of the campaigns beside this one, over the realisations that both have."""
     columns = [
-        TableColumn("file", "companion.path.name", "campaign"),
+        TableColumn("file", lambda row: printable(row["companion"].path.name), "campaign"),
         TableColumn(
             "differs",
             lambda row: "; ".join(row["companion"].differs) or "nothing",
