@@ -39,6 +39,17 @@ def test_a_saddle_is_left_by_edges_that_are_not_pinned(half_width, ways):
     assert len(method.jumps.descents.ways_off_saddle(gaps, d, law)) == ways
 
 
+@pytest.mark.parametrize("number", [84, 112, 116])
+def test_the_error_of_a_loss_counts_the_whole_way_beyond_a_fold(number):
+    """Just beyond the last fold descents come to rest up to three times before contact is lost."""
+    scene = draw(771101, number, "open", "separation")
+    problem, turn = scene.problem(), {"load_steps": scene.load_steps}
+    turn |= scene.turn(problem)
+    loop = loop_of(problem, accuracy=1e-4, **turn)
+    exact = loop_of(problem, accuracy=1e-6, **turn)
+    assert 0.1 * loop.loss_error < abs(loop.loss - exact.loss) < loop.loss_error
+
+
 @pytest.mark.parametrize("depth", [0.3, 0.6])
 @pytest.mark.parametrize("ratio", [1.1, 2.0, 4.0])
 def test_loss_of_a_wave_is_the_closed_form(ratio, depth):

@@ -129,12 +129,16 @@ class Fold:
         The last point of the branch.
     d : float
         d a step beyond it: a smallest one, one across the fold, or to the target.
+    late : float
+        Distance of d from the last point that Newton's iteration has found: beyond it a descent may
+        have come to rest where there is no minimum any more.
     with_another : TwoFolds, optional
         If a second one is near.
     """
 
     point: Point
     d: float
+    late: float
     with_another: TwoFolds | None = None
 
 
@@ -166,6 +170,7 @@ class StableBranch:
         if before is not None and (point.d - before.d) * (target.d - point.d) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
+        self._found = point.d  # of the last one that Newton's iteration has found
         self._at_output: ContactState | None = None  # the state there, where work is compared
         self.trail = [point]
         self.smallest_step, self._longest = resolution.jump, math.inf  # step
@@ -193,7 +198,7 @@ class StableBranch:
                 self._longest = share * abs(step)
                 self.smallest_step = min(self.smallest_step, self._longest)
             elif abs(step) <= self.smallest_step:
-                return Fold(self.point, d, self._two_folds)
+                return Fold(self.point, d, abs(d - self._found), self._two_folds)
             else:
                 self._longest = max(STEP_REDUCTION * abs(step), self.smallest_step)
 
@@ -269,7 +274,7 @@ class StableBranch:
         is_output = error > 1 or reached.d == self._target.d or self._begins_to_move
         point = reached.with_previous(PreviousPoint(self.point.d, self.point.rate, self.point.gaps))
         self.trail.append(point)
-        self.point = point
+        self.point, self._found = point, point.d
         self._work_before = (0.0, math.inf)
         if is_output:
             self._output, self._at_output = point, None

@@ -258,13 +258,12 @@ class Follower:
     ) -> ComputedJump | None:
         """Compute the jump at a fold; None if it was found too late for its drop."""
         point = fold.point
-        way = abs(fold.d - point.d)
         states: tuple[ContactState, ...] = ()
         if last is None or last.internal.gaps is not point.field.gaps:
             states = (self.states.of_point(point),)
         before = self.states.of_point(point, held=(fold.d, self.edges.solve_finer(point)))
         start, orders = self._start_at_fold(fold)
-        event = Event(before, fold.d, point.gaps, start, late=way, orders=orders)
+        event = Event(before, fold.d, point.gaps, start, late=fold.late, orders=orders)
         jump = self.jumps.compute(event, target.direction)
         after, drop = jump.states[-1], jump.jump.energy_drop
         # a branch that is steep, and does not fold, falls by half of the work that it is late by
@@ -274,7 +273,7 @@ class Follower:
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = jump.misplaced + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
-            misplaced += self._early_closure_error(before, point, way)
+            misplaced += self._early_closure_error(before, point, fold.late)
         return replace(jump, states=states + jump.states, misplaced=misplaced)
 
     def _orders_of_folds(self, fold: Fold) -> EventOrders | None:
