@@ -204,11 +204,6 @@ class EdgeMechanics:
         return law
 
     @property
-    def largest_opening(self) -> float:
-        """Largest critical opening of an edge, on a flat piece."""
-        return float(self.critical * np.sqrt(self.adhesion.largest))
-
-    @property
     def is_fixed(self) -> bool:
         """Whether the separation is prescribed."""
         return self.model.device.compliance == 0
