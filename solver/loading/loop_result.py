@@ -7,6 +7,7 @@ of the energy drops at the jumps are the same energy. They are computed independ
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -392,7 +393,7 @@ def result_of(
     max_penetration = turning_point
     if not problem.control.is_fixed:
         max_penetration = float(fields["penetration"][turn])
-    gained = -ledger.part(0, turn).displacement_work
+    gained = -math.fsum(ledger.part(0, turn).displaced)
     result = LoopResult(
         turning_point=turning_point,
         max_penetration=max_penetration,
