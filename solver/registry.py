@@ -43,6 +43,13 @@ def make_method(
     References
     ----------
     docs/methods.md, "Which one"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, make_method, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    >>> make_method("auto", problem).name
+    'sharp'
     """
     choice("method", name, METHOD_NAMES)
     instance("problem", problem, Problem, "Problem(profile, half_space, work_of_adhesion)")

@@ -58,6 +58,14 @@ class LoopResult(EquilibriumPath):
     References
     ----------
     docs/theory.md, "3. The loop"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    >>> loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
+    >>> [jump.kind for jump in loop.jumps]
+    ['snap-in', 'pull-off']
     """
 
     turning_point: float

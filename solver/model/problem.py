@@ -103,6 +103,13 @@ class Problem(ByValue):
     References
     ----------
     docs/theory.md, "1. The problem"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), work_of_adhesion=0.01)
+    >>> round(problem.separation(penetration=0.25), 12)  # three quarters of h_max
+    7.5e-07
     """
 
     profile: Profile
