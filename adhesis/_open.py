@@ -40,6 +40,23 @@ def open(
     References
     ----------
     docs/python.md, "Results in Python"
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import adhesis
+    >>> campaign = adhesis.Campaign({
+    ...     "profile": {"period": 2e-3, "n0": 2, "ratio": 2, "h_rms": 1e-6},
+    ...     "material": {"young": 1e6, "poisson": 0.5},
+    ...     "sweep": {"hurst": [0.8], "work_of_adhesion": [0.01], "realisations": 3},
+    ...     "cycle": {"max_penetration": 0.5, "load_steps": 4},
+    ... })
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "results.h5")
+    ...     _ = campaign.run(file)
+    ...     int((adhesis.open(file).dataset.loss > 0).sum())  # every loop loses energy
+    3
     """
     if isinstance(beside, str | os.PathLike):
         raise TypeError(f"beside is {str(beside)!r}: it must be a list of paths")

@@ -41,27 +41,16 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from adhesis.solver.checks import instance
-from adhesis.solver.model.contact_state import ContactState
-from adhesis.solver.model.jump import BRANCHES, Branch, Jump
+from adhesis.solver.model.contact_state import ContactState as ContactState
+from adhesis.solver.model.jump import BRANCHES as BRANCHES
+from adhesis.solver.model.jump import Branch as Branch
+from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks, parabola_vertex
 from adhesis.solver.runtime.threads import new_lock
 from adhesis.solver.values import ByValue
 from adhesis.solver.views import NotebookDisplay
-
-__all__ = [
-    "BRANCHES",
-    "Branch",
-    "ContactState",
-    "Fields",
-    "Method",
-    "MethodReport",
-    "PatchTension",
-    "Path",
-    "PathError",
-]
-
 
 # Nodes of fields in which tension is searched, where a method has no grid of its own.
 _NODES_PER_WAVE, _FEWEST_NODES = 16, 256

@@ -43,6 +43,13 @@ def make_method(
     References
     ----------
     docs/methods.md, "Which one"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, make_method, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    >>> make_method("auto", problem).name
+    'sharp'
     """
     choice("method", name, METHOD_NAMES)
     instance("problem", problem, Problem, "Problem(profile, half_space, work_of_adhesion)")
@@ -59,25 +66,15 @@ def make_method(
     chosen = None
     if name == "auto":
         name, chosen = choose(problem, nodes_per_wave)
-    _load(name)
-    method: Method
+    # an interrupted import leaves incomplete modules behind
+    uninterrupted(import_module)(f"adhesis.solver.{name}.method")
     if name == "grid":
         from adhesis.solver.grid.method import GridMethod
 
-        method = GridMethod(
-            problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen
-        )
-    else:
-        from adhesis.solver.sharp.method import SharpMethod
+        return GridMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen)
+    from adhesis.solver.sharp.method import SharpMethod
 
-        method = SharpMethod(problem, accuracy=accuracy, chosen=chosen)
-    return method
-
-
-@uninterrupted  # an interrupted import leaves incomplete modules behind
-def _load(name: Literal["grid", "sharp"]) -> None:
-    """Import a method."""
-    import_module(f"adhesis.solver.{name}.method")
+    return SharpMethod(problem, accuracy=accuracy, chosen=chosen)
 
 
 def check_law(name: MethodName, nodes_per_wave: int | None, *, pins: bool, has_range: bool) -> None:

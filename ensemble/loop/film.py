@@ -163,7 +163,6 @@ class Film:
         return re.sub("@[A-Z]+@", lambda found: parts[found[0]], template)
 
     def _animation(self, ending: str, progress: Callable[[int, int], None] | None) -> bytes:
-        """Return the film as matplotlib's own writer makes it."""
         drawing = _Drawing(self._result, self._scenes)
         writer = PillowWriter(fps=_RATE) if ending == ".gif" else FFMpegWriter(fps=_RATE)
         with tempfile.TemporaryDirectory() as folder, style(), mpl.rc_context(_LOOK):

@@ -123,8 +123,7 @@ def _surface(method: Method, state: ContactState, x: Array, height: Array) -> Ar
         for turn in (0.0, period):
             inside = (x + turn > opening.x[0]) & (x + turn < opening.x[-1])
             gap[inside] = np.interp(x[inside] + turn, opening.x, opening.gap)
-    surface: Array = height + gap
-    return surface
+    return np.asarray(height + gap)
 
 
 def _patches(state: ContactState, period: float) -> Array:

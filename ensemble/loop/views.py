@@ -117,9 +117,7 @@ def progress_bar(top: float, load: bool) -> Iterator[Progress]:
                 f"{branch:<9} {drive_text(drive, load)} of {end}  A/A0 "
                 f"{state.contact_fraction:.4f}  {state.patches} patches"
             )
-            if branch == "loading":
-                shown(drive / top, 1.0, text)
-            else:
-                shown(None if state.patches else 1.0, None if state.patches else 1.0, text)
+            share = drive / top if branch == "loading" else None if state.patches else 1.0
+            shown(share, 1.0, text)
 
         yield show

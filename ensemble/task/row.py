@@ -65,10 +65,6 @@ def _of_interior(name: str) -> Callable[[LoopResult], float]:
     return lambda loop: float(getattr(loop.interior, name, np.nan))
 
 
-def _reached(loop: LoopResult) -> float:
-    return np.nan if loop.preload_reached is None else float(loop.preload_reached)
-
-
 _SMALL, _LARGE = (methodcaller("drops", small_scale=small) for small in (True, False))
 TIMES = (_number("wall_time", "s", "wall time"), _number("cpu_time", "s", "CPU time"))
 # Of each loop, one number.
@@ -115,7 +111,10 @@ NUMBERS = (
         "turning_penetration", "1", "penetration/h_max at the turning point", "max_penetration"
     ),
     _number("turning_stress", "Pa", "mean stress at the turning point"),
-    _number("preload_reached", "1", "1 if the mean stress reached the preload, 0 if not", _reached),
+    _number(
+        *("preload_reached", "1", "1 if the mean stress reached the preload, 0 if not"),
+        lambda loop: np.nan if loop.preload_reached is None else float(loop.preload_reached),
+    ),
     _number("work_gained", "J m-2", "work gained on loading per nominal area"),
     _number("work_spent", "J m-2", "work spent on unloading per nominal area"),
     _number("largest_contact_fraction", "1", "largest contact fraction A/A0 of the loop"),

@@ -371,6 +371,15 @@ def loss_of_trace(
     References
     ----------
     docs/measured-profile.md, "The answer and its doubts"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Trace, loss_of_trace, prepare_trace, single_wave
+    >>> prepared = prepare_trace(Trace(single_wave(1e-6, 1e-3).heights(200), 5e-6), cut_off=4e-4)
+    >>> given = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.02, "load_steps": 3}
+    >>> answer = loss_of_trace(prepared, **given, quick=True, processes=0)
+    >>> round(answer.main["loss_from_drops"] / answer.loss.value, 3)  # jumps lose all of it
+    1.0
     """
     control = Control() if control is None else control
     checks.instance("control", control, Control, "Control(stiffness), for a load Control(0)")
@@ -491,7 +500,10 @@ def _several(name: str, value: Several) -> tuple[float, ...]:
 def _quantity(answer: Answer, name: str) -> Uncertain:
     value = float(answer.main[name])
     doubts = {}
-    neighbours = _neighbours(answer)
+    # Cut-offs next to the answer's count as a doubt; longer ones are for the figure.
+    loops = _cut_offs(answer)
+    longer = sorted(factor for factor in loops if factor > 1)[:1]
+    neighbours = [run for factor, (run, _) in loops.items() if factor < 1 or factor in longer]
     for doubt in DOUBTS:
         changes = [
             change
@@ -516,16 +528,6 @@ def _cut_offs(answer: Answer) -> dict[float, tuple[str, Result]]:
     at = answer.prepared.cut_off
     ended = {run.changes["cut_off"] / at: (run.name, r) for run, r in answer.group("cut-off")}
     return {1.0: ("answer", answer.main)} | ended
-
-
-def _neighbours(answer: Answer) -> list[str]:
-    """Return the loops of the cut-offs next to the answer's, which count as a doubt.
-
-    The others, up to sixteen times as long, are for the figure.
-    """
-    loops = _cut_offs(answer)
-    longer = sorted(factor for factor in loops if factor > 1)[:1]
-    return [name for factor, (name, _) in loops.items() if factor < 1 or factor in longer]
 
 
 def _warnings(answer: Answer, loss: Uncertain) -> list[str]:

@@ -155,7 +155,6 @@ def compute(run: Run, progress: Progress | None = None) -> Result:
 
 
 def _compute(runs: Sequence[Run], task: int, check: StopCheck) -> Result:
-    """Run a loop as the hand-out asks for it."""
     return compute(runs[task], lambda branch, drive, _: check((branch, drive)))
 
 

@@ -132,16 +132,14 @@ class Prepared(ByValue):
 
     def level(self, degree: int | None = None, *, without_features: bool = False) -> Array:
         """Subtract the form, also one of another degree; return heights in m."""
-        heights = self._without_features() if without_features else self.filled
+        heights = self.filled
+        if without_features:  # straight lines in place of the single crests and troughs
+            index = np.arange(heights.size)
+            kept = np.ones(index.size, dtype=bool)
+            for feature in self.features:
+                kept &= ~_within(feature.begin, feature.end, self.start, self.step, index.size)
+            heights = np.interp(index, index[kept], heights[kept])
         return heights - polynomial_form(heights, self.degree if degree is None else degree)
-
-    def _without_features(self) -> Array:
-        """Return heights with straight lines in place of the single crests and troughs."""
-        index = np.arange(self.filled.size)
-        kept = np.ones(index.size, dtype=bool)
-        for feature in self.features:
-            kept &= ~_within(feature.begin, feature.end, self.start, self.step, index.size)
-        return np.interp(index, index[kept], self.filled[kept])
 
     def profile(
         self,
@@ -210,6 +208,12 @@ def prepare_trace(
     References
     ----------
     docs/measured-profile.md, "Preparation"
+
+    Examples
+    --------
+    >>> from adhesis import Trace, prepare_trace
+    >>> round(1e6 * prepare_trace(Trace([0, 1e-6, 3e-6, 1e-6] * 50, 5e-6)).cut_off)  # 5 steps
+    25
     """
     instance("trace", trace, Trace, "read_trace(source)")
     flag(parameter("keep_outliers"), keep_outliers)

@@ -104,14 +104,6 @@ class Contact:
             response=self.response.copy() if self.response is not None else None,
         )
 
-    def at(self, prescribed: float, control: Control) -> Contact:
-        """Return an unsolved copy at x = ``prescribed``."""
-        moved = self.copy()
-        moved.prescribed = prescribed
-        if control.is_fixed:
-            moved.separation = prescribed
-        return moved
-
 
 class ContactSolver:
     """Conjugate gradients on the contact sets of one grid.

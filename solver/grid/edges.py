@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.lattice import Lattice
-from adhesis.solver.grid.patches import edges_of, patch_ranges
+from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.model.profile import Array
 
 Indices = NDArray[np.intp]
@@ -56,7 +56,10 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         none = np.empty(0, dtype=np.intp)
         nothing = np.empty(0)
         return Edges(none, none, none, none, none, nothing, nothing, np.empty(0, dtype=bool))
-    side, inner, outer, both_widths, gap = edges_of(first, width, n)
+    last = first + width - 1
+    after_patch = np.append(first[1:], first[0] + n) - last - 1  # free nodes
+    gap = np.concatenate([np.roll(after_patch, 1), after_patch])
+    inner, outer = np.concatenate([first, last % n]), np.concatenate([first - 1, last + 1]) % n
     grow, recede = [0.0] * (2 * count), [0.0] * (2 * count)
     w, gl, gr = width.tolist(), gap[:count].tolist(), gap[count:].tolist()
     total = sum(w)
@@ -90,4 +93,5 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         overlap[:] = False
     stress = contact.stress[inner]
     recession = np.where(stress < 0, dx * (adhesion[inner] - 0.5 * stress**2 * s_recede), np.inf)
+    side, both_widths = np.repeat(np.array([-1, 1]), count), np.tile(width, 2)
     return Edges(side, inner, outer, both_widths, gap, growth, recession, overlap)

@@ -1,4 +1,4 @@
-"""Find the patches and edges of a set of contact nodes."""
+"""Find the patches of a set of contact nodes."""
 
 from __future__ import annotations
 
@@ -23,18 +23,3 @@ def patch_ranges(mask: NDArray[np.bool_]) -> tuple[Integers, Integers]:
     if behind[0] < first[0]:  # the period begins within the last patch
         behind = np.append(behind[1:], behind[0] + mask.size)
     return first, behind - first
-
-
-def edges_of(
-    first: Integers, width: Integers, n: int
-) -> tuple[Integers, Integers, Integers, Integers, Integers]:
-    """Return side, inner and outer node, width and gap of every edge, as ``edges.Edges``."""
-    last = first + width - 1
-    gap = np.append(first[1:], first[0] + n) - last - 1  # after each patch
-    return (
-        np.repeat(np.array([-1, 1]), first.size),
-        np.concatenate([first, last % n]),
-        np.concatenate([first - 1, last + 1]) % n,
-        np.tile(width, 2),
-        np.concatenate([np.roll(gap, 1), gap]),
-    )

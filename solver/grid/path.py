@@ -203,7 +203,10 @@ class Steps:
 
         As the stress is linear in x, the initial guess interpolates the last, longer step.
         """
-        frozen = contact.at(target, self.lattice.control)
+        frozen = contact.copy()
+        frozen.prescribed = target
+        if self.lattice.control.is_fixed:
+            frozen.separation = target
         if self.last is not None and self.last[0] is contact:
             far = self.last[1]
             share = (target - contact.prescribed) / (far.prescribed - contact.prescribed)

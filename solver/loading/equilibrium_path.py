@@ -50,8 +50,10 @@ _FALL_SHARE = 0.01
 # Largest A/A0 from which on harder pressing can add a hundredth of the area at most.
 _NEARLY_FULL = 0.99
 _ROUNDING = 1e-9  # of h_max: a separation that is less below it is at first touch
-_COLUMNS = ("mean_stress", "contact_fraction", "elastic_energy", "adhesion_energy")
-_ENTERED = (*_COLUMNS, "separation", "tangent", "edge_friction")  # in the ledger
+_ENTERED = (  # in the ledger
+    *("separation", "mean_stress", "tangent", "contact_fraction"),
+    *("elastic_energy", "adhesion_energy", "edge_friction"),
+)
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
 
@@ -603,13 +605,9 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
             "where surfaces overlap: there is no such state"
         )
     jumps = tuple(record.jumps)
-    columns: dict[str, Any] = {name: record.column(name) for name in _COLUMNS}
-    friction = record.column("edge_friction")
-    columns |= {
-        "separation": separation,
-        "tangent": record.column("tangent"),
-        "edge_friction": friction if friction.any() else None,
-    }
+    columns: dict[str, Any] = {name: record.column(name) for name in _ENTERED}
+    if not columns["edge_friction"].any():
+        columns["edge_friction"] = None
     ledger = Ledger.of(problem, jumps, **columns)
     fields = columns | {
         "problem": problem,

@@ -99,11 +99,6 @@ class Ledger:
         return math.fsum(self.works)
 
     @property
-    def displacement_work(self) -> float:
-        """Work ∫ p̄ du_tot."""
-        return math.fsum(self.displaced)
-
-    @property
     def rise(self) -> float:
         """Rise of the stored energy from the first state to the last."""
         return float(self.stored[-1] - self.stored[0])

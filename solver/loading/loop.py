@@ -64,6 +64,14 @@ def run_loop(
     References
     ----------
     docs/theory.md, "3. The loop"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    >>> loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
+    >>> round(loop.loss_from_drops / loop.loss, 3)  # jumps lose what the cycle spends
+    1.0
     """
     control = instance("method", method, Method, HOW_METHOD).problem.control
     if preload is None:
@@ -234,6 +242,14 @@ def run_loops(
     References
     ----------
     docs/theory.md, "8. Paths and controls"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, make_method, run_loops, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    >>> loops = run_loops(make_method("sharp", problem), max_penetration=[0.3, 0.6], load_steps=4)
+    >>> round(loops[1].loss / loops[0].loss, 3)  # beyond first touch a wave does not jump
+    1.0
     """
     instance("method", method, Method, HOW_METHOD)
     problem, latest = method.problem, None

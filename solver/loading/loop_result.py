@@ -7,6 +7,7 @@ of the energy drops at the jumps are the same energy. They are computed independ
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,14 @@ class LoopResult(EquilibriumPath):
     References
     ----------
     docs/theory.md, "3. The loop"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    >>> loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
+    >>> [jump.kind for jump in loop.jumps]
+    ['snap-in', 'pull-off']
     """
 
     turning_point: float
@@ -392,7 +401,7 @@ def result_of(
     max_penetration = turning_point
     if not problem.control.is_fixed:
         max_penetration = float(fields["penetration"][turn])
-    gained = -ledger.part(0, turn).displacement_work
+    gained = -math.fsum(ledger.part(0, turn).displaced)
     result = LoopResult(
         turning_point=turning_point,
         max_penetration=max_penetration,

@@ -282,6 +282,14 @@ def run_path(
     References
     ----------
     docs/theory.md, "8. Paths and controls"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, make_method, run_path, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    >>> path = run_path(make_method("sharp", problem), [0.6, 0.2, 0.4], load_steps=6)
+    >>> path.minor_loops[0].closes  # a wave does not jump between first touch and pull-off
+    True
     """
     instance("method", method, Method, HOW_METHOD)
     points = check_path(turning_points, load_steps, method.problem, flag("out", out))

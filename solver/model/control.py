@@ -52,6 +52,12 @@ class Control(NotebookDisplay):
     References
     ----------
     docs/theory.md, "8. Paths and controls"
+
+    Examples
+    --------
+    >>> from adhesis import Control
+    >>> Control().is_fixed, Control(stiffness=0).is_load
+    (True, True)
     """
 
     stiffness: float = math.inf

@@ -29,6 +29,12 @@ class HalfSpace(NotebookDisplay):
     References
     ----------
     docs/theory.md, "1. The problem"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace
+    >>> round(HalfSpace(young=3e6, poisson=0.5).modulus)  # E/(1 - ν²), in Pa
+    4000000
     """
 
     young: float

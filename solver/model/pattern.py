@@ -145,6 +145,13 @@ def stripes(count: int, amplitude: float, phase: float = 0.0) -> AdhesionPattern
     ------
     ValueError, TypeError
         If one of them breaks these rules.
+
+    Examples
+    --------
+    >>> from adhesis import stripes
+    >>> pattern = stripes(4, amplitude=0.3)
+    >>> round(pattern.least, 9), round(pattern.largest, 9)
+    (0.7, 1.3)
     """
     coefficients = np.zeros(whole("count", count, HARMONIC) + 1, dtype=np.complex128)
     phase = real("phase", phase, FINITE)

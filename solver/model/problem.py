@@ -54,32 +54,6 @@ def check_slope(rms_slope: float) -> None:
         raise ValueError(f"rms slope is {shown}: it must be {RMS_SLOPE.text}")
 
 
-def strength_of(
-    work_of_adhesion: float, adhesion_range: float | None, strength: float | None = None
-) -> float:
-    """Compute the strength σ_th in Pa from either the range of adhesion in m or itself.
-
-    Infinite if neither is given, or without adhesion, where nothing is in tension.
-
-    Raises
-    ------
-    ValueError
-        If both are given, or one is out of its bounds.
-    TypeError
-        If one is not a number.
-    """
-    if adhesion_range is None:
-        found = math.inf if strength is None else real("strength", strength, STRENGTH)
-    else:
-        if strength is not None and strength != math.inf:
-            raise ValueError(
-                f"adhesion_range is {adhesion_range!r} and strength is {strength!r}: give one of "
-                "them, strength = work_of_adhesion/adhesion_range"
-            )
-        found = work_of_adhesion / real("adhesion_range", adhesion_range, ADHESION_RANGE)
-    return found if work_of_adhesion > 0 else math.inf
-
-
 def griffith_length(tension: float, modulus: float, work_of_adhesion: float) -> float:
     """Compute the length in m of the crack that is in equilibrium under a uniform tension in Pa."""
     return 4 * modulus * work_of_adhesion / (math.pi * tension**2)
@@ -129,6 +103,13 @@ class Problem(ByValue):
     References
     ----------
     docs/theory.md, "1. The problem"
+
+    Examples
+    --------
+    >>> from adhesis import HalfSpace, Problem, single_wave
+    >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), work_of_adhesion=0.01)
+    >>> round(problem.separation(penetration=0.25), 12)  # three quarters of h_max
+    7.5e-07
     """
 
     profile: Profile
@@ -149,7 +130,7 @@ class Problem(ByValue):
         instance("control", self.control, Control, "Control(stiffness), for a load Control(0)")
         choice("measure", self.measure, get_args(Measure))
         check_slope(float(np.sqrt(self.profile.m2)))
-        object.__setattr__(self, "strength", strength_of(gamma, adhesion_range, self.strength))
+        self._set_strength(adhesion_range)
         self._check_strength(adhesion_range)
         self._check_open()
         self._check_pattern()
@@ -170,6 +151,20 @@ class Problem(ByValue):
         """Return an alternative that ends an advice; empty where ``sharp`` alone knows the law."""
         sharp_alone = self.pinning > 0 or math.isfinite(self.strength)
         return "" if sharp_alone else " or the other method"
+
+    def _set_strength(self, adhesion_range: float | None) -> None:
+        """Set the strength, from the range if that is given; without adhesion it is infinite."""
+        gamma, given = self.work_of_adhesion, self.strength
+        if adhesion_range is None:
+            found = math.inf if given is None else real("strength", given, STRENGTH)
+        else:
+            if given is not None and given != math.inf:
+                raise ValueError(
+                    f"adhesion_range is {adhesion_range!r} and strength is {given!r}: give one of "
+                    "them, strength = work_of_adhesion/adhesion_range"
+                )
+            found = gamma / real("adhesion_range", adhesion_range, ADHESION_RANGE)
+        object.__setattr__(self, "strength", found if gamma > 0 else math.inf)
 
     def _check_open(self) -> None:
         """Refuse a work of adhesion on opening that is the smaller one, or beside a strength."""

@@ -110,6 +110,12 @@ class Profile(ByValue):
     References
     ----------
     docs/theory.md, "2. Profiles"; moments after Nayak, J. Lubr. Technol. 93, 398 (1971)
+
+    Examples
+    --------
+    >>> from adhesis import Profile
+    >>> round(Profile(1e-3, [0, 0.5e-6]).h_max, 12)  # one wave, of an amplitude of 1 µm
+    1e-06
     """
 
     period: float
@@ -411,6 +417,13 @@ def self_affine_profile(
     ----------
     docs/theory.md, "2. Profiles"; Carbone, Pierro, Recchia, Phys. Rev. E 92, 062404 (2015),
     arXiv 1511.08891
+
+    Examples
+    --------
+    >>> from adhesis import self_affine_profile
+    >>> profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=16, seed=1, h_rms=1e-6)
+    >>> round(profile.h_rms, 12), profile.highest_harmonic
+    (1e-06, 64)
     """
     hurst, period = real("hurst", hurst, HURST), real("period", period, LENGTH)
     n0, ratio = whole("n0", n0, HARMONIC), whole("ratio", ratio, HARMONIC)
@@ -469,6 +482,14 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     References
     ----------
     docs/theory.md, "2. Profiles"
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from adhesis import profile_from_heights
+    >>> profile = profile_from_heights(1e-6 * np.array([2, 3, -1, 0]), period=1e-3)
+    >>> (1e6 * profile.heights(8)[::2]).round(9)  # the same but for their mean
+    array([ 1.,  2., -2., -1.])
     """
     check_index("heights", heights)
     h = finite_row("heights", heights, entry="height")
@@ -502,6 +523,13 @@ def single_wave(amplitude: float, period: float) -> Profile:
     References
     ----------
     docs/theory.md, "2. Profiles"
+
+    Examples
+    --------
+    >>> from adhesis import single_wave
+    >>> wave = single_wave(amplitude=1e-6, period=1e-3)
+    >>> round(wave.h_max / wave.h_rms, 9)  # that of a sine is the root of 2
+    1.414213562
     """
     amplitude = real("amplitude", amplitude, FINITE)
     return Profile(period, np.array([0.0, amplitude / 2], dtype=np.complex128))

@@ -19,7 +19,6 @@ their faces.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -28,11 +27,7 @@ from scipy.optimize import brentq
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.references.full_contact import full_contact_stress
 
-
-@cache
-def _gauss() -> tuple[Array, Array]:
-    """Return Gauss-Legendre nodes and weights for the integrals over φ."""
-    return legendre.leggauss(200)
+_NODES, _WEIGHTS = legendre.leggauss(200)  # of the integrals over φ
 
 
 @dataclass(frozen=True)
@@ -98,15 +93,13 @@ class LastGap:
 
     def _nodes(self, b: float) -> tuple[Array, Array]:
         """Return Gauss nodes φ from 0 to π/2, and their positions x inside the gap."""
-        nodes, _ = _gauss()
-        angle = np.pi / 4 * (nodes + 1)
+        angle = np.pi / 4 * (_NODES + 1)
         inside = np.arcsin(np.sin(self._beta(b)) * np.sin(angle))
         return angle, np.asarray(inside * self.profile.period / np.pi)
 
     def _mean(self, values: Array) -> float:
         """Average over φ: (2/π) ∫_0^{π/2} … dφ."""
-        _, weights = _gauss()
-        return float(values @ weights) / 2
+        return float(values @ _WEIGHTS) / 2
 
     def _full(self, x: Array) -> Array:
         """Compute the tension of full contact without a mean stress."""

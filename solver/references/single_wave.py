@@ -265,11 +265,6 @@ class SingleWave:
         """a_out in m, at the end of the branch on unloading (ds/da = 0); 0 without adhesion."""
         return self.stable_range(np.inf)[0]
 
-    @cached_property
-    def touch_half_width(self) -> float:
-        """a_in in m, the half-width on the stable branch at s = A; 0 without adhesion."""
-        return self.half_width(self.amplitude)
-
     def half_width(self, s: float) -> float:
         """Compute the half-width a in m of the stable state at separation s in m.
 

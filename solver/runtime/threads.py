@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache, wraps
 from threading import Lock, RLock
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 
@@ -39,9 +39,7 @@ def one_at_a_time(function: F) -> F:
         with self.in_use:
             return function(self, *args, **options)
 
-    decorated: Any = waiting
-    result: F = decorated
-    return result
+    return cast(F, waiting)
 
 
 @contextmanager

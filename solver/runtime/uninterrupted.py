@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -88,6 +88,4 @@ def uninterrupted(function: F) -> F:
             raise error
         return result
 
-    decorated: Any = guarded
-    result: F = decorated
-    return result
+    return cast(F, guarded)

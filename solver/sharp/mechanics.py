@@ -190,23 +190,13 @@ class EdgeMechanics:
         self._finer: tuple[Point, Field] | None = None
         self.forget()
 
-    @property
-    def pins(self) -> bool:
-        """Whether edges are pinned, as works of adhesion differ."""
-        return self.adhesion.pins
-
     def law_at(self, memory: Array) -> EdgeLaw:
         """Return the law of edges that were at ``memory`` in the state before."""
-        if not self.pins:
+        if not self.adhesion.pins:
             return self.law
         law = EdgeLaw(self.law)
         law.memory = memory
         return law
-
-    @property
-    def largest_opening(self) -> float:
-        """Largest critical opening of an edge, on a flat piece."""
-        return float(self.critical * np.sqrt(self.adhesion.largest))
 
     @property
     def is_fixed(self) -> bool:
@@ -350,5 +340,5 @@ class EdgeMechanics:
         field = GapField(
             self.source, gaps, prescribed, lambda: found.solve_field(prescribed, self.model), nearly
         )
-        pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.pins else None
+        pinned = PinnedEdges(found.pinned_share, found.pinned_rate) if self.adhesion.pins else None
         return Point(prescribed, field, found.rate, found.slope, pinned=pinned)

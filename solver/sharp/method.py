@@ -226,7 +226,7 @@ class SharpMethod(Method):
                 f"load steps{self.problem.or_other_method} may get past it"
             ) from failed
         states = history.states
-        if self.edges.pins:
+        if self.edges.adhesion.pins:
             states = self.states.with_friction(state, states)
         return Path(tuple(states), tuple(history.jumps), self._error(history))
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import copy
-import doctest
 import html
 import io
 import json
@@ -29,7 +28,6 @@ from adhesis import (
     LoopResult,
     PathResult,
     Problem,
-    _campaign,
     run_loop,
     run_loops,
     run_path,
@@ -37,15 +35,12 @@ from adhesis import (
     single_wave,
 )
 from adhesis.ensemble.aggregate.status import as_text, read_status
-from adhesis.ensemble.loop import saved
 from adhesis.ensemble.quantities import with_error
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.results.schema import DONE
 from adhesis.ensemble.trace.prepare import prepare_trace
-from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
-from adhesis.solver import checks, views
-from adhesis.solver.loading import loop_result
+from adhesis.solver import checks
 from tests.support.campaign_support import campaign_text
 from tests.support.exact_wave import ExactWave
 from tests.support.wrong_values import FloatWithUnit, WithUnit
@@ -453,17 +448,6 @@ def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
     other = adhesis.Campaign(campaign.text.replace("young = 1000000.0", "young = 2e6"))
     with pytest.raises(InputError, match="young"):
         other.run(tmp_path / "2.h5", ranks=2)
-
-
-@pytest.mark.parametrize(
-    "module",
-    [_campaign, saved, views, measured_trace, loop_result],
-    ids=lambda module: module.__name__,
-)
-def test_the_examples_of_the_docstrings_are_right(module):
-    done = doctest.testmod(module)
-    assert done.failed == 0
-    assert done.attempted >= 3
 
 
 def test_a_loop_is_drawn_into_axes_that_are_given():

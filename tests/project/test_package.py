@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import doctest
 import inspect
 import pkgutil
 import re
@@ -68,6 +69,26 @@ def test_the_public_names_are_those_of_the_reference() -> None:
 def test_the_reference_names_what_there_is() -> None:
     names = re.findall(r"auto\w+:: (.+)$", REFERENCE, re.MULTILINE)
     assert len([pkgutil.resolve_name(name) for name in names]) > len(PUBLIC)
+
+
+RETURNED = {"ContactState", "Fields", "Jump", "LoopState", "MinorLoop", "Opening", "PathResult"}
+"""Results, which a user gets from what has an example."""
+SUBCLASSED = {"Method", "Path"}
+"""For methods of one's own."""
+RAISED = {"InputError", "PathError"}
+
+
+def test_what_is_public_has_an_example_and_all_examples_are_right() -> None:
+    """Also those of methods, inherited ones included."""
+    public = {name: getattr(adhesis, name) for name in [*adhesis.__all__, *BESIDE]}
+    found = {name: doctest.DocTestFinder(recurse=False).find(each) for name, each in public.items()}
+    without = {name for name, own in found.items() if not any(test.examples for test in own)}
+    assert without == RETURNED | SUBCLASSED | RAISED
+    owners = {owner for each in public.values() for owner in getattr(each, "__mro__", (each,))}
+    modules = {owner.__module__ for owner in owners if owner.__module__.startswith("adhesis.")}
+    assert {"adhesis.solver.views", "adhesis.solver.loading.loop"} < modules
+    wrong = [name for name in sorted(modules) if doctest.testmod(sys.modules[name]).failed]
+    assert wrong == []
 
 
 def test_type_checkers_see_the_modules_that_the_running_program_loads() -> None:

@@ -258,7 +258,7 @@ def test_a_narrow_patch_first_comes_to_rest_near_the_half_width_without_load(alp
     w = wave(alpha)
     curvature = A * (2 * np.pi / PERIOD) ** 2
     b = (32 * w.work_of_adhesion / (np.pi * MODULUS * curvature**2)) ** (1 / 3)
-    assert 0.85 < w.touch_half_width / b < 0.96
+    assert 0.85 < w.loop.touch_half_width / b < 0.96
     assert parabola_load(b, 1 / curvature, MODULUS, w.work_of_adhesion) == pytest.approx(
         0, abs=1e-9
     )

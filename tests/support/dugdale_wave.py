@@ -69,7 +69,7 @@ class DugdaleWave:
     def loss(self) -> float:
         """Loss of one loop at fixed separation, J/m² of nominal area; 0 without hysteresis."""
         wave, touch = self.wave, self.wave.amplitude + self.range_
-        low, high = 0.1 * wave.fold_half_width, wave.touch_half_width
+        low, high = 0.1 * wave.fold_half_width, wave.loop.touch_half_width
         fold = minimize_scalar(
             lambda a: -self.state(a)[0],
             bounds=(low, high),

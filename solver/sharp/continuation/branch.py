@@ -255,7 +255,7 @@ class StableBranch:
         With two works of adhesion it is pinned where it turns; what it goes back in a step counts
         up to the error of the field. An edge that is pinned where the step began turned midway.
         """
-        if not self._edges.pins:
+        if not self._edges.adhesion.pins:
             return 1.0
         motion = signs_of(len(reached.gaps)) * (reached.gaps - self.point.gaps).ravel()
         start, end = step * self.point.rate, step * reached.rate

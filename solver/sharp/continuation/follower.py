@@ -67,7 +67,7 @@ class Follower:
         d, point
             d reached and the stable point there, None if no contact is left.
         """
-        if self.edges.pins and self._came_on not in (None, target.direction):
+        if self.edges.adhesion.pins and self._came_on not in (None, target.direction):
             # where a path turns back all its edges are pinned at first
             turned = self.edges.equilibrium(point.gaps, point.d, self.edges.newton_tolerance)
             point = point.with_previous(None) if turned is None else turned
@@ -310,8 +310,9 @@ class Follower:
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
-            # edges that are pinned keep their places
-            gaps = saddle.gaps if self.edges.pins else self.edges.symmetry.symmetrised(saddle.gaps)
+            gaps = saddle.gaps
+            if not self.edges.adhesion.pins:  # edges that are pinned keep their places
+                gaps = self.edges.symmetry.symmetrised(gaps)
             ways = self.jumps.descents.ways_off_saddle(
                 gaps, fold.d, self.edges.law_at(point.gaps), at_fold=True
             )

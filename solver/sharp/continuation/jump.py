@@ -202,10 +202,13 @@ class Jumps:
         return abs(ends[1] - ends[0]) / self.states.period
 
     def _after(self, before: ContactState, point: Point | None, d: float) -> ContactState:
-        """State that a descent led to."""
-        if point is None:
-            return self.states.detached_after(before, d)
-        return self.states.of_point(point)
+        """State that a descent led to.
+
+        Under a load the loop is closed where contact is lost (``model.control``).
+        """
+        if point is not None:
+            return self.states.of_point(point)
+        return self.states.detached(before.separation * self.states.q0 if self.edges.is_load else d)
 
     def _end_of(self, point: Point | None, d: float, equal_speeds: bool = False) -> Point | None:
         """Go on from a minimum at ``d`` until nothing touches."""

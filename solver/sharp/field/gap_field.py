@@ -119,17 +119,7 @@ class GapField:
     @property
     def nearly(self) -> tuple[float, float]:
         """2p̄/E* and q0 s to the accuracy of an equilibrium."""
-        return self._nearly or (self.pressure, self.separation)
-
-    @property
-    def pressure(self) -> float:
-        """2p̄/E*."""
-        return self.solution.pressure
-
-    @property
-    def separation(self) -> float:
-        """Separation q0 s."""
-        return self.solution.separation
+        return self._nearly or (self.solution.pressure, self.solution.separation)
 
     @property
     def edge_opening(self) -> Array:

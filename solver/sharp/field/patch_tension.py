@@ -36,7 +36,7 @@ class RefinedTension:
     def __init__(self, field: GapField, openings: list[GapOpening] | None = None) -> None:
         if openings is None:
             openings = [field.fine_opening(k) for k in range(len(field.gaps))]
-        self._source, self._pressure = field.source, field.pressure
+        self._source, self._pressure = field.source, field.solution.pressure
         theta = np.concatenate([opening.theta for opening in openings])
         self._sine, self._cosine = np.sin(0.5 * theta), np.cos(0.5 * theta)
         self._source_weight = np.concatenate([o.opening * o.weight for o in openings])
@@ -131,7 +131,7 @@ class InnerTension:
         relief = np.fft.rfft(opening)
         relief *= self._harmonic
         relief += self._full
-        tension = -(np.fft.irfft(relief, n) + field.pressure)
+        tension = -(np.fft.irfft(relief, n) + field.solution.pressure)
         for nodes in free:
             tension[nodes] = np.nan
         return tension

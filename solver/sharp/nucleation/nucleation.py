@@ -127,9 +127,10 @@ class Nucleation:
         self.range = problem.attraction_range * problem.profile.q0
         self.healed: list[tuple[float, float]] = []
         self.heals, self.healed_at = 0, math.nan
+        largest_opening = edges.critical * np.sqrt(edges.adhesion.largest)  # on a flat piece
         self._lengths = SearchLengths(
             wave=float(edges.wave),
-            closing_per_motion=float(edges.largest_opening / np.sqrt(edges.wave)),
+            closing_per_motion=float(largest_opening / np.sqrt(edges.wave)),
             surface=edges.surface,
             narrowest=self.edges.narrowest,
             longest_step=float(edges.longest_step),

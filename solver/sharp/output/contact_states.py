@@ -89,13 +89,6 @@ class States:
         touch = self.problem.profile.h_max * self.q0 if touch is None else touch
         return not self.problem.control.is_load and d < touch * (1 - 1e-12)
 
-    def detached_after(self, before: ContactState, d: float) -> ContactState:
-        """Make the state after ``before`` has lost contact at ``d``.
-
-        Under a load the loop is closed at the separation of the loss (``model.control``).
-        """
-        return self.detached(before.separation * self.q0 if self.problem.control.is_load else d)
-
     def of_point(
         self,
         point: Point,
