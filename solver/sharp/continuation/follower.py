@@ -273,7 +273,10 @@ class Follower:
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = jump.misplaced + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
-            misplaced += self._early_closure_error(before, point, fold.late)
+            # The loop is closed at the separation of the last state (``model.control``). s goes like a
+            # square root of the distance from the fold: it lies 2 ds/dd times that further on.
+            further = 2 * abs(point.slope) * fold.late / self.states.q0
+            misplaced += abs(before.mean_stress) * further
         return replace(jump, states=states + jump.states, misplaced=misplaced)
 
     def _orders_of_folds(self, fold: Fold) -> EventOrders | None:
@@ -326,15 +329,6 @@ class Follower:
         motion = np.zeros(gaps.size)
         motion[edge] = math.copysign(longest[edge], length)
         return move_edges(gaps, motion)
-
-    def _early_closure_error(self, before: ContactState, point: Point, way: float) -> float:
-        """Bound the work in J/m² that a loop under a load misses, as it is closed before the fold.
-
-        It is closed at the separation of the last state (``model.control``), a ``way`` in d or less
-        before the fold. There s goes like a square root of the distance from the fold, which
-        therefore lies 2 ds/dd times that distance further on.
-        """
-        return abs(before.mean_stress) * 2 * abs(point.slope) * way / self.states.q0
 
     def _is_near(self, point: Point, after: Point | None) -> bool:
         """Whether no edge left the reach of Newton's iteration in a descent."""
