@@ -273,8 +273,8 @@ class Follower:
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
         misplaced = jump.misplaced + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
-            # The loop is closed at the separation of the last state (``model.control``). s goes like a
-            # square root of the distance from the fold: it lies 2 ds/dd times that further on.
+            # The loop is closed at the separation of the last state (``model.control``). There s
+            # goes like a square root of the distance from the fold, 2 ds/dd times that further on.
             further = 2 * abs(point.slope) * fold.late / self.states.q0
             misplaced += abs(before.mean_stress) * further
         return replace(jump, states=states + jump.states, misplaced=misplaced)
