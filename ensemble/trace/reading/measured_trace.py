@@ -560,8 +560,8 @@ def _raster(x: Array) -> tuple[int, int] | None:
     again = np.flatnonzero((x[1:] == x[:1]) & (x[:-1] != x[:1])) + 1
     points = int(again[0]) if again.size else max(x.size, 1)
     count, rest = divmod(x.size, points)
-    rises = np.diff(x[:points])
-    is_raster = count > 1 and not rest and (np.all(rises > 0) or np.all(rises < 0))
+    rises = np.sign(np.diff(x[:points]))
+    is_raster = count > 1 and not rest and abs(rises.sum()) == points - 1 >= _NO_CHANCE
     return (points, count) if is_raster and np.array_equal(x, np.tile(x[:points], count)) else None
 
 
