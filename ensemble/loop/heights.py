@@ -75,8 +75,7 @@ def read_heights(
     # No note says that the option overruled a line of the header, so it is refused as a name is;
     # metres are assumed in any case.
     found = replace(found, by_name=True, unclear="" if found.units[-1] == "m" else found.unclear)
-    size = heights.max(initial=-np.inf) - heights.min(initial=np.inf)
-    step = 1.0 if size <= HEIGHT.largest else None  # no height is an outlier; more are no metres
+    step = None if heights.size and np.ptp(heights) > HEIGHT.largest else 1.0  # all heights count
     of_heights = units_of_columns(f"{source}", found, unit, heights[None], step)[0][-1]
     return np.asarray(heights * LENGTH.units[of_heights])
 

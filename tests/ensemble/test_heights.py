@@ -145,6 +145,11 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
         {"unit": "nm"},
         "unit is nm for the heights, and the hea",
     ),
+    "line of the header against option": (
+        ["Unit: µm", *NM],
+        {"unit": "nm"},
+        "unit is nm for the heights, and the hea",
+    ),
     "one high asperity": (
         ["0.000"] * 400 + ["1.000"] * 2,
         {},

@@ -137,6 +137,10 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["Position (X),Height (Z)", *(f"{5e-7 * k:.7f},{z:.12f}" for k, z in enumerate(Z))],
         {},
     ),
+    "brackets beside units in lines": (
+        ["X-Unit: um", "Z-Unit: um", "Data (raw),Profile (Rz)", *TWO],
+        {},
+    ),
     "heights beside directions": (
         [f"{x},{k % 2},{z}" for k, (x, z) in enumerate(PAIRS)],
         {"columns": [3], **Z_UM},
@@ -159,6 +163,9 @@ def test_delimiters_of_whole_numbers_are_no_decimal_signs(tmp_path: Path) -> Non
     of_r = ['"x","z"', *(f'"{k}",{row}' for k, row in enumerate(rows, 1))]
     trace = read_trace(put(tmp_path / "t.csv", of_r), unit="nm", columns=[2, 3])
     np.testing.assert_allclose(trace.heights, Z, rtol=0, atol=5.1e-10)
+    of_map = ["Line 1, raw", *3 * [",".join(row.split(",")[1] for row in rows[:399])]]
+    line = read_trace(put(tmp_path / "t.csv", of_map), unit="nm", step=STEP, row=1)
+    assert np.array_equal(line.heights, trace.heights[:399])
     behind = ["x (nm),z (nm)", *(f"{row}," for row in rows)]
     assert np.array_equal(read_trace(put(tmp_path / "t.csv", behind)).heights, trace.heights)
 

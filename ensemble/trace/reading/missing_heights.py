@@ -59,8 +59,7 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
     # all others, even within the range.
     are_single = float(np.median(times)) == 1.0
     ends, rest = np.flatnonzero(~likely)[[0, -1]], values[~likely]
-    are_apart = apart[ends] > abs(rest[-2] - rest[1])
-    far[ends] |= are_single & repeated[ends] & are_apart
+    far[ends] |= are_single & repeated[ends] & (apart[ends] > abs(rest[-2] - rest[1]))
     far &= far.sum() <= _MOST_CODES
     repeated &= times > times[~likely & (values != 0)].max()
     codes = (known if known_alone else likely) & (away > _BEYOND_KNOWN * (high - low))

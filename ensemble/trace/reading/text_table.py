@@ -154,11 +154,10 @@ class _Reader:
     @cached_property
     def rows(self) -> dict[int, _Row]:
         """The rows by their lines, without words, comments, and lines of too many fields."""
-        found = ((place, self._row(place)) for place in range(len(self.lines)))
+        found = ((place, self._row(place, line)) for place, line in enumerate(self.lines))
         return {place: row for place, row in found if row is not None}
 
-    def _row(self, place: int) -> _Row | None:
-        line = self.lines[place]
+    def _row(self, place: int, line: str) -> _Row | None:
         plain = line.strip()
         # "***" may be a missing number, "#N/A" is one, and "###" rules a comment off
         is_comment = plain[:1] in COMMENT and not (is_missing(plain) and plain.strip("#"))
@@ -170,8 +169,7 @@ class _Reader:
         if not any(fields[:1]) and self.holds_names(place):
             return None
         values = [value(field, self.decimal) for field in fields]
-        # Of more than positions and heights one may mark rows; a map is longer.
-        if 2 < self.count < _LONG_ROW:
+        if 2 < self.count < _LONG_ROW:  # beside positions and heights one may mark rows
             values = [_MARKS.get(f.lower(), v) for f, v in zip(fields, values, strict=True)]
         numbers = [v for v in values if v is not None]
         if len(fields) > self.count or len(numbers) < len(fields):
