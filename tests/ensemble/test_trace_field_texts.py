@@ -102,6 +102,10 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"columns": [3], "row": 1, **Z_UM},
     ),
+    "a line of the heights of a raster that lacks its first one": (
+        [f"{XS[k]},{y},{ZS[k] if y + k else 'nan'}" for y in range(2) for k in range(N)],
+        {"columns": [3], "row": 1, **Z_UM},
+    ),
     "an option against a line that names no column": (
         ["Evaluation length in mm", *TWO],
         {"unit": "um"},
@@ -441,6 +445,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         ["x (um)", *(f"{z:.9f}" for z in Z)],
         {"step": STEP},
         r"is clear, with .\(um\)",
+    ),
+    "the heights alone of a raster that lacks its first one": (
+        [f"{x},{y},{z if (x, y) != (XS[0], 0) else 'nan'}" for y in range(3) for x, z in PAIRS],
+        {"columns": [3], **Z_UM},
+        "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
     ),
     "another row": (["\t".join(ZS)] * 3, {"row": 3}, "row is 3: .* has the rows 0 to 2"),
     "a map": (["\t".join(ZS)] * 3, {}, "has 400 columns: give columns X,Z, .* or row K, a row"),
