@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.quantities import LENGTH, length_text
+from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.header_units import HeaderUnits, units_of_header
 from adhesis.ensemble.trace.reading.measured_trace import load_array, units_of_columns
 from adhesis.ensemble.trace.reading.missing_heights import without_codes
@@ -75,7 +75,8 @@ def read_heights(
     # No note says that the option overruled a line of the header, so it is refused as a name is;
     # metres are assumed in any case.
     found = replace(found, by_name=True, unclear="" if found.units[-1] == "m" else found.unclear)
-    of_heights = units_of_columns(f"{source}", found, unit, heights[None], step=1.0)[0][-1]
+    step = None if heights.size and np.ptp(heights) > HEIGHT.largest else 1.0  # all heights count
+    of_heights = units_of_columns(f"{source}", found, unit, heights[None], step)[0][-1]
     return np.asarray(heights * LENGTH.units[of_heights])
 
 

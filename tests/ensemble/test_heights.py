@@ -145,6 +145,16 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
         {"unit": "nm"},
         "unit is nm for the heights, and the hea",
     ),
+    "line of the header against option": (
+        ["Unit: µm", *NM],
+        {"unit": "nm"},
+        "unit is nm for the heights, and the hea",
+    ),
+    "one high asperity": (
+        ["0.000"] * 400 + ["1.000"] * 2,
+        {},
+        "states no unit, and heights from 0 to 1 need not be metres",
+    ),
     "two units": (METRES, {"unit": "mm,um"}, "--unit is 'mm,um': with --heights it is one unit"),
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
     "nan": ([*METRES[:5], "nan", *METRES[5:]], {}, "has no finite height on line 6: --heights"),

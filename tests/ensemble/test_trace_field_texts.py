@@ -102,6 +102,10 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"columns": [3], "row": 1, **Z_UM},
     ),
+    "a line of the heights of a raster that lacks its first one": (
+        [f"{XS[k]},{y},{ZS[k] if y + k else 'nan'}" for y in range(2) for k in range(N)],
+        {"columns": [3], "row": 1, **Z_UM},
+    ),
     "an option against a line that names no column": (
         ["Evaluation length in mm", *TWO],
         {"unit": "um"},
@@ -133,6 +137,18 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         {"columns": [1, 2]},
     ),
     "a nought without decimals at the first place": (["x (um),z (um)", f"0,{ZS[0]}", *TWO[1:]], {}),
+    "names in brackets": (
+        ["Position (X),Height (Z)", *(f"{5e-7 * k:.7f},{z:.12f}" for k, z in enumerate(Z))],
+        {},
+    ),
+    "brackets beside units in lines": (
+        ["X-Unit: um", "Z-Unit: um", "Data (raw),Profile (Rz)", *TWO],
+        {},
+    ),
+    "heights beside directions": (
+        [f"{x},{k % 2},{z}" for k, (x, z) in enumerate(PAIRS)],
+        {"columns": [3], **Z_UM},
+    ),
     "page breaks": ([f"\f{z}" if k % 60 == 59 else z for k, z in enumerate(ZS)], Z_UM),
 }  # fmt: skip
 
@@ -144,6 +160,18 @@ def test_what_is_meant_is_read(kind: str, tmp_path: Path) -> None:
     assert trace.points == N
     assert trace.step == pytest.approx(STEP, rel=1e-9)
     np.testing.assert_allclose(trace.heights, Z, rtol=0, atol=1e-15)
+
+
+def test_delimiters_of_whole_numbers_are_no_decimal_signs(tmp_path: Path) -> None:
+    rows = [f"{500 * k},{1e3 * float(z):.0f}" for k, z in enumerate(ZS)]
+    of_r = ['"x","z"', *(f'"{k}",{row}' for k, row in enumerate(rows, 1))]
+    trace = read_trace(put(tmp_path / "t.csv", of_r), unit="nm", columns=[2, 3])
+    np.testing.assert_allclose(trace.heights, Z, rtol=0, atol=5.1e-10)
+    of_map = ["Line 1, raw", *3 * [",".join(row.split(",")[1] for row in rows[:399])]]
+    line = read_trace(put(tmp_path / "t.csv", of_map), unit="nm", step=STEP, row=1)
+    assert np.array_equal(line.heights, trace.heights[:399])
+    behind = ["x (nm),z (nm)", *(f"{row}," for row in rows)]
+    assert np.array_equal(read_trace(put(tmp_path / "t.csv", behind)).heights, trace.heights)
 
 
 def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
@@ -169,6 +197,7 @@ def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
         ({50: "-9.99", 200: "9.99"}, 2),
         ({50: "-3.2768", 51: "-3.2768", 200: "-3.2768"}, 3),
         ({50: "5.0", 51: "5.0", 52: "5.0", 200: "-5.0", 201: "-5.0", 202: "-5.0"}, 6),
+        (dict.fromkeys(range(50, 56), "-1.2"), 0),  # the floor of a groove
         ({50: "0.800", 51: "0.800", 52: "0.800"}, 0),  # the flat top of a grain
         ({50: "9.1", 51: "9.2", 52: "9.2", 53: "9.2", 54: "9.3"}, 0),  # one that is high
         ({k: f"{0.5 * np.sin(np.pi * k / 10):.6g}" for k in range(N)}, 0),  # 40 are 1e-16 or so
@@ -394,6 +423,31 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     ),
     "the heights alone of a raster": (
         [f"{x},{y},{z}" for y in range(3) for x, z in PAIRS],
+        {"columns": [3], **Z_UM},
+        "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
+    ),
+    "a word for a height": (
+        ["x (um),z (um),I", *(f"{x},{'NG' if x == '20.000' else z},5" for x, z in PAIRS)],
+        {"columns": [1, 2]},
+        "line 42 .*'20.000,NG,5': write NaN for a number that is missing, and no word",
+    ),
+    "words for heights of a map": (
+        [",".join(["0.1", "NG", *ZS])] * 3,
+        {"row": 1, **Z_UM},
+        "line 1 of .* has 'NG', which is no number",
+    ),
+    "a row without its position": (
+        ["x (nm);z (nm)", *(f"{500 * k};{1e3 * float(z):.0f}" for k, z in enumerate(ZS)), ";0"],
+        {},
+        "line 402 of .* has no position",
+    ),
+    "a lone column of positions": (
+        ["x (um)", *(f"{z:.9f}" for z in Z)],
+        {"step": STEP},
+        r"is clear, with .\(um\)",
+    ),
+    "the heights alone of a raster that lacks its first one": (
+        [f"{x},{y},{z if (x, y) != (XS[0], 0) else 'nan'}" for y in range(3) for x, z in PAIRS],
         {"columns": [3], **Z_UM},
         "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
     ),

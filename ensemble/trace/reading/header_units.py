@@ -76,8 +76,8 @@ _OTHER = re.compile(
     r"|m?rad|counts?|cts|a\.?u\.?|arb\.?( units)?|px|pixels?|%|ppm|dB|bits?|LSB|digits?|Ohm|Ω|1|-)"
     rf"|(?(1)[^)\]>}}]*|(?:{_WORD}))[/^][^)\]>}}]*)(?(1)\s*[)\]>}}])\s*"
 )
-# A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
-_POSSIBLE_UNIT = re.compile(r"[(\[<{]\s*[^\s\d)\]>}]{1,3}\s*[)\]>}]")
+# A word in brackets that may be a unit: "z [æm]" after a wrong conversion, but no "Height (Z)".
+_POSSIBLE_UNIT = re.compile(r"[(\[<{]\s*(?![a-z]\s*[)\]>}])[^\s\d)\]>}]{1,3}\s*[)\]>}]", re.I)
 _NUMBERED = re.compile(r"\b(channel|kanal|profile|profil|column|trace|line|scan) \d\b")
 _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
 # A label and a value name no column: "Unit:", "0.5 µm", "Tip radius 2 um", "Cut-off (mm): 0.8".
@@ -231,7 +231,7 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
     units = [next(iter(names)) if len(names) == 1 else None for names in known]
     alone = bool(fields) and len(fields[0]) == 1
     possible = _POSSIBLE_UNIT.search(" ".join(text for row in fields for text in row))
-    unclear = possible[0] if possible and not any(known) else ""
+    unclear = possible[0] if possible and not any(known[alone:]) else ""
     return HeaderUnits((units[1] if alone else units[0], units[1]), unclear=unclear)
 
 

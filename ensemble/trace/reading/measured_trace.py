@@ -372,10 +372,9 @@ def _table_of(
 
 
 def _columns_of(name: str, values: Array) -> Table:
-    values = np.atleast_1d(values)
     if values.ndim == 2 and 2 in values.shape:
         columns = values if values.shape[0] == 2 else values.T
-    elif values.ndim == 1 or 1 in values.shape:
+    elif values.ndim < 2 or 1 in values.shape:
         columns = values.reshape(1, -1)
     else:
         shape = " × ".join(map(str, values.shape))
@@ -401,7 +400,7 @@ def _from_table(
         columns, names, lines = _row_of_map(name, table, row, notes), (), None
         places = table.lines[: row + 1]
     else:
-        columns, names, lines = _chosen(name, table, wanted, notes)
+        columns, names, lines = _chosen(name, table, wanted, row, notes)
         columns, lines = _scan_line(name, table, columns, lines, row, notes)
         places = lines
     if len(columns) == 1:
@@ -470,7 +469,7 @@ def _from_table(
 
 
 def _chosen(
-    name: str, table: Table, wanted: Sequence[Any] | None, notes: list[str]
+    name: str, table: Table, wanted: Sequence[Any] | None, row: int | None, notes: list[str]
 ) -> tuple[Array, Sequence[Sequence[str]], Array]:
     """Return the columns of positions and heights, or of heights, their names, their lines."""
     picked, fields = list(table.filled), table.fields
@@ -497,7 +496,7 @@ def _chosen(
     there = np.flatnonzero(np.isfinite(columns).any(axis=0))
     if len(columns) == 2:
         kept = there
-    elif wanted is not None and there.size:
+    elif wanted is not None and row is None and there.size:
         kept = kept[there[0] : there[-1] + 1]
     if wanted is not None:
         marked, about = invalid_rows(table.columns, fields, picked)
@@ -531,14 +530,14 @@ def _scan_line(
 
     Beside heights alone they may stand in any other column.
     """
-    columns_of_positions = columns[:1]
-    if len(columns) == 1:
-        others = table.columns[list(table.filled)][:, np.isin(table.lines, lines)]
-        columns_of_positions = others[(others != columns).any(axis=1)]
+    columns_of_positions, places = columns[:1], lines
+    if len(columns) == 1:  # heights may be missing in the first place or the last
+        others, places = table.columns[list(table.filled)], table.lines
+        columns_of_positions = others[(others[:, np.isin(places, lines)] != columns).any(axis=1)]
     points, count = next(filter(None, map(_raster, columns_of_positions)), (0, 0))
     if row is None and count:
         raise InputError(
-            f"the positions of {name} begin anew on line {lines[points]}: it is a raster of "
+            f"the positions of {name} begin anew on line {places[points]}: it is a raster of "
             f"{count} lines of {points} points, of which {parameter('row')} K takes one, 0 to "
             f"{count - 1}"
         )
@@ -560,8 +559,8 @@ def _raster(x: Array) -> tuple[int, int] | None:
     again = np.flatnonzero((x[1:] == x[:1]) & (x[:-1] != x[:1])) + 1
     points = int(again[0]) if again.size else max(x.size, 1)
     count, rest = divmod(x.size, points)
-    rises = np.diff(x[:points])
-    is_raster = count > 1 and not rest and (np.all(rises > 0) or np.all(rises < 0))
+    rises = np.sign(np.diff(x[:points]))
+    is_raster = count > 1 and not rest and abs(rises.sum()) == points - 1 >= _NO_CHANCE
     return (points, count) if is_raster and np.array_equal(x, np.tile(x[:points], count)) else None
 
 

@@ -54,13 +54,12 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
     apart = np.minimum(np.diff(values, prepend=-np.inf), np.diff(values, append=np.inf))
     far = (away > _BEYOND * (high - low)) & (apart > _BEYOND_KNOWN * (high - low))
     far &= repeated | nines | on_both_sides
-    # Where hardly a height occurs twice, a number at the end of the range that does stands for no
-    # height if it is apart from all others; so do noughts and nines, more often than all others,
-    # even within the range.
+    # Where hardly a height occurs twice, a number that does stands for no height if all others lie
+    # within a smaller range than it is apart from them; so do noughts and nines, more often than
+    # all others, even within the range.
     are_single = float(np.median(times)) == 1.0
     ends, rest = np.flatnonzero(~likely)[[0, -1]], values[~likely]
-    are_apart = apart[ends] > _BEYOND_KNOWN * abs(rest[-2] - rest[1])
-    far[ends] |= are_single & repeated[ends] & are_apart
+    far[ends] |= are_single & repeated[ends] & (apart[ends] > abs(rest[-2] - rest[1]))
     far &= far.sum() <= _MOST_CODES
     repeated &= times > times[~likely & (values != 0)].max()
     codes = (known if known_alone else likely) & (away > _BEYOND_KNOWN * (high - low))

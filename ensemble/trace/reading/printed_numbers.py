@@ -150,12 +150,12 @@ def find_form(
     if most and others and best[0] in ", ":
         return _one_comma(sample) or _refuse_two_ways(source, sample[0])
     # A name stands above each of the numbers; "x, mm, z, um" names two.
-    fields, count = split(names, ","), len(split(sample[0], ","))
-    is_named = len(fields) == count and not LENGTH.spellings.keys() & set(fields)
-    is_doubtful = decimal is None and best[0] == "," and not is_named
-    # Fewer names than numbers, none of which has a point
-    has_few_names = 1 < len(fields) < count and "." not in "".join(sample)
-    if is_doubtful and (has_few_names or all(map(_PAIRS.fullmatch, sample))):
+    fields, numbers = (split(line.rstrip(" ,\r\n"), ",") for line in (names, sample[0]))
+    is_named = len(fields) == len(numbers) and not LENGTH.spellings.keys() & set(fields)
+    is_doubtful = decimal is None and best[0] == "," and not (is_named or is_quoted)
+    # Fewer names than whole numbers, and enough for decimal ones
+    is_short = 1 < len(fields) < len(numbers) <= 2 * len(fields) and "." not in "".join(sample)
+    if is_doubtful and (is_short or all(map(_PAIRS.fullmatch, sample))):
         _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
 

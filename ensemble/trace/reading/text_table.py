@@ -154,10 +154,10 @@ class _Reader:
     @cached_property
     def rows(self) -> dict[int, _Row]:
         """The rows by their lines, without words, comments, and lines of too many fields."""
-        found = ((place, self._row(line)) for place, line in enumerate(self.lines))
+        found = ((place, self._row(place, line)) for place, line in enumerate(self.lines))
         return {place: row for place, row in found if row is not None}
 
-    def _row(self, line: str) -> _Row | None:
+    def _row(self, place: int, line: str) -> _Row | None:
         plain = line.strip()
         # "***" may be a missing number, "#N/A" is one, and "###" rules a comment off
         is_comment = plain[:1] in COMMENT and not (is_missing(plain) and plain.strip("#"))
@@ -166,10 +166,10 @@ class _Reader:
         fields = [plain] if is_missing(plain) else split(line, self.delimiter)
         while len(fields) > self.count and not fields[-1]:
             fields.pop()
-        if _are_names(fields):
+        if not any(fields[:1]) and self.holds_names(place):
             return None
         values = [value(field, self.decimal) for field in fields]
-        if self.count > 2:  # of more than positions and heights one may mark rows
+        if 2 < self.count < _LONG_ROW:  # beside positions and heights one may mark rows
             values = [_MARKS.get(f.lower(), v) for f, v in zip(fields, values, strict=True)]
         numbers = [v for v in values if v is not None]
         if len(fields) > self.count or len(numbers) < len(fields):
@@ -198,20 +198,21 @@ class _Reader:
         if place in self.rows:
             return adjoins or self.is_whole(place)
         line = self.lines[place].strip()
-        if not line or line[0] in COMMENT or _are_names(split(line, self.delimiter)):
+        if not line or line[0] in COMMENT or self.holds_names(place):
             return False
         return adjoins and (_DIGIT.match(line) is not None or is_without_words(line))
+
+    def holds_names(self, place: int) -> bool:
+        """Return whether pandas names the columns beside an index so: ",0,1" above row 0."""
+        fields, *below = (split(line, self.delimiter) for line in self.lines[place : place + 2])
+        is_named = fields == ["", *map(str, range(len(fields) - 1))] != [""]
+        return is_named and any(row[:1] == ["0"] for row in below)
 
     def refuse(self, place: int, sentence: str) -> NoReturn:
         """Raise InputError about a line."""
         raise InputError(
             f"line {place + 1} of {self.source} is {shown_line(self.lines[place])}{sentence}"
         )
-
-
-def _are_names(fields: list[str]) -> bool:
-    """Return whether pandas names the columns beside an index so: ",0,1"."""
-    return fields[:1] == [""] and fields[1:] == [str(k) for k in range(len(fields) - 1)] != []
 
 
 def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
@@ -241,6 +242,9 @@ def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str
         refuse_thousands(source, columns, decimal)
     for k, column in zip(filled, columns, strict=True):
         numbers = [row.values[k] for row in rows]
+        words = [n for n, field in enumerate(column) if field.lower() in _MARKS]
+        if words and not all(f.lower() in _MARKS or is_missing(f) for f in column):
+            reader.refuse(places[words[0]], ": write NaN for a number that is missing, and no word")
         _refuse_odd_ends(source, column, numbers, places, str(k), is_lone=len(filled) == 1)
         if len(filled) == 1:
             _refuse_dashes(reader, column, places)
