@@ -195,7 +195,7 @@ class _Session:
         (InputError, WriteError).
         """
         summary, batches = self._counts, self.plan.batches
-        if self.plan.rows and not stopped:
+        if self.plan.rows and not summary.pending:
             with Results(path) as results:
                 held = int(np.isin(results.status(), (DONE, FAILED)).sum())
             if held < (finished := summary.done + summary.failed):
