@@ -73,9 +73,9 @@ def run_campaign(
     progress goes to ``stream``, or stderr.
 
     InputError on every rank, before any work, if the campaign cannot be computed or the file is
-    foreign, damaged, of another campaign, in use or not writable. Unresponsive on rank 0, if a
-    worker does not answer; the results file is sound. The other ranks wait: the caller has to end
-    the job.
+    foreign, damaged, of another campaign, in use or not writable; at the end, if it was damaged
+    meanwhile. Unresponsive on rank 0, if a worker does not answer; the results file is sound. The
+    other ranks wait: the caller has to end the job.
     """
     options, engine = options or Options(), engine or Engine()
     path = target_of(path)
