@@ -73,17 +73,15 @@ def run_campaign(
     progress goes to ``stream``, or stderr.
 
     InputError on every rank, before any work, if the campaign cannot be computed or the file is
-    foreign, damaged, of another campaign, in use or not writable. Unresponsive on rank 0, if a
-    worker does not answer; the results file is sound. The other ranks wait: the caller has to end
-    the job.
+    foreign, damaged, of another campaign, in use or not writable; at the end, if it was damaged
+    meanwhile. Unresponsive on rank 0, if a worker does not answer; the results file is sound. The
+    other ranks wait: the caller has to end the job.
     """
     options, engine = options or Options(), engine or Engine()
     path = target_of(path)
     comm = comm or OneRank()
     size = max(comm.size, 1 + options.processes)
-    lock = RunLock(path)
-    with ExitStack() as stack, StopSignals() as signals:
-        stack.push(lock)
+    with RunLock(path) as lock, StopSignals() as signals:
         try:
             plan = together(
                 comm, lambda: prepare(campaign, path, lock, size, options, say, engine.check)
@@ -101,12 +99,14 @@ def run_campaign(
         own_rows = comm.size > 1 and engine.all_write
         if own_rows and comm.rank > 0:
             lock.join()
-        writer = None
-        if own_rows or comm.rank == 0:
-            all_of_them = comm if own_rows else None
-            writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
-        session = _Session(campaign, plan, writer, options, signals, engine, stream)
-        stopped = session.run(comm, own_rows)
+        with ExitStack() as stack:
+            writer = None
+            if own_rows or comm.rank == 0:
+                all_of_them = comm if own_rows else None
+                writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
+            session = _Session(campaign, plan, writer, options, signals, engine, stream)
+            stopped = session.run(comm, own_rows)
+        # The file is closed: a rank that ends by an error with it open would wait for the others.
         return together(comm, lambda: session.summary(stopped, path))
 
 
@@ -195,7 +195,7 @@ class _Session:
         (InputError, WriteError).
         """
         summary, batches = self._counts, self.plan.batches
-        if self.plan.rows and not stopped:
+        if self.plan.rows and not summary.pending:
             with Results(path) as results:
                 held = int(np.isin(results.status(), (DONE, FAILED)).sum())
             if held < (finished := summary.done + summary.failed):

@@ -274,6 +274,25 @@ def test_an_error_under_mpirun_is_one_sentence(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["c.toml"]
 
 
+@pytest.mark.parametrize(
+    ("code", "sentence"), [(2, "or it is damaged"), (74, "of 8 finished tasks: another program")]
+)
+def test_ranks_whose_file_was_copied_over_end_with_one_sentence(tmp_path, code, sentence):
+    """By zeros, or by an older copy; no rank goes to the end of MPI with the file open."""
+    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
+    process = start("run", path, "--out", out, ranks=3, fake=f"hold=1 free={free}")
+    wait_until(lambda: out.exists())
+    copy = out.read_bytes() if code == 74 else bytes(out.stat().st_size)
+    wait_until(lambda: done_rows(out) >= 2)
+    out.write_bytes(copy)
+    free.touch()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == code, errors
+    (line,) = (line for line in errors.splitlines() if line.startswith("adhesis run: "))
+    assert sentence in line
+    assert "Traceback" not in errors
+
+
 def test_a_run_that_starts_its_ranks_ends_with_one_sentence(tmp_path):
     bad = write_campaign(tmp_path, "bad.toml", hurst="[1.5]")
     process = adhesis("run", bad, "--out", tmp_path / "r.h5", "--ranks", "2")

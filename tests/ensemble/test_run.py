@@ -16,7 +16,7 @@ import xarray
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.run import session
@@ -338,6 +338,17 @@ def test_a_file_that_is_copied_over_meanwhile_is_no_finished_run(tmp_path, how):
     if code == 74:
         again = adhesis_here("run", path, "--out", out, fake="step=0")
         assert (again.returncode, done_rows(out)) == (0, 8)
+
+
+def test_what_is_asked_to_stop_at_its_last_task_reads_the_file_too(tmp_path):
+    campaign, out = load_campaign(write_campaign(tmp_path)), tmp_path / "r.h5"
+    create(out, campaign)
+    plan = Plan(campaign.tasks(), [7], 7, 0)
+    asked = session._Session(campaign, plan, None, Options(), StopSignals(), Engine())
+    assert asked.summary("SIGTERM received", out).stopped == "SIGTERM received"
+    asked._counts.done += 1
+    with pytest.raises(WriteError, match=r"holds 0 of 8 finished tasks: another program"):
+        asked.summary("SIGTERM received", out)
 
 
 def test_processes_of_another_mpi_are_reported_by_rank_0(tmp_path, monkeypatch):
