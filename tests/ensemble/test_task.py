@@ -14,7 +14,13 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.doubt import doubtful
-from adhesis.ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, field_plan, field_row
+from adhesis.ensemble.task.fields import (
+    GAP_EDGES,
+    HEIGHT_EDGES,
+    field_plan,
+    field_row,
+    field_scales,
+)
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
@@ -322,6 +328,16 @@ def test_the_spectral_density_holds_the_mean_square_and_the_slope_of_the_profile
     present = (plan.wave_number > 10 * profile.q0) & (plan.wave_number < 150 * profile.q0)
     slope = np.polyfit(np.log(plan.wave_number[present]), np.log(density[present]), 1)[0]
     assert slope == pytest.approx(-(2 * task.hurst + 1), abs=0.02)
+
+
+def test_positions_have_units_of_a_period_that_has_several_values_and_bins_are_of_the_task():
+    for period, units in (("1e-3", {"rad m-1", "m"}), ("[1e-3, 2e-3]", {"1"})):
+        scales = field_scales(field_plan(campaign_with(period=period)))
+        assert {s.unit for s in scales if s.name in ("wave_number", "field_position")} == units
+    campaign = campaign_with(ratio="[4, 40]")
+    low, high = (field_plan(campaign, task) for task in campaign.tasks().of_cells()[:2])
+    assert np.sum(low.filled) < np.sum(high.filled)
+    np.testing.assert_array_equal(low.harmonic_edges, high.harmonic_edges)
 
 
 def test_penetrations_move_to_load_steps():
