@@ -26,8 +26,7 @@ class Curve:
     longest_step: float = 0.05 * WAVE
     is_load: bool = False
     asked: int = 0
-    pins: bool = False
-    adhesion: ClassVar[Any] = SimpleNamespace(least=1.0, largest=1.0)
+    adhesion: ClassVar[Any] = SimpleNamespace(least=1.0, largest=1.0, pins=False)
 
     def point(self, d: float) -> Point:
         a = 0.5 + float(np.sqrt(d - FOLD))
