@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from adhesis.solver._kernels import SHAPE_NODES
 from adhesis.solver.method import Fields, Opening
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.sharp.field.gap_field import GapField
@@ -56,9 +57,7 @@ def openings_of(field: GapField, q0: float) -> list[Opening]:
     """Evaluate the opening of every gap in m, at points that are dense beside its edges."""
     out = []
     for k, (left, right) in enumerate(field.gaps):
-        modes = field.fine_opening(k).modes
-        along = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, _FINER * (modes.size + 1) + 1))
-        theta = left + (right - left) * along
-        inside = field.solution.sum_modes(k, theta[1:-1], modes)
-        out.append(Opening(theta / q0, np.concatenate([[0.0], inside, [0.0]]) / q0))
+        fine = field.fine_opening(k, _FINER * SHAPE_NODES)
+        theta = np.concatenate([[left], fine.theta, [right]])
+        out.append(Opening(theta / q0, np.concatenate([[0.0], fine.opening, [0.0]]) / q0))
     return out
