@@ -87,8 +87,9 @@ int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave) {
   const auto circle = circle_of(24);
   for (int i = 1; i < circle->count; ++i)
     widest = std::max(widest, theta_at(gap, circle->cosine[i]).stretch * circle->sine[i]);
-  const int waves = int(std::ceil(0.5 * per_wave * widest * top)) + FEWEST_SINE_NODES;
-  return fast_size(std::max(waves, modes));
+  const int waves = int(std::ceil(0.5 * per_wave * widest * top));
+  const int ends = int(FEWEST_SINE_NODES * std::max(1.0, per_wave / SHAPE_NODES));
+  return fast_size(std::max(waves + ends, modes));
 }
 
 FineOpening open_gap(const Field& field, int k, const Circle& circle) {
