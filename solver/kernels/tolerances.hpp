@@ -24,7 +24,8 @@ inline constexpr int MOST_CHARGES = 160;
 // Sine nodes per λ_min that bracket every local minimum of an opening.
 inline constexpr double SHAPE_NODES = 6.0;
 
-// Sine nodes of a gap beyond those by its length, for its ends.
+// Sine nodes of a gap beyond those by its length, for its ends; more where all are finer than those
+// of shapes.
 inline constexpr int FEWEST_SINE_NODES = 64;
 
 // ---------------------------------------------------------------- equilibrium of the edges

@@ -1,6 +1,6 @@
 """Compute stress, displacement and gap of sharp edges on equally spaced nodes.
 
-The gaps' openings are summed from their Chebyshev series at each node; the stress on the contact is
+The openings at the nodes are summed from Chebyshev series; the stress on the contact is
 that of ``patch_tension``.
 """
 
