@@ -18,7 +18,12 @@ _INTERVALS, _FINE = 60, 50  # of a band, and places between two points that are 
 
 
 def contact_against_stress(data: Aggregate) -> style.PublishedFigure:
-    """Fig. 6: A/A0 against σ~/sqrt(m2), one panel for each H, means over realisations."""
+    """Contact fraction against mean stress.
+
+    Means over realisations, taken at equal penetration; σ~ = 2p̄/(E* q0 h_max) with each
+    realisation's own h_max, compression positive. Shading: one standard deviation of A/A0 of a
+    single realisation.
+    """
     figure, rows = style.row_for_each_hurst(data, 1, 16, 46)
     for (axes,), hurst in rows:
         for k, cell in style.curves_of(data, hurst):
@@ -69,7 +74,11 @@ def _envelope(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
 
 
 def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
-    """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations."""
+    """Mean stress and contact fraction against penetration.
+
+    Lines: means over realisations; shading: one standard deviation of a single realisation. A
+    realisation that has detached counts with zero.
+    """
     figure, rows = style.row_for_each_hurst(data, 2, 13, 46, sharey="col")
     for row, hurst in rows:
         for axes, name in zip(row, ("mean_stress_dimensionless", "contact_fraction"), strict=True):

@@ -50,7 +50,11 @@ def loss_label(data: Aggregate, what: str = "loss") -> str:
 
 
 def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
-    """Table 1 as a figure: loss of each H with intervals and the paper's, a panel for each γ."""
+    """Loss of each H and work of adhesion.
+
+    Means with 95 % intervals, a panel for each γ. A caret at 0 marks an interval that goes on
+    below.
+    """
     shown, (name, label, unit) = style.shown_gammas(data), loss_quantity(data)
     columns = min(len(shown), _MOST_BESIDE)
     rows = -(-len(shown) // columns)
@@ -78,7 +82,11 @@ def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
 
 
 def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
-    """Loss against the mean square slope m2 with intervals, a panel for each γ."""
+    """Loss against mean square slope.
+
+    Means with 95 % intervals, a panel for each γ, a point for each H. A caret at 0 marks an
+    interval that goes on below.
+    """
     shown, (name, label, unit) = style.shown_gammas(data), loss_quantity(data)
     figure = style.new_figure(
         len(shown), 1, style.ONE_COLUMN, (20 + 33 * len(shown)) * style.MM, sharex=True
@@ -114,7 +122,13 @@ def _star_handle(data: Aggregate) -> list[Line2D]:
 
 
 def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
-    """Sum of the drops at small-scale and at large-scale jumps, for each (H, γ)."""
+    """Loss by mechanism.
+
+    Sum of the energy drops of one loop. Small scale: edges run inside existing patches; large
+    scale: patches appear, merge, split, open, vanish or pull off. Above the bars: share of the
+    small scale. Error bars: 95 % interval of the mean of either part. A caret at 0 marks an
+    interval that goes on below.
+    """
     gammas = style.spread_out(data.works_of_adhesion, style.MOST_CURVES)
     cells = data.finished(style.spread_out(data.hursts, style.MOST_PANELS), gammas)
     width = style.ONE_COLUMN if len(cells) <= _MOST_BARS else style.TWO_COLUMNS
@@ -155,7 +169,11 @@ def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
 
 
 def jump_energies(data: Aggregate) -> style.PublishedFigure:
-    """Jumps per loop and decade of energy drop: large scale left, small scale right."""
+    """Distribution of the energy drops.
+
+    Jumps of one loop per decade of energy drop, mean over realisations. Drops more than eight
+    decades below the largest are not shown. Shading: n jumps in a bin are known to sqrt(n).
+    """
     figure, rows = style.row_for_each_hurst(data, 2, 13, 44, sharey=True)
     occupied = _occupied(data)
     for row, hurst in rows:
@@ -190,7 +208,11 @@ def _jump_density(axes: Axes, cell: AveragedCell, small: bool, k: int, part: sli
 
 
 def pull_off(data: Aggregate) -> style.PublishedFigure:
-    """Largest mean tension on unloading against γ, for each H, with intervals."""
+    """Pull-off stress.
+
+    Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart a
+    little.
+    """
     figure = style.new_figure(1, 1, style.ONE_COLUMN, 62 * style.MM)
     axes = figure.panels[0]
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)
