@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.by_blocks import fitted_slope
 from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
@@ -196,23 +194,15 @@ def agreement(data: Aggregate) -> Iterator[str]:
     of_paper = paper.are_its_cells(shown.cells)
     if of_paper:
         yield from _table_1(shown)
-        yield from _slopes(shown)
     yield from _growth(data, of_paper)
     for axis in own_axes(data):
         yield from _along(data, axis)
     yield from _order_in_slope(shown, of_paper)
     yield from _unloading_exceeds_loading(data, of_paper)
-    yield from _spectrum(shown)
 
 
 def quality(data: Aggregate) -> Iterator[str]:
     """Sentences on the error of the losses, and on what the file's shape cut off."""
-    audit = _all(data, "audit_residual")
-    yield (
-        "Energy audit: loop integral and sum of the drops differ by "
-        f"{percent(_rms(audit))} of the loss (root mean square over loops), "
-        f"{percent(np.max(np.abs(audit)))} in the worst loop."
-    )
     if wrong := doubtful_loops(data.cells):
         rows = [f"row {c.rows[k]}, {c.name} ({percent(c.doubt[k])})" for c, k in wrong]
         yield (
@@ -314,18 +304,6 @@ def _table_1(data: Aggregate) -> Iterator[str]:
         f"here: W~ is off by {100 * min(found):+.1f} % to {100 * max(found):+.1f} %, root mean "
         f"square {100 * _rms(found):.1f} %{here if known else ''}."
     )
-
-
-def _slopes(data: Aggregate) -> Iterator[str]:
-    parts = []
-    for hurst in data.hursts:
-        quoted = paper.m2(hurst)
-        cells = data.finished([hurst], data.works_of_adhesion)
-        if quoted is not None and cells:
-            m2 = cells[0].estimates["m2"].mean
-            parts.append(f"{m2:.3g} against {quoted:.2g} at H = {hurst:g}")
-    if parts:
-        yield f"Mean square slope m2 here and in the paper: {', '.join(parts)}."
 
 
 def _growth(data: Aggregate, of_paper: bool) -> Iterator[str]:
@@ -431,38 +409,6 @@ def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> Iterator[str]
             f"{where} larger than on loading everywhere, by a factor of at least {min(ratios):.2f}"
             f"{rest if apart else ''}{'; the paper says the same' if of_paper else ''}."
         )
-
-
-def _spectrum(data: Aggregate) -> Iterator[str]:
-    """Fitted slope of the loading spectrum at the deepest penetration, against -(2+H)."""
-    parts = []
-    for hurst in data.hursts:
-        cell = typical_cell(data, hurst)
-        if cell is not None and cell.plan.penetration.size:
-            slope, error = fitted_slope(cell.plan, cell.fields.psd_displacement[0, -1])
-            if not np.isnan(slope):
-                fit = f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f}"
-                parts.append(f"{fit} at {cell.name}")
-    if parts:
-        depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
-        yield (
-            "Slope of the loading spectrum of the deformed surface at small wave numbers and "
-            f"{state_sign(data)} = {' or '.join(sorted(depths))}, fitted, against Persson's "
-            "-(2+H): "
-            f"{_listed(parts)}."
-        )
-
-
-def typical_cell(data: Aggregate, hurst: float | None = None) -> AveragedCell | None:
-    """The cell that stands for all: middle H (unless given) and middle γ that have results."""
-    hursts = [hurst] if hurst is not None else _from_middle(data.hursts)
-    places = product(hursts, _from_middle(data.works_of_adhesion))
-    return next((cell for h, gamma in places for cell in data.finished([h], [gamma])), None)
-
-
-def _from_middle(values: tuple[float, ...]) -> list[float]:
-    middle = (len(values) - 1) / 2
-    return [values[k] for k in sorted(range(len(values)), key=lambda k: abs(k - middle))]
 
 
 def area_ratio(cell: AveragedCell) -> float | None:

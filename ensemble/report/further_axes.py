@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import place
-from adhesis.ensemble.quantities import common_unit, gamma_text, with_unit
+from adhesis.ensemble.quantities import common_unit, gamma_text
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
@@ -39,15 +38,6 @@ def axis_label(axis: Axis) -> tuple[str, float]:
     unit, size = common_unit(axis.name, axis.values)
     label = _LABELS.get(axis.name, axis.name)
     return (f"{label} ({unit})" if unit else label), size
-
-
-def symbols(others: Sequence[tuple[str, float]]) -> str:
-    """Return :func:`place` for figures, with symbols where a name is no word: "$h_rms$ = 2 µm"."""
-    named = []
-    for name, value in others:
-        symbol = None if name.isalpha() else re.search(r"\$.*\$", _LABELS.get(name, ""))
-        named.append(f"{symbol[0] if symbol else name} = {with_unit(name, value)}")
-    return ", ".join(named)
 
 
 def gamma_label(work_of_adhesion: float) -> str:
@@ -122,10 +112,10 @@ def failed_cells(cells: Sequence[Cell]) -> list[Cell]:
 
 def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
     """Return lines to stand below a figure: what its cells have in common, and what is amiss."""
-    parts = [symbols(others)] if others else []
+    parts = [place(others)] if others else []
     if failed := failed_cells(cells):
         first = failed[0]
-        name = ", ".join(filter(None, (cell_label(first), symbols(first.others))))
+        name = ", ".join(filter(None, (cell_label(first), place(first.others))))
         more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
         parts.append(f"missing, as all tasks failed: {name}{more}")
     drawn = [cell for cell in cells if cell.done]

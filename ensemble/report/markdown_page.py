@@ -98,11 +98,10 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         "elastic energy, to be set beside γ. With intervals: `works.csv`.",
         "## Profiles",
         loss_tables.profiles(data).markdown(),
-        "## Accuracy and completeness",
-        _bullets(
-            *(sentence for sentence in findings.quality(data) if not sentence.startswith("WARNING"))
-        ),
     ]
+    rest = (text for text in findings.quality(data) if not text.startswith("WARNING"))
+    if accuracy := _bullets(*rest):
+        out += ["## Accuracy and completeness", accuracy]
     if data.failures:
         failed = (f"row {row}: {text}" for row, text in data.failures)
         out += ["### Failed tasks", _bullets(*failed)]

@@ -232,7 +232,7 @@ def test_units_are_those_in_which_the_campaign_was_written(tmp_path):
         r"$\gamma$ = 20 mJ/m²",
     ]
     assert plot.pull_off().axes[0].get_xlabel() == r"work of adhesion $\gamma$ (mJ/m²)"
-    assert plot.pull_off().get_supxlabel() == r"$h_\mathrm{rms}$ = 1 µm"
+    assert plot.pull_off().get_supxlabel() == "h_rms = 1 µm"
     heading, _, first, *_ = losses(aggregate(path)).markdown().splitlines()
     assert [cell.strip() for cell in heading.split("|")[2:4]] == ["γ (mJ/m²)", "h_rms (µm)"]
     assert [cell.strip() for cell in first.split("|")[2:4]] == ["10", "0.5"]
@@ -270,7 +270,7 @@ def test_a_mean_without_the_loops_that_failed_is_hollow(with_failures):
     assert figure.legends[0].get_texts()[-1].get_text() == "loops failed"
     assert " ".join(figure.get_supxlabel().split()) == (
         r"missing, as all tasks failed: H = 0.8, $\gamma$ = 0.04 J/m², ratio = 50, "
-        r"$h_\mathrm{rms}$ = 1 µm 1 of 9 loops failed, and are in no mean "
+        "h_rms = 1 µm 1 of 9 loops failed, and are in no mean "
         "n = 2 to 3 profiles, 95 % interval of the mean"
     )
     data = aggregate(with_failures)
@@ -285,7 +285,7 @@ def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, qui
     write_report(with_failures, tmp_path / "report", io.StringIO())
     notes = {name: figure.get_supxlabel() for name, figure in quick_figures.items()}
     for name in ("fig7_loop_against_penetration", "loss_by_mechanism", "jump_energies"):
-        assert notes[name] == r"ratio = 100, $h_\mathrm{rms}$ = 1 µm"
+        assert notes[name] == "ratio = 100, h_rms = 1 µm"
     assert "failed" in notes["loss_along_ratio"]
 
 

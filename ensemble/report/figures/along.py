@@ -7,6 +7,7 @@ import numpy as np
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
+from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.figures.loss_figures import errorbar, hollow_handle, loss_label
 from adhesis.ensemble.report.further_axes import (
@@ -15,7 +16,6 @@ from adhesis.ensemble.report.further_axes import (
     common,
     from_to,
     gamma_label,
-    symbols,
     together,
 )
 
@@ -122,6 +122,6 @@ def _lines(
         title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
         if second is not None:
             value = cell.at[second.name]
-            title, label = f"{title}, {label}", symbols([(second.name, value)])
+            title, label = f"{title}, {label}", place([(second.name, value)])
         lines.setdefault((title, label), []).append(cell)
     return [other for other in common(data.shown) if other[0] not in moving], lines

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.report.figures import style
@@ -14,7 +14,6 @@ from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
 _MARKERS_PER_CURVE = 8
-_INTERVALS, _FINE = 60, 50  # of a band, and places between two points that are sorted into them
 
 
 def contact_against_stress(data: Aggregate) -> style.PublishedFigure:
@@ -31,8 +30,7 @@ def contact_against_stress(data: Aggregate) -> style.PublishedFigure:
                 stress = cell.curves[f"{branch}_mean_stress_over_slope"].mean
                 area = cell.curves[f"{branch}_contact_fraction"]
                 if cell.done > 1:
-                    for band in _bands(stress, area.mean - area.std, area.mean + area.std):
-                        axes.fill_between(*band, color=style.colour(k), alpha=0.13, linewidth=0)
+                    _shade(axes, stress, area.mean - area.std, area.mean + area.std, k)
                 _plot(axes, stress, area.mean, cell, branch, k)
         style.label_panel(axes, f"H = {hurst:g}")
         axes.set_ylim(bottom=0)
@@ -41,36 +39,20 @@ def contact_against_stress(data: Aggregate) -> style.PublishedFigure:
     return figure
 
 
-def _bands(x: Array, low: Array, high: Array) -> list[tuple[Array, Array, Array]]:
-    """Return x, lower and upper end of the shading of a curve, before and after its least x.
-
-    The mean stress runs back and forth by small steps, where a band from point to point would cross
-    itself: it is the envelope in narrow intervals of x.
-    """
+def _shade(axes: Axes, x: Array, low: Array, high: Array, k: int) -> None:
+    """Shade between two curves, also where x runs back: all between each two points of both."""
     known = np.isfinite(x) & np.isfinite(low)  # loops end at several places
-    if not known.any():
-        return []
-    x, low, high = x[known], low[known], high[known]
-    turn = int(np.argmin(x))
-    return [
-        _envelope(x[part], low[part], high[part])
-        for part in (slice(0, turn + 1), slice(turn, x.size))
-        if np.ptp(x[part]) > 0
+    points = np.stack([x, low, high], axis=1)[known]
+    ends = np.stack([points[:-1], points[1:]])
+    back = ends[0, :, 0] > ends[1, :, 0]
+    ends[:, back] = ends[
+        ::-1, back
+    ]  # all quadrilaterals turn one way, so that none cancels another
+    corners = [
+        end[:, [0, side]] for end, side in zip(ends[[0, 1, 1, 0]], (1, 1, 2, 2), strict=True)
     ]
-
-
-def _envelope(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
-    places = np.arange(x.size)
-    fine = np.linspace(0, x.size - 1, _FINE * x.size)
-    x, low, high = (np.interp(fine, places, values) for values in (x, low, high))
-    edges = np.linspace(x.min(), x.max(), _INTERVALS + 1)
-    inside = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _INTERVALS - 1)
-    lower, upper = np.full(_INTERVALS, np.inf), np.full(_INTERVALS, -np.inf)
-    np.minimum.at(lower, inside, low)
-    np.maximum.at(upper, inside, high)
-    crossed = np.isfinite(lower)
-    middle = (edges[1:] + edges[:-1]) / 2
-    return middle[crossed], np.maximum(lower[crossed], 0), upper[crossed]
+    path = Path.make_compound_path_from_polys(np.stack(corners, axis=1))
+    axes.add_patch(PathPatch(path, color=style.colour(k), alpha=0.15, linewidth=0))
 
 
 def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
@@ -89,8 +71,7 @@ def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
                     mean, std = curve.mean[part], curve.std[part]
                     _plot(axes, depth, mean, cell, branch, k)
                     if cell.done > 1:
-                        band: Any = {"color": style.colour(k), "alpha": 0.18, "linewidth": 0}
-                        axes.fill_between(depth, mean - std, mean + std, **band)
+                        _shade(axes, depth, mean - std, mean + std, k)
             style.label_panel(axes, f"H = {hurst:g}")
         row[0].axhline(0, color="0.5", linewidth=0.5)
         row[1].set_ylim(bottom=0)

@@ -6,6 +6,8 @@ Each shows the (H, γ) and the Δ/h_max of the paper's figure, or the nearest th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,6 @@ from adhesis.ensemble.aggregate.by_blocks import DeformedShape
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
-from adhesis.ensemble.report.findings import typical_cell
 from adhesis.ensemble.report.further_axes import cell_label, state_sign
 from adhesis.ensemble.report.paper import PaperFigure
 from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, FieldPlan, field_plan
@@ -55,12 +56,10 @@ def shapes(data: Aggregate) -> style.PublishedFigure:
     Heights are those of the profile: on a machine or under a load the two branches have different
     separations at one prescribed value. ValueError if no cell has kept its fields.
     """
-    kept = cells_with_shape(data)
-    wished = [cell for cell in cells_of(data, paper.FIGURE_3) if cell in kept]
-    if not kept:
+    found = nearest(cells_with_shape(data), paper.FIGURE_3)
+    if not found:
         raise ValueError("no loop has kept its fields")
-    cell = (wished or kept)[0]
-    shape = cell.fields.shape
+    cell, shape = found[0], found[0].fields.shape
     assert shape is not None
     chosen = shown_penetrations(data, 3)
     height, ratios = (12 + 38 * len(chosen)) * style.MM, {"width_ratios": [2, 1]}
@@ -99,7 +98,7 @@ def spectra_of_branches(data: Aggregate) -> style.PublishedFigure:
     wave number only the edges of contact have power.
     """
     panels: list[Panel] = []
-    for cell in cells_of(data, paper.FIGURE_4):
+    for cell in nearest(data.cells, paper.FIGURE_4):
         k = state_of(cell.plan, paper.FIGURE_4)
         lines = [(b, k, branch, style.LOOK_OF_BRANCH[branch]) for b, branch in enumerate(BRANCHES)]
         panels.append((cell, f", {_depth(data, cell, k)}", lines))
@@ -134,7 +133,7 @@ def gap_density(data: Aggregate) -> style.PublishedFigure:
     figure, rows = style.row_for_each_hurst(data, 2, 16, 46, sharey=True)
     chosen = shown_penetrations(data, style.MOST_CURVES)
     for row, hurst in rows:
-        cell = cell_of_hurst(data, hurst, paper.FIGURE_8)
+        (cell,) = nearest(data.finished([hurst], data.works_of_adhesion), paper.FIGURE_8) or (None,)
         if cell is None:
             continue
         for b, (axes, branch) in enumerate(zip(row, BRANCHES, strict=True)):
@@ -194,7 +193,7 @@ def _spectra_of_branch(data: Aggregate, b: int) -> style.PublishedFigure:
     looks = [{**style.look(n), "linestyle": style.LINES[n]} for n in range(len(chosen))]
     panels: list[Panel] = []
     for hurst in style.spread_out(data.hursts, style.MOST_PANELS):
-        cell = cell_of_hurst(data, hurst, paper.FIGURE_5)
+        (cell,) = nearest(data.finished([hurst], data.works_of_adhesion), paper.FIGURE_5) or (None,)
         depths = [] if cell is None else [f"{cell.plan.penetration[k]:.2f}" for k in chosen]
         lines = [(b, *line) for line in zip(chosen, depths, looks, strict=False)]
         panels.append((cell, "", lines))
@@ -288,29 +287,20 @@ def has_fields(cell: AveragedCell) -> bool:
     return bool(np.any(cell.fields.psd_displacement > 0))
 
 
-def cell_of_hurst(data: Aggregate, hurst: float, figure: PaperFigure) -> AveragedCell | None:
-    """Return the cell of H with the first γ of a figure; else the typical one of H."""
-    kept = [cell for cell in data.cells if has_fields(cell) and cell.hurst == hurst]
-    of_paper = [cell for cell in kept if cell.work_of_adhesion == figure.works_of_adhesion[0]]
-    return next(iter([*of_paper, *kept[(len(kept) - 1) // 2 :]]), typical_cell(data, hurst))
+def nearest(cells: Sequence[AveragedCell], figure: PaperFigure) -> list[AveragedCell]:
+    """Return the cells that are nearest to those of a figure, first in H and then in γ.
 
-
-def cells_of(data: Aggregate, figure: PaperFigure) -> list[AveragedCell]:
-    """Return the cells of a figure that have results.
-
-    Where the campaign lacks its H, they are of the typical one; where it lacks all of its γ, they
-    are of all γ of the campaign.
+    Of those with fields, or, if there are none, of those with results.
     """
-    kept = [cell for cell in data.cells if has_fields(cell)]
-    kept = kept or [cell for cell in data.cells if cell.done]
-    known = {(cell.hurst, cell.work_of_adhesion): cell for cell in kept}
-    typical = typical_cell(data)
-    assert typical is not None  # an aggregate has finished tasks
-    for hurst in (figure.hurst, typical.hurst):
-        for gammas in (figure.works_of_adhesion, data.works_of_adhesion):
-            if found := [gamma for gamma in gammas if (hurst, gamma) in known]:
-                return [known[hurst, gamma] for gamma in style.spread_out(found, style.MOST_PANELS)]
-    return [typical]
+    known = [cell for cell in cells if has_fields(cell)] or [cell for cell in cells if cell.done]
+
+    def away(cell: AveragedCell, gamma: float) -> tuple[float, float]:
+        return abs(cell.hurst - figure.hurst), abs(cell.work_of_adhesion - gamma)
+
+    found = (
+        sorted(known, key=partial(away, gamma=gamma))[:1] for gamma in figure.works_of_adhesion
+    )
+    return list(dict.fromkeys(chain.from_iterable(found)))
 
 
 def state_of(plan: FieldPlan, figure: PaperFigure) -> int:
@@ -325,20 +315,19 @@ def state_of(plan: FieldPlan, figure: PaperFigure) -> int:
 
 def beside_paper(data: Aggregate, figure: PaperFigure) -> str:
     """Return a sentence on what the paper's figure shows, and what is nearest to it here."""
-    cells = cells_of(data, figure)
-    plan = cells[0].plan
-    at = figure.penetration
-    drawn = None if at is None else float(plan.penetration[state_of(plan, figure)])
-    gammas = tuple(cell.work_of_adhesion for cell in cells)
-    shown = f"The paper's figure is at {_place(figure.hurst, figure.works_of_adhesion, at)}"
-    # A state is stored at the load step that is nearest to the penetration that was asked for.
-    half = 0.5 * plan.max_penetration / plan.campaign.cycle.load_steps
-    near = at is None or drawn is None or abs(drawn - at) <= 1.001 * half
-    if (cells[0].hurst, gammas, near) == (figure.hurst, figure.works_of_adhesion, True):
-        return f"{shown}."
-    return f"{shown}; the nearest to it here is {_place(cells[0].hurst, gammas, drawn)}."
+    cells, at = nearest(data.cells, figure), figure.penetration
+    plan, drawn = cells[0].plan, at
+    if at is not None:
+        found = float(plan.penetration[state_of(plan, figure)])
+        # A state is stored at the load step that is nearest to the penetration that was asked for.
+        half = 0.5 * plan.max_penetration / plan.campaign.cycle.load_steps
+        drawn = at if abs(found - at) <= 1.001 * half else found
+    wanted = _place(figure.hurst, figure.works_of_adhesion, at)
+    here = _place(cells[0].hurst, [cell.work_of_adhesion for cell in cells], drawn)
+    rest = "" if here == wanted else f"; the nearest to it here is {here}"
+    return f"The paper's figure is at {wanted}{rest}."
 
 
-def _place(hurst: float, gammas: tuple[float, ...], penetration: float | None) -> str:
+def _place(hurst: float, gammas: Sequence[float], penetration: float | None) -> str:
     text = f"H = {hurst:g}, γ = {' and '.join(f'{gamma:g}' for gamma in gammas)} J/m²"
     return text if penetration is None else f"{text}, Δ/h_max = {penetration:.2g}"
