@@ -180,7 +180,8 @@ class Campaign:
         TypeError
             If a value is of the wrong type.
         """
-        path = checks.path("out", out)
+        # The folder may be another one before the run ends: threads share it.
+        path = checks.path("out", out).absolute()
         ranks = checks.whole("ranks", ranks, _RANKS)
         checks.flag("progress", progress)
         from adhesis.ensemble.results.layout import check_results_file

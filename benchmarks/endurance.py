@@ -88,7 +88,7 @@ def measured(times: Times, pretend: float | None) -> Engine:
     class TimedWriter(Writer):
         def write_result(self, row: int, result: Row, rank: int = 0) -> None:
             started, cpu = time.perf_counter(), time.process_time()
-            super().write_result(row, result, rank)
+            return super().write_result(row, result, rank)
             times.writing += time.perf_counter() - started
             times.writing_cpu += time.process_time() - cpu
             times.rows += 1

@@ -181,8 +181,11 @@ def read_cells(results: Results) -> list[Cell]:
         values["small_scale_share"] = np.divide(
             values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
         )
+        contact = values["largest_contact_fraction"]
         for name, energy in _PER_CONTACT.items():
-            values[name] = values[energy] / values["largest_contact_fraction"]
+            values[name] = np.divide(
+                values[energy], contact, out=np.full_like(contact, np.nan), where=contact > 0
+            )
         values["instability"] = values["loss"] - values["friction"]
         scale = stress_scale(of_cell, values["h_max"])
         values["pull_off_stress_dimensionless"] = values["pull_off_stress"] / scale

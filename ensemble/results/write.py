@@ -86,20 +86,21 @@ class Writer:
                 raise WriteError(f"{self.path} could not be closed: {reason(error)}") from error
         self._names.close()
 
-    def write_result(self, row: int, result: Row, rank: int = 0) -> None:
-        """Write the row of a task that was computed; its status last (WriteError).
+    def write_result(self, row: int, result: Row, rank: int = 0) -> int:
+        """Write the row of a task that was computed, its status last; return its checksum.
 
+        WriteError if the disk does not take it.
         ValueError if the row has other datasets than the schema, or one has another shape.
         """
         wanted = _NAMES if row in self._kept else _NAMES - _KEPT_NAMES
         if wanted - result.keys() or result.keys() - _NAMES:
             raise ValueError(f"a row of {sorted(result)} where {sorted(wanted)} is wanted")
-        self._write(row, {**result, "rank": rank, **self._origin_of(rank)}, schema.DONE)
+        return self._write(row, {**result, "rank": rank, **self._origin_of(rank)}, schema.DONE)
 
-    def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> None:
-        """Write the row of a task that failed: why, after how many seconds; its status last."""
+    def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> int:
+        """Write the row of a task that failed: why, after how many s; see :meth:`write_result`."""
         values = {"error": schema.encode_text(error), "wall_time": wall_time, "rank": rank}
-        self._write(row, values | self._origin_of(rank), schema.FAILED)
+        return self._write(row, values | self._origin_of(rank), schema.FAILED)
 
     def reset(self, rows: Iterable[int], status: int = schema.PENDING) -> None:
         """Empty rows, which are to be computed, or need not be; what they held is lost."""
@@ -109,8 +110,8 @@ class Writer:
                 self._put(schema.STATUS, row, schema.PENDING)
             self._write(row, {}, status)
 
-    def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
-        """Write a row, its checksum, and then its status; what has no value is left empty.
+    def _write(self, row: int, values: Mapping[str, Any], status: int) -> int:
+        """Write a row, its checksum (returned), and its status; what has no value is left empty.
 
         All of a row is written: a run that was killed may have left a part of it.
         """
@@ -127,6 +128,7 @@ class Writer:
             covered = schema.CHECKSUM.fill if status == schema.PENDING else checksum(blocks)
             self._put(schema.CHECKSUM, row, covered)
             self._put(schema.STATUS, row, status)
+        return covered
 
     def _put(self, dataset: Dataset, row: int, value: int) -> None:
         """Write one number of a row, and hand all that was written to the operating system."""

@@ -19,7 +19,7 @@ from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import WriteError, parameter
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, origin_of
+from adhesis.ensemble.results.schema import CHECKSUM, DONE, FAILED, NOT_NEEDED, origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.dispatch import Outcome, StopCheck
@@ -137,6 +137,7 @@ class _Session:
         self._ends = None if deadline is None else deadline.at - time.time() + self._started
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Summary(total, plan.done, plan.failed)
+        self._written: dict[int, int] = {}  # checksums of the rows of this run
         self._compute = partial(_compute, engine.compute, campaign, plan.tasks)
         self._limits = dispatch.Limits(
             stop=self._stop,
@@ -192,15 +193,18 @@ class _Session:
         """Return the counts, and how the run has ended.
 
         What a run has finished is read once more: another program may have written to the file
-        (InputError, WriteError).
+        (InputError, WriteError), or have copied an older one over it.
         """
         summary, batches = self._counts, self.plan.batches
         if self.plan.rows and not summary.pending:
             with Results(path) as results:
-                held = int(np.isin(results.status(), (DONE, FAILED)).sum())
-            if held < (finished := summary.done + summary.failed):
+                finished = np.isin(results.status(), (DONE, FAILED))
+                checksums = results.column(CHECKSUM.name)
+            other = [row for row, known in self._written.items() if checksums[row] != known]
+            finished[other] = False
+            if (held := int(finished.sum())) < (count := summary.done + summary.failed):
                 raise WriteError(
-                    f"{path} holds {held} of {finished} finished tasks: another program has "
+                    f"{path} holds {held} of {count} finished tasks: another program has "
                     "changed it while a run wrote to it"
                 )
         summary.seconds = time.monotonic() - self._started
@@ -213,16 +217,17 @@ class _Session:
         assert self.writer is not None
         task, rank = outcome.task, outcome.rank
         if outcome.error is not None:
-            self.writer.write_failure(task, outcome.error, outcome.seconds, rank)
-            return outcome
-        self.writer.write_result(task, outcome.result, rank)
+            known = self.writer.write_failure(task, outcome.error, outcome.seconds, rank)
+            return replace(outcome, result={CHECKSUM.name: known})
+        known = self.writer.write_result(task, outcome.result, rank)
         gamma = self.plan.tasks[task].work_of_adhesion
-        row = {**outcome.result, "work_of_adhesion": gamma}
-        judged = (*OF_DOUBT, self.campaign.stop.quantity)
+        row = {**outcome.result, "work_of_adhesion": gamma, CHECKSUM.name: known}
+        judged = (*OF_DOUBT, self.campaign.stop.quantity, CHECKSUM.name)
         return replace(outcome, result={name: row[name] for name in judged})
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         counts, what, row = self._counts, str(self.plan.tasks[outcome.task]), outcome.result
+        self._written[outcome.task] = row[CHECKSUM.name]
         if outcome.error is not None:
             counts.failed += 1
             counts.failed_now += 1

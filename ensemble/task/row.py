@@ -85,7 +85,8 @@ NUMBERS = (
     _number("loss_error", "J m-2", "estimated numerical error of the loss"),
     _number("zone_error", "J m-2", "estimated change of the loss by zones at edges"),
     _number(
-        "races", "1", "jumps that another rule of descent would have ended elsewhere", dtype=COUNT
+        *("races", "1", "jumps that another rule of descent or order would have ended elsewhere"),
+        dtype=COUNT,
     ),
     _number("energy_at_stake", "J m-2", "energy between the ends of those jumps"),
     # below the least of four ranges of adhesion the zero-range limit holds

@@ -38,6 +38,7 @@ from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.quantities import with_error
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.results.schema import DONE
+from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import checks
@@ -416,6 +417,23 @@ def test_failed_tasks_are_loud(tmp_path):
     assert "yet" not in text
     below = results.plot.contact_against_stress().get_supxlabel()
     assert below == r"missing, as all tasks failed: H = 0.8, $\gamma$ = 1 J/m²"
+
+
+def test_a_run_ends_in_the_folder_where_it_began(tmp_path, monkeypatch):
+    """The working directory is that of all threads: one may change it meanwhile."""
+    one_task = {"realisations": "1", "hurst": "[0.7]", "work_of_adhesion": "[0.04]"}
+    compute = Runner.__call__
+
+    def from_elsewhere(*arguments):
+        monkeypatch.chdir("/")
+        return compute(*arguments)
+
+    monkeypatch.setattr(Runner, "__call__", from_elsewhere)
+    monkeypatch.chdir(tmp_path)
+    results = adhesis.Campaign(campaign_text(**one_task)).run("r.h5")
+    assert results.path == tmp_path / "r.h5"
+    assert (results.dataset.status == DONE).all()
+    assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
 
 
 def test_campaigns_run_outside_the_main_thread(tmp_path):

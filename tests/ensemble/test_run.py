@@ -19,7 +19,9 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import session
+from adhesis.ensemble.run.dispatch import Outcome
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
@@ -35,7 +37,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.fake_run import fake_engine, write_results
+from tests.support.fake_run import fake_engine, fake_result, write_results
 
 
 def run(folder, *words, fake="", **changes):
@@ -349,6 +351,22 @@ def test_what_is_asked_to_stop_at_its_last_task_reads_the_file_too(tmp_path):
     asked._counts.done += 1
     with pytest.raises(WriteError, match=r"holds 0 of 8 finished tasks: another program"):
         asked.summary("SIGTERM received", out)
+
+
+def test_an_older_row_in_the_place_of_one_that_was_computed_again_is_no_finished_run(tmp_path):
+    campaign, out = load_campaign(write_campaign(tmp_path)), tmp_path / "r.h5"
+    create(out, campaign)
+    write_results(out, campaign, range(8))
+    plan = Plan(campaign.tasks(), [7], 7, 0)
+    with Writer(out) as writer:
+        again = session._Session(campaign, plan, writer, Options(), StopSignals(), Engine())
+        done = again._write(Outcome(7, 0, 1.0, result=fake_result(campaign, campaign.tasks()[7])))
+    again._counts.done += 1
+    again._written[7] = done.result["checksum"]
+    assert again.summary(None, out).pending == 0
+    write_results(out, campaign, [7], loss=1.0)  # as of the file before
+    with pytest.raises(WriteError, match=r"holds 7 of 8 finished tasks: another program"):
+        again.summary(None, out)
 
 
 def test_processes_of_another_mpi_are_reported_by_rank_0(tmp_path, monkeypatch):

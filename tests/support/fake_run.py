@@ -116,7 +116,7 @@ def fake_engine(behaviour: str) -> Engine:
                 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
                 limits = (int(settings["full"]), resource.RLIM_INFINITY)
                 resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-            super().write_result(row, result, rank)
+            return super().write_result(row, result, rank)
 
     engine = Engine(task, lambda campaign, task: None, FakeWriter)
     if "silence" in settings:
