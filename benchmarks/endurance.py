@@ -86,12 +86,13 @@ def measured(times: Times, pretend: float | None) -> Engine:
         return run
 
     class TimedWriter(Writer):
-        def write_result(self, row: int, result: Row, rank: int = 0) -> None:
+        def write_result(self, row: int, result: Row, rank: int = 0) -> int:
             started, cpu = time.perf_counter(), time.process_time()
-            return super().write_result(row, result, rank)
+            written = super().write_result(row, result, rank)
             times.writing += time.perf_counter() - started
             times.writing_cpu += time.process_time() - cpu
             times.rows += 1
+            return written
 
     compute = Runner() if pretend is None else do_nothing(pretend)
     check = check_task if pretend is None else lambda *_: None

@@ -302,7 +302,7 @@ def _table_1(data: Aggregate) -> Iterator[str]:
     yield (
         f"Of the {len(paper.TABLE_1)} losses of the paper's Table 1, {len(found)} have a cell "
         f"here: W~ is off by {100 * min(found):+.1f} % to {100 * max(found):+.1f} %, root mean "
-        f"square {100 * _rms(found):.1f} %{here if known else ''}."
+        f"square {100 * np.sqrt(np.mean(np.square(found))):.1f} %{here if known else ''}."
     )
 
 
@@ -448,7 +448,3 @@ def _listed(texts: Sequence[str], between: str = "; ") -> str:
 
 def _all(data: Aggregate, name: str) -> NDArray[np.float64]:
     return np.concatenate([cell.values[name] for cell in data.cells])
-
-
-def _rms(values: Sequence[float] | NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -163,8 +163,10 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
         assert "paper" not in lines_of(loss_figures.loss_against_hurst(data).axes[0])
 
 
-def test_tables_print_as_plain_lines_without_a_terminal(data):
+def test_tables_print_as_plain_lines(data, monkeypatch):
+    """On a terminal, too: a table that is fitted into its width has its numbers cut."""
     stream = io.StringIO()
+    monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
     loss_tables.losses(data).print(stream)
     lines = stream.getvalue().splitlines()
     assert len(lines) == 2 + 6

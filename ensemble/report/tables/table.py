@@ -91,19 +91,8 @@ class Table:
         return "; ".join(column.note for _, column in shown if column.note) + "."
 
     def print(self, stream: IO[str]) -> None:
-        """Print the columns that have a heading: rich on a terminal, plain lines elsewhere."""
+        """Print the columns that have a heading as lines, of which no terminal cuts a number."""
         shown = self._texts()
-        if stream.isatty():
-            from rich.console import Console
-            from rich.table import Table as RichTable
-
-            table = RichTable(title=self.title, title_justify="left")
-            for heading in shown[0]:
-                table.add_column(heading, justify="right")
-            for row in shown[1:]:
-                table.add_row(*row)
-            Console(file=stream).print(table)
-            return
         widths = [max(len(cell) for cell in column) for column in zip(*shown, strict=True)]
         print(self.title, file=stream)
         for row in shown:
