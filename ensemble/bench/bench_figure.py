@@ -52,7 +52,6 @@ def draw(lines: Sequence[Line]) -> Figure:
             axes.set_xlim(min(seconds) / 2, 2.5 * max(seconds))
             axes.set_ylim(min(errors) / 3, 5 * max(errors))
         figure.legend_above(list(shown.values()), len(shown))
-        style.plain_decades(figure.axes)
     return figure
 
 

@@ -117,7 +117,6 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
         ylabel="power $C(q)$ (m³)",
         ylim=(0.3 * low, None),
     )
-    style.plain_decades([axes])
     axes.legend(loc="best")
     return figure, (
         "Power spectrum with Hann's window, averaged over bands, before and after levelling, and "

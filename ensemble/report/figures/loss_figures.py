@@ -188,7 +188,6 @@ def jump_energies(data: Aggregate) -> style.PublishedFigure:
         style.key(gamma_label(g), color=style.colour(k), linestyle=style.LINES[k])
         for k, g in style.shown_gammas(data)
     ]
-    style.plain_decades(figure.panels)
     figure.legend_above(handles, len(handles))
     return figure
 

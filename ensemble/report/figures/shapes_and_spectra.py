@@ -149,7 +149,6 @@ def gap_density(data: Aggregate) -> style.PublishedFigure:
         axes.set(xscale="log", yscale="log")
         axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
     figure.label(r"gap $t/h_\mathrm{max}$", r"density of $t/h_\mathrm{max}$")
-    style.plain_decades(figure.panels)
     figure.legend_above(_penetration_handles(data, chosen, markers=False), len(chosen))
     return figure
 
@@ -222,7 +221,6 @@ def _spectra(panels: Sequence[Panel], handles: list[Line2D]) -> style.PublishedF
             slope = factor * rigid[0] * (ends / q[0]) ** -exponent
             axes.loglog(ends, slope, linestyle=line, label=f"slope {-exponent:.1f}", **_SLOPE)
         style.label_panel(axes, f"{cell_label(cell)}{state}")
-    style.plain_decades(figure.panels)
     figure.label("wave number $q$ (rad/m)", r"spectral density $C(q)$ (m³)")
     profile = style.key("rigid profile", color="0.55", linewidth=2)
     slopes = {"$q^{-(2H+1)}$": ":", "$q^{-(2+H)}$": "-."}

@@ -24,7 +24,6 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
-from matplotlib.ticker import NullFormatter
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.outputs import whole_file
@@ -271,15 +270,6 @@ def row_for_each_hurst(
     width, height = ONE_COLUMN if columns == 1 else TWO_COLUMNS, (above + each * len(hursts)) * MM
     figure = new_figure(len(hursts), columns, width, height, sharex=True, **options)
     return figure, list(zip(figure.rows, hursts, strict=True))
-
-
-def plain_decades(axes: Sequence[Axes]) -> None:
-    """Label whole decades of logarithmic axes only."""
-    for panel in axes:
-        for axis, scale in ((panel.xaxis, panel.get_xscale()), (panel.yaxis, panel.get_yscale())):
-            low, high = axis.get_view_interval()
-            if scale == "log" and high >= 20 * low:
-                axis.set_minor_formatter(NullFormatter())
 
 
 def label_panel(axes: Axes, text: str) -> None:
