@@ -11,17 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, one_of, parameter, refused_as_input
+from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
+from adhesis.ensemble.outputs import Writing, check_ending, check_outputs, whole_file, write_json
 from adhesis.ensemble.trace.options import (
     given,
     pattern_of,
     prepared_of,
+    refuse_several,
     trace_of,
     what_was_read,
 )
@@ -158,12 +159,10 @@ def _take_defaults(args: argparse.Namespace) -> list[str]:
 
 def _check_files(args: argparse.Namespace) -> None:
     """Refuse output files that cannot be written, or that would destroy an input or each other."""
-    if args.figure is not None and args.figure.suffix.lower() not in FIGURE_FORMATS:
-        raise InputError(
-            f"--figure is {args.figure}: the name must end in {one_of(FIGURE_FORMATS)}"
-        )
-    if args.fields is not None and args.fields.suffix != ".npz":
-        raise InputError(f"--fields is {args.fields}: the name must end in .npz")
+    if args.figure is not None:
+        check_ending("--figure", args.figure, *FIGURE_FORMATS)
+    if args.fields is not None:
+        check_ending("--fields", args.fields, ".npz")
 
     def named(*names: str) -> dict[str, Path]:
         paths = {f"--{name}": getattr(args, name) for name in names}
@@ -190,10 +189,9 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
 
 def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     """Return the profile of the one source that is given, and what is doubtful about it."""
-    sources = given(args, "hurst", "heights", "trace")
-    if len(sources) != 1:
-        found = f"{' and '.join(sources)} are" if sources else "no profile is"
-        raise InputError(f"{found} given: give one of --hurst, --heights and --trace")
+    refuse_several(args, "hurst", "heights", "trace")
+    if not given(args, "hurst", "heights", "trace"):
+        raise InputError("no profile is given: give one of --hurst, --heights and --trace")
     if args.heights is not None and args.period is None:
         raise InputError("--heights needs --period, the length of the period, as in 2mm")
     if args.hurst is None:
@@ -228,9 +226,7 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
 
 def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
-    several = given(args, *norms)
-    if len(several) > 1:
-        raise InputError(f"{' and '.join(several)} are given: give one of --h-rms, --m2 and --c0")
+    refuse_several(args, *norms)
     return self_affine_profile(
         args.hurst,
         period=args.period,
@@ -251,8 +247,7 @@ def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float],
     if cycle.is_path or len(cycle.points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
     penetrations, stresses = args.field_penetrations, args.field_stresses
-    if penetrations is not None and stresses is not None:
-        raise InputError("--field-penetrations and --field-stresses are given: give one of them")
+    refuse_several(args, "field_penetrations", "field_stresses")
     at_preload, (top,) = cycle.are_preloads, cycle.points
     at_stresses = stresses is not None or (at_preload and penetrations is None)
     if not at_stresses and (at_preload or not cycle.control.is_fixed):

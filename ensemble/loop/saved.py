@@ -24,7 +24,7 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import check_outputs, whole_file
+from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.quantities import units_under, with_units
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
@@ -152,8 +152,7 @@ def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
 def save(result: Result, path: str | os.PathLike[str]) -> None:
     """Write a netCDF file; see :meth:`adhesis.LoopResult.save`."""
     path = checks.path("path", path)
-    if path.suffix != ".nc":
-        raise InputError(f"path is {path}: the name must end in .nc")
+    check_ending("path", path, ".nc")
     check_outputs({"path": path}, {})
     dataset = to_xarray(result)
     plain = {name: {"_FillValue": None} for name in dataset.variables}  # no value means "missing"

@@ -225,7 +225,7 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
         parts += [heading, markdown_table(*sweep, left_columns=1), images.get("tables")]
     parts += [
         "## What it took",
-        f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {counted(plan.processes, 'core')} "
+        f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {plan.cores} "
         f"(planned: {plan.wall:.0f} s). Every number: `trace.json`. adhesis {__version__}.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
