@@ -74,15 +74,15 @@ def execute(args: argparse.Namespace) -> int:
     try:
         results = _run(args, method, cycle)
         if wanted:
-            assert isinstance(results, tuple)  # fields are those of one loop
+            (loop,) = results
+            assert isinstance(loop, LoopResult)  # a path has no fields
             if at_stresses:
-                fields = record.fields_at_stresses(results[0], wanted, nodes)
+                fields = record.fields_at_stresses(loop, wanted, nodes)
             else:
-                fields = record.fields_at_penetrations(results[0], method, wanted, nodes)
+                fields = record.fields_at_penetrations(loop, method, wanted, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
-    loops = (results,) if isinstance(results, PathResult) else results
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
@@ -106,13 +106,15 @@ def execute(args: argparse.Namespace) -> int:
             write(draw_loops(results), args.figure, dpi=200)
     if args.film is not None:
         with writing.output("--film", args.film):
-            loops[0].film(args.film, progress=not args.quiet)
-    print("\n\n".join(loop.summary() for loop in loops))
+            results[0].film(args.film, progress=not args.quiet)
+    print("\n\n".join(result.summary() for result in results))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
         print(f"wrote       {path}")
-    doubts = list(dict.fromkeys([*warnings, *(text for loop in loops for text in loop.warnings)]))
+    doubts = list(
+        dict.fromkeys([*warnings, *(text for result in results for text in result.warnings)])
+    )
     for text in doubts:
         print(f"adhesis loop: {text}", file=sys.stderr)
     writing.finish()
@@ -121,10 +123,10 @@ def execute(args: argparse.Namespace) -> int:
 
 def _run(
     args: argparse.Namespace, method: Method, cycle: Cycle
-) -> tuple[LoopResult, ...] | PathResult:
+) -> tuple[LoopResult | PathResult, ...]:
     options: dict[str, Any] = {"load_steps": cycle.load_steps, "progress": not args.quiet}
     if cycle.is_path:
-        return run_path(method, cycle.points, out=cycle.out, **options)
+        return (run_path(method, cycle.points, out=cycle.out, **options),)
     if len(cycle.points) > 1:
         return run_loops(method, **cycle.arguments(cycle.points), **options)
     return (run_loop(method, **cycle.arguments(cycle.points[0]), **options),)

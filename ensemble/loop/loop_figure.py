@@ -20,7 +20,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile
 
 
-def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) -> Figure:
+def draw_loops(results: Sequence[LoopResult | PathResult], ax: object = None) -> Figure:
     """Draw loops of ascending turning points that share their loading branch, or one path.
 
     ``ax`` is that of :func:`draw_curves`.
@@ -28,19 +28,21 @@ def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) ->
     return draw_curves(_curves_of(results), ax)
 
 
-def _curves_of(results: Sequence[LoopResult] | PathResult) -> Iterator[Curve]:
-    if isinstance(results, PathResult):
-        for leg in range(int(results.leg.max()) + 1):
-            rows = results.leg == leg
-            branch = str(results.branch[rows][0])
+def _curves_of(results: Sequence[LoopResult | PathResult]) -> Iterator[Curve]:
+    for k, result in enumerate(results):
+        columns = result.columns()
+        if isinstance(result, LoopResult):
+            rows = result.states("unloading")
+            label = f"unloading from {result.penetration[rows[0]]:.3g}"
+            yield columns, rows, look_of_branch("unloading", k) | {"label": label}
+            if result is results[-1]:
+                yield columns, result.states("loading"), look_of_branch("loading")
+            continue
+        for leg in range(int(result.leg.max()) + 1):
+            chosen = result.leg == leg
+            branch = str(result.branch[chosen][0])
             options = {"color": style.colour(leg), "ls": style.LINE_OF_BRANCH[branch]}
-            yield results.columns(), rows, options | {"label": f"leg {leg + 1}, {branch}"}
-        return
-    for k, loop in enumerate(results):
-        rows = loop.states("unloading")
-        label = f"unloading from {loop.penetration[rows[0]]:.3g}"
-        yield loop.columns(), rows, look_of_branch("unloading", k) | {"label": label}
-    yield results[-1].columns(), results[-1].states("loading"), look_of_branch("loading")
+            yield columns, chosen, options | {"label": f"leg {leg + 1}, {branch}"}
 
 
 _POINTS = 2000  # of a drawn profile

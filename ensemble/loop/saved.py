@@ -128,15 +128,14 @@ def to_xarray(result: Result) -> xr.Dataset:
 # ---------------------------------------------------------------------- files
 
 
-def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
+def write_csv(path: Path, results: Sequence[Result]) -> None:
     """Write the states as a CSV, one row each, with units in the header (OSError).
 
     Of several loops the first column is the turning point, or the preload.
     """
-    several = [results] if isinstance(results, PathResult) else results
-    tables = [to_dataframe(result, "states") for result in several]
+    tables = [to_dataframe(result, "states") for result in results]
     units = tables[0].attrs["units"] | {"penetration": "h_max"}
-    if not isinstance(results, PathResult) and len(results) > 1:
+    if isinstance(results[0], LoopResult) and len(results) > 1:
         turn = "turning_point" if results[0].preload is None else "preload"
         at_stress = results[0].problem.control.is_load or turn == "preload"
         units[turn] = "Pa" if at_stress else "h_max"
