@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from adhesis.ensemble.errors import InputError, WriteError, reason, refusal
+from adhesis.ensemble.errors import InputError, WriteError, one_of, reason, refusal
 from adhesis.ensemble.regular_file import irregular
 
 if TYPE_CHECKING:
@@ -88,6 +88,12 @@ def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> No
                         f"{name} and {option} are both {path}: each output needs a file of its own"
                     )
         seen[option] = path
+
+
+def check_ending(option: str, path: Path, *endings: str) -> None:
+    """Refuse the name of a file with another ending, in small letters or capitals (InputError)."""
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{option} is {path}: the name must end in {one_of(endings)}")
 
 
 def check_output_folder(

@@ -11,17 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, one_of, parameter, refused_as_input
+from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
+from adhesis.ensemble.outputs import Writing, check_ending, check_outputs, whole_file, write_json
 from adhesis.ensemble.trace.options import (
     given,
     pattern_of,
     prepared_of,
+    refuse_several,
     trace_of,
     what_was_read,
 )
@@ -73,15 +74,15 @@ def execute(args: argparse.Namespace) -> int:
     try:
         results = _run(args, method, cycle)
         if wanted:
-            assert isinstance(results, tuple)  # fields are those of one loop
+            (loop,) = results
+            assert isinstance(loop, LoopResult)  # a path has no fields
             if at_stresses:
-                fields = record.fields_at_stresses(results[0], wanted, nodes)
+                fields = record.fields_at_stresses(loop, wanted, nodes)
             else:
-                fields = record.fields_at_penetrations(results[0], method, wanted, nodes)
+                fields = record.fields_at_penetrations(loop, method, wanted, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
-    loops = (results,) if isinstance(results, PathResult) else results
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
@@ -105,13 +106,15 @@ def execute(args: argparse.Namespace) -> int:
             write(draw_loops(results), args.figure, dpi=200)
     if args.film is not None:
         with writing.output("--film", args.film):
-            loops[0].film(args.film, progress=not args.quiet)
-    print("\n\n".join(loop.summary() for loop in loops))
+            results[0].film(args.film, progress=not args.quiet)
+    print("\n\n".join(result.summary() for result in results))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
         print(f"wrote       {path}")
-    doubts = list(dict.fromkeys([*warnings, *(text for loop in loops for text in loop.warnings)]))
+    doubts = list(
+        dict.fromkeys([*warnings, *(text for result in results for text in result.warnings)])
+    )
     for text in doubts:
         print(f"adhesis loop: {text}", file=sys.stderr)
     writing.finish()
@@ -120,10 +123,10 @@ def execute(args: argparse.Namespace) -> int:
 
 def _run(
     args: argparse.Namespace, method: Method, cycle: Cycle
-) -> tuple[LoopResult, ...] | PathResult:
+) -> tuple[LoopResult | PathResult, ...]:
     options: dict[str, Any] = {"load_steps": cycle.load_steps, "progress": not args.quiet}
     if cycle.is_path:
-        return run_path(method, cycle.points, out=cycle.out, **options)
+        return (run_path(method, cycle.points, out=cycle.out, **options),)
     if len(cycle.points) > 1:
         return run_loops(method, **cycle.arguments(cycle.points), **options)
     return (run_loop(method, **cycle.arguments(cycle.points[0]), **options),)
@@ -158,12 +161,10 @@ def _take_defaults(args: argparse.Namespace) -> list[str]:
 
 def _check_files(args: argparse.Namespace) -> None:
     """Refuse output files that cannot be written, or that would destroy an input or each other."""
-    if args.figure is not None and args.figure.suffix.lower() not in FIGURE_FORMATS:
-        raise InputError(
-            f"--figure is {args.figure}: the name must end in {one_of(FIGURE_FORMATS)}"
-        )
-    if args.fields is not None and args.fields.suffix != ".npz":
-        raise InputError(f"--fields is {args.fields}: the name must end in .npz")
+    if args.figure is not None:
+        check_ending("--figure", args.figure, *FIGURE_FORMATS)
+    if args.fields is not None:
+        check_ending("--fields", args.fields, ".npz")
 
     def named(*names: str) -> dict[str, Path]:
         paths = {f"--{name}": getattr(args, name) for name in names}
@@ -190,10 +191,9 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
 
 def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     """Return the profile of the one source that is given, and what is doubtful about it."""
-    sources = given(args, "hurst", "heights", "trace")
-    if len(sources) != 1:
-        found = f"{' and '.join(sources)} are" if sources else "no profile is"
-        raise InputError(f"{found} given: give one of --hurst, --heights and --trace")
+    refuse_several(args, "hurst", "heights", "trace")
+    if not given(args, "hurst", "heights", "trace"):
+        raise InputError("no profile is given: give one of --hurst, --heights and --trace")
     if args.heights is not None and args.period is None:
         raise InputError("--heights needs --period, the length of the period, as in 2mm")
     if args.hurst is None:
@@ -228,9 +228,7 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
 
 def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
-    several = given(args, *norms)
-    if len(several) > 1:
-        raise InputError(f"{' and '.join(several)} are given: give one of --h-rms, --m2 and --c0")
+    refuse_several(args, *norms)
     return self_affine_profile(
         args.hurst,
         period=args.period,
@@ -251,8 +249,7 @@ def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float],
     if cycle.is_path or len(cycle.points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
     penetrations, stresses = args.field_penetrations, args.field_stresses
-    if penetrations is not None and stresses is not None:
-        raise InputError("--field-penetrations and --field-stresses are given: give one of them")
+    refuse_several(args, "field_penetrations", "field_stresses")
     at_preload, (top,) = cycle.are_preloads, cycle.points
     at_stresses = stresses is not None or (at_preload and penetrations is None)
     if not at_stresses and (at_preload or not cycle.control.is_fixed):

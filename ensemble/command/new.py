@@ -9,8 +9,7 @@ import argparse
 import shlex
 from pathlib import Path
 
-from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import write_new
+from adhesis.ensemble.outputs import check_ending, write_new
 
 EXAMPLES = (
     "adhesis new my.toml",
@@ -25,8 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
-    if args.file.suffix != ".toml":
-        raise InputError(f"FILE.toml is {args.file}: the name must end in .toml")
+    check_ending("FILE.toml", args.file, ".toml")
 
     def content() -> bytes:
         from adhesis.ensemble.campaign.template import campaign_template  # loads numpy

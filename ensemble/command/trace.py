@@ -9,28 +9,18 @@ from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.exit_codes import SOME_FAILED
 from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
-from adhesis.ensemble.quantities import (
-    WORK_OF_ADHESION,
-    drive_text,
-    duration,
-    read_words,
-    words_of,
-)
-from adhesis.ensemble.reporter import bar
+from adhesis.ensemble.quantities import WORK_OF_ADHESION, read_words, words_of
 from adhesis.ensemble.trace.answer import (
     FIGURE_FILES,
     FILES,
-    Answer,
     NoAnswer,
     check,
     document,
     make_cycle,
     run_plan,
 )
-from adhesis.ensemble.trace.loops import Cycle, Loops
 from adhesis.ensemble.trace.options import pattern_of, prepared_of, trace_of, what_was_read
-from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.variants import Plan, make_plan
+from adhesis.ensemble.trace.variants import make_plan
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver.model.half_space import HalfSpace
 
@@ -43,8 +33,6 @@ def execute(args: argparse.Namespace) -> int:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
     option, text = "--work-of-adhesion", args.work_of_adhesion
     gammas = read_words(option, words_of(option, text), WORK_OF_ADHESION.read)
-    if len(set(gammas)) < len(gammas):
-        raise InputError(f"{option} is {text!r}: its values must differ")
     with refused_as_input(vars(args), thickness="layer"):
         half_space = HalfSpace(args.young, args.poisson)
         control = control_of(args, half_space)
@@ -67,7 +55,7 @@ def execute(args: argparse.Namespace) -> int:
     if args.plan:
         return 0
     try:
-        answer = _run(prepared, cycle, plan, args.quiet)
+        answer = run_plan(prepared, cycle, plan, progress=not args.quiet)
     except NoAnswer as error:
         print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
         return SOME_FAILED
@@ -89,27 +77,3 @@ def execute(args: argparse.Namespace) -> int:
         print(f"wrote       {args.to / 'trace.html'}, trace.md, trace.json and the figures")
     writing.finish()
     return 0
-
-
-def _run(prepared: Prepared, cycle: Cycle, plan: Plan, quiet: bool) -> Answer:
-    """Run the plan, with lines on stderr: loops done, what is running, time left."""
-    if quiet:
-        return run_plan(prepared, cycle, plan, None)
-    load = cycle.control.is_load
-    with bar("loops") as show:
-        return run_plan(
-            prepared, cycle, plan, lambda loops: show(None, None, _progress(loops, load))
-        )
-
-
-def _progress(loops: Loops, load: bool) -> str:
-    """Return how far the loops of a trace are, as a line."""
-    running = ", ".join(
-        f"{name} ({branch}, {drive_text(drive, load)})"
-        for name, (branch, drive) in loops.running.items()
-    )
-    parts = [f"{len(loops.done)} of {loops.count} loops"]
-    parts += [f"running {running}"] if running else []
-    left = loops.seconds_left if len(loops.done) < loops.count else None
-    parts += [] if left is None else [f"about {duration(left)} left"]
-    return "; ".join(parts)

@@ -10,7 +10,7 @@ from typing import Any
 
 from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.quantities import STRESS, read_words, words_of
-from adhesis.ensemble.trace.options import MAX_PENETRATION, given
+from adhesis.ensemble.trace.options import MAX_PENETRATION, refuse_several
 from adhesis.solver.loading.cycle import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
@@ -55,7 +55,7 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     """Read the cycle from the options (InputError; ValueError for stiffness or layer)."""
     control = control_of(args, half_space)
     if args.path is not None:
-        _refuse_several(args, "path", *_TURNS)
+        refuse_several(args, "path", *_TURNS)
         words = words_of("--path", args.path)
         out = words[-1] == _OUT
         words = words[:-1] if out else words
@@ -70,7 +70,7 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
 
 def turns_of(args: argparse.Namespace, control: Control) -> Cycle:
     """Read the cycle of a control, its turning points in the given order (InputError)."""
-    _refuse_several(args, "max_stress", "preload")
+    refuse_several(args, "max_stress", "preload")
     if control.is_load:
         if args.preload is not None:
             raise InputError(
@@ -78,7 +78,7 @@ def turns_of(args: argparse.Namespace, control: Control) -> Cycle:
                 f"weight give --max-stress {args.preload} with --stiffness 0; for a machine, which "
                 "turns at that mean stress, leave --stiffness 0 out"
             )
-        _refuse_several(args, "max_penetration", "max_stress")
+        refuse_several(args, "max_penetration", "max_stress")
         if args.max_stress is None:
             raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
         stresses = _distinct("--max-stress", args.max_stress, STRESS.read)
@@ -122,9 +122,8 @@ def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
 
     InputError if both a stiffness and a layer are given, ValueError if one breaks its rule.
     """
+    refuse_several(args, "stiffness", "layer")
     if args.layer is not None:
-        if args.stiffness is not None:
-            raise InputError("--stiffness and --layer are given: give one of them")
         return Control(half_space.layer_stiffness(args.layer))
     return Control(math.inf if args.stiffness is None else args.stiffness)
 
@@ -143,9 +142,3 @@ def in_options(text: str, args: argparse.Namespace) -> str:
     ):
         text = text.replace(words, replacement)
     return text
-
-
-def _refuse_several(args: argparse.Namespace, *names: str) -> None:
-    found = given(args, *names)
-    if len(found) > 1:
-        raise InputError(f"{' and '.join(found)} are given: a loop has one of them")

@@ -25,9 +25,9 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from adhesis.ensemble.errors import InputError, one_of
+from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.film_scenes import Scene, Scenes
-from adhesis.ensemble.outputs import check_outputs, whole_file
+from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.solver import checks
 from adhesis.solver.checks import counted, function
@@ -64,8 +64,7 @@ def check_film(name: str, path: str | os.PathLike[str]) -> Path:
     """
     path = Path(checks.path(name, path))
     ending = path.suffix.lower()
-    if ending not in FORMATS:
-        raise InputError(f"{name} is {path}: the name must end in {one_of(FORMATS)}")
+    check_ending(name, path, *FORMATS)
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError(
             f"{name} is {path}: ffmpeg, which writes .mp4, is not installed, so take .html or .gif"

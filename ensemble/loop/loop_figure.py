@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from adhesis.ensemble.report.figures import style
+from adhesis.ensemble.report.figures.curves import Curve, draw_curves, look_of_branch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.loading.loop_result import LoopResult
@@ -19,46 +20,29 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile
 
 
-def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) -> Figure:
+def draw_loops(results: Sequence[LoopResult | PathResult], ax: object = None) -> Figure:
     """Draw loops of ascending turning points that share their loading branch, or one path.
 
-    ``ax`` is one Axes for the mean stress, or two for mean stress and contact fraction (TypeError,
-    ValueError).
+    ``ax`` is that of :func:`draw_curves`.
     """
-    with style.drawn_into(ax):
-        figure = style.new_figure(1, 2, style.TWO_COLUMNS, 62 * style.MM)
-        panels = figure.given or figure.panels
-        for result, rows, options in _lines(results):
-            columns = (result.mean_stress[rows] / 1e3, result.contact_fraction[rows])
-            for panel, y in zip(panels, columns, strict=False):
-                panel.plot(result.penetration[rows], y, **options)
-        stress, depth = panels[0], r"penetration $\Delta/h_{\max}$"
-        stress.axhline(0, color="0.7", lw=0.5, zorder=0)
-        stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
-        for contact in panels[1:]:
-            contact.set(xlabel=depth, ylabel="contact fraction $A/A_0$", ylim=(0, None))
-        if len(stress.get_legend_handles_labels()[1]) > 1:
-            panels[-1].legend()
-        return figure.finish()
+    return draw_curves(_curves_of(results), ax)
 
 
-def _lines(
-    results: Sequence[LoopResult] | PathResult,
-) -> Iterator[tuple[LoopResult | PathResult, Any, dict[str, Any]]]:
-    """Return what is drawn: a result, the rows of its states, and the look of their line."""
-    if isinstance(results, PathResult):
-        for leg in range(int(results.leg.max()) + 1):
-            rows = results.leg == leg
-            branch = str(results.branch[rows][0])
+def _curves_of(results: Sequence[LoopResult | PathResult]) -> Iterator[Curve]:
+    for k, result in enumerate(results):
+        columns = result.columns()
+        if isinstance(result, LoopResult):
+            rows = result.states("unloading")
+            label = f"unloading from {result.penetration[rows[0]]:.3g}"
+            yield columns, rows, look_of_branch("unloading", k) | {"label": label}
+            if result is results[-1]:
+                yield columns, result.states("loading"), look_of_branch("loading")
+            continue
+        for leg in range(int(result.leg.max()) + 1):
+            chosen = result.leg == leg
+            branch = str(result.branch[chosen][0])
             options = {"color": style.colour(leg), "ls": style.LINE_OF_BRANCH[branch]}
-            yield results, rows, options | {"label": f"leg {leg + 1}, {branch}"}
-        return
-    for k, loop in enumerate(results):
-        rows = loop.states("unloading")
-        options = {"color": style.colour(k), "ls": style.LINE_OF_BRANCH["unloading"]}
-        yield loop, rows, options | {"label": f"unloading from {loop.penetration[rows[0]]:.3g}"}
-    options = {"color": "k", "ls": style.LINE_OF_BRANCH["loading"], "label": "loading"}
-    yield results[-1], results[-1].states("loading"), options
+            yield columns, chosen, options | {"label": f"leg {leg + 1}, {branch}"}
 
 
 _POINTS = 2000  # of a drawn profile

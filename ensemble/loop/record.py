@@ -56,16 +56,15 @@ def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
 
 
 def document(
-    results: Sequence[LoopResult] | PathResult, warnings: Sequence[str] = ()
+    results: Sequence[LoopResult | PathResult], warnings: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Return the JSON document of a path, or of loops with ascending turning points.
+    """Return the JSON document of one path, or of loops with ascending turning points.
 
     That of the last loop, and where there are several all of them, in order, as ``turns``. The keys
     of a path are those of a loop where they mean the same. ``warnings`` of the input stand before
     those of each result.
     """
-    several = [results] if isinstance(results, PathResult) else results
-    documents = [loop_document(result) for result in several]
+    documents = [loop_document(result) for result in results]
     for one in documents:
         one["warnings"] = [*warnings, *one["warnings"]]
     return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})

@@ -24,7 +24,7 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import check_outputs, whole_file
+from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.quantities import units_under, with_units
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
@@ -128,15 +128,14 @@ def to_xarray(result: Result) -> xr.Dataset:
 # ---------------------------------------------------------------------- files
 
 
-def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
+def write_csv(path: Path, results: Sequence[Result]) -> None:
     """Write the states as a CSV, one row each, with units in the header (OSError).
 
     Of several loops the first column is the turning point, or the preload.
     """
-    several = [results] if isinstance(results, PathResult) else results
-    tables = [to_dataframe(result, "states") for result in several]
+    tables = [to_dataframe(result, "states") for result in results]
     units = tables[0].attrs["units"] | {"penetration": "h_max"}
-    if not isinstance(results, PathResult) and len(results) > 1:
+    if isinstance(results[0], LoopResult) and len(results) > 1:
         turn = "turning_point" if results[0].preload is None else "preload"
         at_stress = results[0].problem.control.is_load or turn == "preload"
         units[turn] = "Pa" if at_stress else "h_max"
@@ -152,8 +151,7 @@ def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
 def save(result: Result, path: str | os.PathLike[str]) -> None:
     """Write a netCDF file; see :meth:`adhesis.LoopResult.save`."""
     path = checks.path("path", path)
-    if path.suffix != ".nc":
-        raise InputError(f"path is {path}: the name must end in .nc")
+    check_ending("path", path, ".nc")
     check_outputs({"path": path}, {})
     dataset = to_xarray(result)
     plain = {name: {"_FillValue": None} for name in dataset.variables}  # no value means "missing"

@@ -26,7 +26,7 @@ def plot(result: Result, ax: Any = None) -> Any:
     """Draw mean stress and contact fraction; see :meth:`adhesis.LoopResult.plot`."""
     from adhesis.ensemble.loop.loop_figure import draw_loops
 
-    return draw_loops(result if isinstance(result, PathResult) else [result], ax)
+    return draw_loops([result], ax)
 
 
 def film(

@@ -6,6 +6,7 @@ import math
 import os
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from operator import itemgetter
@@ -355,7 +356,8 @@ def loss_of_trace(
     processes : int, optional
         Side by side; without it one for each core, 0 for none beside this one.
     progress : bool
-        Whether a bar on a terminal, or lines elsewhere, show how many of the loops are done.
+        Whether a line on stderr, anew from time to time, shows how many of the loops are done,
+        which run, and how long the others will take.
     watch : callable, optional
         Called with the :class:`~adhesis.ensemble.trace.loops.Loops` about once a second.
 
@@ -407,17 +409,7 @@ def loss_of_trace(
     if processes is not None:
         processes = checks.whole("processes", processes, _PROCESSES)
     plan = make_plan(prepared, cycle, quick=quick, processes=processes)
-    if not checks.flag("progress", progress):
-        return run_plan(prepared, cycle, plan, watch)
-    with bar("loops") as shown:
-
-        def both(loops: Loops) -> None:
-            done, runs = len(loops.done), len(plan.runs)
-            shown(done, runs, f"{done}/{runs} loops")
-            if watch is not None:
-                watch(loops)
-
-        return run_plan(prepared, cycle, plan, both)
+    return run_plan(prepared, cycle, plan, watch, checks.flag("progress", progress))
 
 
 def make_cycle(
@@ -470,11 +462,25 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
         check_law(cycle.method, None, pins=problem.pinning > 0, has_range=has_range)
 
 
-def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
+def run_plan(
+    prepared: Prepared,
+    cycle: Cycle,
+    plan: Plan,
+    watch: Watch | None = None,
+    progress: bool = False,
+) -> Answer:
     """Run a plan; see :func:`loss_of_trace`."""
     started = time.monotonic()
     try:
-        results = Loops(plan.runs, plan.processes, plan.seconds).run(watch)
+        with bar("loops") if progress else nullcontext() as show:
+
+            def look(loops: Loops) -> None:
+                if show is not None:
+                    show(None, None, f"{loops}")
+                if watch is not None:
+                    watch(loops)
+
+            results = Loops(plan.runs, plan.processes, plan.seconds).run(look)
     except Unresponsive as error:  # a process of a loop hangs
         raise NoAnswer(f"the loops could not be run to their end: {error}") from error
     main = results.get("answer")

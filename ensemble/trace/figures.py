@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,9 +13,11 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from adhesis.ensemble.quantities import shown_unit
 from adhesis.ensemble.report.figures import style
+from adhesis.ensemble.report.figures.curves import draw_curves, look_of_branch
 from adhesis.ensemble.trace.answer import FIGURES, Answer
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
+from adhesis.solver.model.jump import BRANCHES
 from adhesis.solver.model.measured_profile import trace_spectrum
 
 _GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
@@ -127,29 +128,13 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
 
 def draw_loop(answer: Answer) -> Figure:
     """Draw the answer's own loop."""
-    with style.style():
-        return _loop(answer)[0]
+    states = {name: np.array(values) for name, values in answer.main["states"].items()}
+    return draw_curves((states, states["branch"] == b, look_of_branch(b)) for b in BRANCHES)
 
 
 def _loop(answer: Answer) -> tuple[Figure, str]:
-    states: dict[str, Any] = answer.main["states"]
-    branch = np.array(states["branch"])
-    depth = np.array(states["penetration"])
-    stress = np.array(states["mean_stress"])
-    contact = np.array(states["contact_fraction"])
-    unit, size = shown_unit("mean_stress", float(np.abs(stress).max()))
-    figure = style.new_figure(1, 2, style.TWO_COLUMNS, 2.5)
-    left, right = figure.axes
-    for name, look in style.LOOK_OF_BRANCH.items():
-        rows = branch == name
-        left.plot(depth[rows], stress[rows] / size, label=name, **look)
-        right.plot(depth[rows], contact[rows], label=name, **look)
-    left.axhline(0, color="0.5", lw=0.5)
-    left.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel=rf"mean stress $\bar p$ ({unit})")
-    right.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel="contact fraction $A/A_0$")
-    left.legend(loc="best")
-    right.legend(loc="best")
-    return figure, "Mean stress (compression positive) and contact fraction over the whole loop."
+    caption = "Mean stress (compression positive) and contact fraction over the whole loop."
+    return draw_loop(answer), caption
 
 
 def _cut_off(answer: Answer) -> tuple[Figure, str] | None:

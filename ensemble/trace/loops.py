@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from adhesis.ensemble.quantities import stress_text
+from adhesis.ensemble.quantities import drive_text, duration, stress_text
 from adhesis.ensemble.run.dispatch import Channel, Limits, Master, Outcome, OwnWorker, StopCheck
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.schedule import Schedule
@@ -190,6 +190,19 @@ class Loops:
         """By name: the branch and prescribed value reached."""
         notes = {} if self._master is None else self._master.notes
         return {self._runs[k].name: note or ("loading", 0.0) for k, note in notes.items()}
+
+    def __str__(self) -> str:
+        """Return how far they are, as a line."""
+        load = any(run.cycle.control.is_load for run in self._runs)
+        running = ", ".join(
+            f"{name} ({branch}, {drive_text(drive, load)})"
+            for name, (branch, drive) in self.running.items()
+        )
+        parts = [f"{len(self.done)} of {self.count} loops"]
+        parts += [f"running {running}"] if running else []
+        left = self.seconds_left if len(self.done) < self.count else None
+        parts += [] if left is None else [f"about {duration(left)} left"]
+        return "; ".join(parts)
 
     def run(
         self, watch: Watch | None = None, every: float = _REPORT_INTERVAL

@@ -74,6 +74,13 @@ def what_was_read(prepared: Prepared) -> str:
     return printable("\n".join(lines))
 
 
+def refuse_several(args: argparse.Namespace, *names: str) -> None:
+    """Refuse options that exclude each other (InputError)."""
+    found = given(args, *names)
+    if len(found) > 1:
+        raise InputError(f"{' and '.join(found)} are given: give one of them")
+
+
 def given(args: argparse.Namespace, *names: str) -> list[str]:
     """Return which of these options are given; without names, of reading and preparation."""
     found = {name: getattr(args, name) for name in names or _NAMES}

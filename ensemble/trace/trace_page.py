@@ -40,6 +40,7 @@ from adhesis.solver.loading.equilibrium_path import (
     in_works_of_adhesion,
     sticking_text,
 )
+from adhesis.solver.loading.zero_range import limit_text
 
 
 def summary(answer: Answer) -> str:
@@ -134,24 +135,12 @@ def _range(answer: Answer) -> str:
         return "without adhesion there is none, and nothing is lost"
     if answer.main["strength"] is not None:
         return str(answer.main["range_summary"])
-    inside, ranges = "no tension inside patches", []
+    inside = "no tension inside patches"
     if answer.valid_range is not None:
-        tension = stress_text(answer.largest_interior_tension)
-        inside = f"tension inside patches of up to {tension}: {length_text(answer.valid_range, 3)}"
-        ranges.append(answer.valid_range)
-    outside = ""
-    for where, value in (
-        ("at edges", answer.edge_range),
-        ("at touches", answer.touch_range),
-        ("beyond the turn", answer.turn_range),
-    ):
-        if value is not None:
-            outside += f"; {where}: {length_text(value, 3)}"
-            ranges.append(value)
-    return (
-        "the zero-range model is valid if the real adhesion reaches less than "
-        f"{length_text(min(ranges), 3)} ({inside}{outside})"
-    )
+        inside = f"tension inside patches of up to {stress_text(answer.largest_interior_tension)}"
+    names = ("valid_range", "edge_range", "touch_range", "turn_range")
+    ranges = (getattr(answer, name) for name in names)
+    return limit_text(inside, *(math.inf if one is None else one for one in ranges))
 
 
 def write_page(answer: Answer, folder: Path) -> None:
@@ -236,7 +225,7 @@ def page_text(answer: Answer, captions: Mapping[str, str]) -> str:
         parts += [heading, markdown_table(*sweep, left_columns=1), images.get("tables")]
     parts += [
         "## What it took",
-        f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {counted(plan.processes, 'core')} "
+        f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {plan.cores} "
         f"(planned: {plan.wall:.0f} s). Every number: `trace.json`. adhesis {__version__}.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"

@@ -49,13 +49,18 @@ class Plan(ByValue):
     hints: tuple[str, ...]
 
     @property
+    def cores(self) -> str:
+        """Number of cores in use, as a text: without processes, that of this one."""
+        return counted(max(self.processes, 1), "core")
+
+    @property
     def text(self) -> str:
         """Description of the plan in two or three lines."""
         lines = [
             f"plan        {self.waves} waves, about {self.patches} "
             f"patch{'es' if self.patches != 1 else ''} at a time: "
             f"{len(self.runs)} loops, about {duration(sum(self.seconds.values()))} of CPU time, "
-            f"{duration(self.wall)} on {counted(self.processes, 'core')} of a quiet machine"
+            f"{duration(self.wall)} on {self.cores} of a quiet machine"
         ]
         return "\n".join(lines + [f"hint        {hint}" for hint in self.hints])
 
@@ -95,11 +100,12 @@ def _doubts(prepared: Prepared, answer: Run) -> list[Run]:
     factor = 1.0
     while length / (factor * cut) > _MAX_WAVES_OF_VARIANTS and factor < _LONGEST_CUT_OFF:
         factor *= 2
-    base = {} if factor == 1 else {"cut_off": factor * cut}
-    reference = "answer" if factor == 1 else f"cut-off × {factor:.3g}"
+    coarser: dict[str, Any] = {}
+    if factor > 1:
+        coarser = {"cut_off": factor * cut, "reference": f"cut-off × {factor:.3g}"}
 
     def add(
-        name: str, group: str, description: str, changes: dict[str, Any], reference: str = "answer"
+        name: str, group: str, description: str, *, reference: str = "answer", **changes: Any
     ) -> None:
         profile, cycle = prepared.profile(**changes), answer.cycle
         if cycle.pattern is not None:  # stripes keep their width where the period is another
@@ -108,30 +114,27 @@ def _doubts(prepared: Prepared, answer: Run) -> list[Run]:
         run = replace(answer, name=name, group=group, description=description, changes=changes)
         runs.append(replace(run, profile=profile, cycle=cycle, reference=reference))
 
-    def variant(name: str, group: str, description: str, **changes: Any) -> None:
-        add(name, group, description, base | changes, reference)
-
     for longer in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0), 1 / math.sqrt(2.0)):
         if longer * cut <= length / 4 if longer > 1 else longer * cut >= 2.5 * step:
             described = f"waves down to {length_text(longer * cut)}"
-            add(f"cut-off × {longer:.3g}", "cut-off", described, {"cut_off": longer * cut})
-    variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
+            add(f"cut-off × {longer:.3g}", "cut-off", described, cut_off=longer * cut)
+    add("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1, **coarser)
     for part in (0.05, 0.1):
         faded = f"both ends faded to the mean over {100 * part:.0f} %"
         name = f"taper {100 * part:.0f} %"
-        variant(name, "continuation", faded, continuation="taper", part=part)
+        add(name, "continuation", faded, continuation="taper", part=part, **coarser)
     degree = prepared.degree
-    variant(f"degree {degree + 1}", "form", "one degree more off", degree=degree + 1)
+    add(f"degree {degree + 1}", "form", "one degree more off", degree=degree + 1, **coarser)
     if degree > 1 and not prepared.form_is_sure:
-        variant(f"degree {degree - 1}", "form", "one degree less off", degree=degree - 1)
+        add(f"degree {degree - 1}", "form", "one degree less off", degree=degree - 1, **coarser)
     if prepared.features:
         bridged = f"{single_features_text(prepared.features)} bridged by straight lines"
         name = "without single features"
-        variant(name, "single features", bridged, without_features=True)
+        add(name, "single features", bridged, without_features=True, **coarser)
     if prepared.spectrum.noise > 0:
         described = "white noise of the instrument's size added"
         for seed in (1, 2) if factor == 1 else (1,):
-            add(f"noise {seed}", "noise", described, {"noise_seed": seed})
+            add(f"noise {seed}", "noise", described, noise_seed=seed)
     return runs
 
 

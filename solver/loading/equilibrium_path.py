@@ -21,7 +21,9 @@ from adhesis.solver.loading.zero_range import (
     InteriorTension,
     interior_tension,
     least_range,
+    limit_text,
     narrowest_length,
+    outside_text,
     range_warnings,
     stress_text,
     touch_stress,
@@ -465,11 +467,6 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""
         interior = self.interior
         strength = self.problem.strength
-        outside = f"at edges: {1e9 * self.edge_range:.3g} nm"
-        if math.isfinite(self.touch_range):
-            outside += f"; at touches: {1e9 * self.touch_range:.3g} nm"
-        if math.isfinite(self.turn_range):
-            outside += f"; beyond the turn: {1e9 * self.turn_range:.3g} nm"
         if math.isfinite(strength):
             largest = 0.0 if interior is None else interior.tension
             zones = 100 * self.zone_error / (abs(self.lost) or 1.0)
@@ -478,20 +475,18 @@ class EquilibriumPath(ByValue, ResultViews):
                 f"together from there on, and patches open from inside at {strength:.3g} Pa, "
                 f"{counted(self.openings, 'opening')} with barriers of "
                 f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; "
-                f"{outside}; zones at edges, left out, change the loss by about {zones:.1g} %"
+                f"{outside_text(*self.outer_ranges)}; zones at edges, left out, change the loss by "
+                f"about {zones:.1g} %"
             )
         inside = "no tension inside patches"
         if interior is not None:
             inside = (
                 f"tension inside patches of {stress_text(interior.tension)} on {interior.branch} "
-                f"at Δ/h_max = {interior.penetration:.4g}: {1e9 * self.valid_range:.3g} nm"
+                f"at Δ/h_max = {interior.penetration:.4g}"
             )
         if self.problem.work_of_adhesion == 0:
             return inside
-        return (
-            "the zero-range model is valid if the real adhesion reaches less than "
-            f"{1e9 * self.least_range:.3g} nm ({inside}; {outside})"
-        )
+        return limit_text(inside, self.valid_range, *self.outer_ranges)
 
     # ------------------------------------------------------------------ for tables and files
 

@@ -271,6 +271,34 @@ def least_range(
     return np.asarray(np.fmin.reduce(np.array(ranges, dtype=np.float64)), dtype=np.float64)
 
 
+def limit_text(
+    inside: str, valid_range: float, edge_range: float, touch_range: float, turn_range: float
+) -> str:
+    """Return in one line for which ranges of adhesion in m the zero-range limit holds.
+
+    ``inside`` says what is known of the tension inside patches, which sets ``valid_range``.
+    """
+    if math.isfinite(valid_range):
+        inside += f": {length_text(valid_range)}"
+    least = float(least_range(valid_range, edge_range, touch_range, turn_range))
+    return (
+        "the zero-range model is valid if the real adhesion reaches less than "
+        f"{length_text(least)} ({inside}; {outside_text(edge_range, touch_range, turn_range)})"
+    )
+
+
+def outside_text(edge_range: float, touch_range: float, turn_range: float) -> str:
+    """Return the finite ones of the ranges in m that hold elsewhere than inside patches."""
+    named = {"at edges": edge_range, "at touches": touch_range, "beyond the turn": turn_range}
+    known = {name: bound for name, bound in named.items() if math.isfinite(bound)}
+    return "; ".join(f"{name}: {length_text(bound)}" for name, bound in known.items())
+
+
+def length_text(metres: float) -> str:
+    """Return a range of adhesion in a unit of its size: "17.5 nm"."""
+    return f"{1e6 * metres:.3g} µm" if metres >= 1e-6 else f"{1e9 * metres:.3g} nm"
+
+
 def stress_text(pascals: float) -> str:
     """Return a stress in a unit of its size: "100 kPa"."""
     return f"{1e-6 * pascals:.3g} MPa" if pascals >= 1e6 else f"{1e-3 * pascals:.3g} kPa"

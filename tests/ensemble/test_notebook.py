@@ -227,7 +227,7 @@ def test_a_film_shows_a_bar_and_is_the_same(capsys):
 
 
 @pytest.mark.usefixtures("quick_figures")
-def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_path):
+def test_a_trace_shows_its_progress_and_its_answer_is_shown_by_a_notebook(capsys, tmp_path):
     step = 1e-3 / 400
     x = step * np.arange(400)
     profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=2, h_rms=1e-6)
@@ -245,7 +245,7 @@ def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_p
     )
     runs = len(answer.plan.runs)
     assert seen[-1] == runs
-    assert f"{runs}/{runs}" in capsys.readouterr().err
+    assert f"{runs} of {runs} loops" in capsys.readouterr().err
     page = answer._repr_html_()
     assert "<th>loss</th>" in page
     assert "data:image/png;base64," in page

@@ -9,11 +9,10 @@ import pytest
 from matplotlib.axes import Axes
 
 import adhesis
-from adhesis import Control, Problem, prepare_trace, read_trace, run_loop
+from adhesis import Control, Problem, prepare_trace, read_trace, run_loop, single_wave
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.command.trace import _progress
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.figures.catalogue import sections
 from adhesis.ensemble.report.markdown_page import write_page
@@ -119,8 +118,10 @@ def test_a_mean_stress_that_the_loop_does_not_have_is_refused(tmp_path, monkeypa
 
 def test_the_way_of_a_trace_under_a_weight_has_a_unit(monkeypatch):
     monkeypatch.setattr(Loops, "running", {"answer": ("unloading", -3.4e4)})
-    for load, text in ((True, "p̄ -34 kPa)"), (False, "Δ/h_max -3.4e+04)")):
-        assert f"(unloading, {text}" in _progress(Loops((), 1), load)
+    for control, text in ((Control(0.0), "p̄ -34 kPa)"), (Control(), "Δ/h_max -3.4e+04)")):
+        cycle = Cycle(HALF_SPACE, (0.04,), (1.0,), control=control)
+        run = Run("answer", single_wave(1e-6, 1e-3), cycle, 0.04, 1.0)
+        assert f"(unloading, {text}" in f"{Loops([run], 1)}"
 
 
 def test_fields_are_written_at_mean_stresses(tmp_path):

@@ -88,7 +88,7 @@ loop --heights none.npy --period 1e-3 -> with --heights the material has to be g
 loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
     --heights needs --period
-WAVE --hurst 0.8 -> --hurst and --heights are given: give one of --hurst, --heights and --trace
+WAVE --hurst 0.8 -> --hurst and --heights are given: give one of them
 WAVE --seed 4 -> --seed belongs to --hurst
 WAVE --delimiter : -> --delimiter is ':': it must be one of
 WAVE --measure projected -> --measure is 'projected': it must be one of arc, flat
@@ -99,7 +99,7 @@ LOOP --path=out -> --path is 'out': it holds no turning point
 LOOP --path=0.5,x,out -> --path is '0.5,x,out': it must be numbers with commas
 LOOP --path=0.5,nan -> --path[1] is nan
 {{LOOP,TRACE --plan --unit um}} --adhesion-range 0.3 -> --adhesion-range is 0.3 m: it must be at
-LOOP --path=0.5 --max-penetration 0.5 -> a loop has one of them
+LOOP --path=0.5 --max-penetration 0.5 -> are given: give one of them
 LOOP --path 0,5,0,2,out -> --path is '0,5,0,2,out': numbers have a decimal point, as in
 LOOP --max-penetration 90% -> --max-penetration is '90%': it must be one or more numbers between
 LOOP --max-penetration 0.5,0.5 -> turning points must differ
@@ -154,7 +154,7 @@ TRACE --plan --unit um --step 1um -> --step belongs to heights without
 TRACE --plan --unit um --processes 0 -> --processes is 0
 TRACE --plan --work-of-adhesion {{0\,04,0.02\,0\,04,2\,5mJ/m2}} ->
     --work-of-adhesion is '{{}}': numbers have a decimal point, as in
-TRACE --plan --work-of-adhesion 1.0,1.0 -> is '1.0,1.0': its values must
+TRACE --plan --work-of-adhesion 1.0,1.0 -> is [1.0, 1.0]: its values must
 TRACE --plan --unit um --work-of-adhesion inf -> work-of-adhesion is inf: it must be 0 or a positive
 TRACE --plan --work-of-adhesion 20mJ -> --work-of-adhesion is '20mJ': it must be a number in J/m²
 TRACE --plan --unit um --work-of-adhesion=-1 -> --work-of-adhesion is -1

@@ -197,7 +197,7 @@ def test_the_command_passes_what_is_given(words, control, turns, pattern, tmp_pa
     np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
     given: list[Any] = []
 
-    def stop(prepared: Prepared, cycle: Any, plan: Plan, watch: object) -> Answer:
+    def stop(prepared: Prepared, cycle: Any, plan: Plan, progress: bool) -> Answer:
         given.append(cycle)
         raise NoAnswer("stopped")
 
