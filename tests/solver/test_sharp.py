@@ -45,12 +45,6 @@ def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     assert losses == pytest.approx([losses[1]] * 3, rel=1e-3)
 
 
-def test_touching_is_looked_for_before_a_branch_ends():
-    """Surfaces touch at s = 0.10517 h_max, just before a branch that is followed finely ends."""
-    losses = [loop(of_paper(5), 0.04, accuracy=a).loss for a in (1e-3, 1e-5)]
-    assert losses[0] == pytest.approx(losses[1], rel=1e-3)
-
-
 def test_ten_thousand_waves():
     """Wave numbers 10 … 10,000: the field needs no more modes than before."""
     profile = of_paper(1, ratio=1000)
@@ -99,21 +93,6 @@ def test_fields_obey_the_boundary_conditions():
     assert abs(fields.displacement.mean()) < 1e-4 * profile.h_rms
     # sums over nodes miss the square-root edges: error ~ sqrt(dx)
     assert fields.stress.mean() == pytest.approx(state.mean_stress, rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("hurst", "n0", "ratio", "gamma", "seed", "accuracy", "max_penetration"),
-    [
-        # a minimum at a fold that the field's error hides and shows again, from step to step
-        (0.43401581445546505, 4, 10, 0.16417912944464388, 798665, 1e-4, 0.5263623158621008),
-        (0.8, 5, 8, 0.01, 1511, 1e-3, 0.9),
-    ],
-)
-def test_loops_that_once_did_not_end(hurst, n0, ratio, gamma, seed, accuracy, max_penetration):
-    profile = rough(seed, n0=n0, ratio=ratio, hurst=hurst)
-    result = loop(profile, gamma, accuracy=accuracy, max_penetration=max_penetration)
-    assert result.patches[-1] == 0
-    assert abs(result.audit_residual) < 1e-4
 
 
 def test_a_path_goes_on_from_a_minimum_next_to_a_fold():
