@@ -1,9 +1,13 @@
 """Method sharp, whole loops: exact losses, the grid's limit, invariances and hard cases."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from adhesis import Problem, Profile, make_method, run_loop, self_affine_profile
+from adhesis import Problem, Profile, make_method, run_loop, self_affine_profile, single_wave
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp.continuation.branch import Fold, StableBranch, Target
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support import scenes
 from tests.support.scenes import HALF_SPACE, loop_of, of_paper
@@ -43,6 +47,28 @@ def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
         method.edges.law.longest_step *= share
         losses.append(run_loop(method, max_penetration=0.9, load_steps=20).loss)
     assert losses == pytest.approx([losses[1]] * 3, rel=1e-3)
+
+
+@pytest.mark.parametrize("resolution", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked(resolution):
+    """In steps that no integral shortens, from half of the depth of a wave, in units of h_max."""
+    amplitude = 1e-8
+    wave = SingleWave.with_alpha(0.2, amplitude, 1e-3, HALF_SPACE.modulus, "arc")
+    problem = Problem(single_wave(amplitude, 1e-3), HALF_SPACE, wave.work_of_adhesion)
+    method = SharpMethod(problem, accuracy=1e-8)
+    edges, h_max = method.edges, method.resolution.h_max
+    state = method.follow(method.detached(amplitude), 0.5 * amplitude).states[-1]
+    point = edges.equilibrium(state.internal.gaps, 0.5 * h_max, edges.wave)
+    finer = replace(method.resolution, jump=resolution * h_max, bend=np.inf)
+    target = Target(3 * h_max, 3 * amplitude, "unloading")
+    branch, places = StableBranch(edges, finer, method.states, point, target), []
+    before = edges.count.newton_steps
+    while not isinstance(event := branch.advance(), Fold):
+        places.append(event.point.d)
+    assert event.point.d < method.q0 * wave.loop.fold_separation < event.d
+    assert event.d - event.point.d < 2 * finer.jump
+    assert edges.count.newton_steps - before < 45  # 30 to 37
+    assert places == sorted(places)
 
 
 def test_ten_thousand_waves():
