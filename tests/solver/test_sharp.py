@@ -24,19 +24,6 @@ def loop(profile, gamma, **path):
     return loop_of(Problem(profile, HALF_SPACE, gamma), **path)
 
 
-def test_grid_converges_to_sharp():
-    """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
-    problem = Problem(rough(n0=2, ratio=6), HALF_SPACE, 0.01)
-    path = {"max_penetration": 0.9, "load_steps": 10}
-    sharp = loop_of(problem, **path).loss
-    errors = []
-    for nodes in (8, 64):
-        grid = loop_of(problem, "grid", nodes_per_wave=nodes, **path)
-        errors.append(abs(grid.loss / sharp - 1))
-    assert errors[1] < errors[0]
-    assert errors[1] < 2e-3
-
-
 @pytest.mark.parametrize(("seed", "gamma"), [(1, 0.02), (2, 0.1)])
 def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     """Edges that race make a path sensitive; steps that are minima in their box decide it."""

@@ -201,7 +201,7 @@ def test_every_claim_about_the_method_holds(name, capsys, request, monkeypatch):
 
     On a grid of a quarter as many nodes, whose edges are known a quarter as well. Other α are in
     test_sharp_path.py, controls in test_control_loops.py, audits of rough loops in test_extremes.py
-    and test_touch.py.
+    and test_hostile.py.
     """
     alphas = validation.ALPHAS
     if not request.config.getoption("--slow"):
