@@ -137,18 +137,36 @@ def test_ranks_end_with_their_run_and_the_next_one_goes_on(
     assert goes_on(path, out, whole) >= 2
 
 
-def test_ranks_end_when_the_results_file_is_moved(tmp_path):
-    """The run would have gone on, and reported rows as done that nobody finds."""
+@pytest.mark.parametrize(
+    ("started", "done_to_it", "code", "said"),
+    [
+        (OWN, "moved", 74, "r.h5 was moved, replaced or removed while a run wrote to it"),
+        (MPI, "zeros", 2, "or it is damaged"),
+        (MPI, "an older copy", 74, "of 8 finished tasks: another program"),
+    ],
+)
+def test_ranks_whose_file_is_taken_away_end_with_one_sentence(
+    tmp_path, started, done_to_it, code, said
+):
+    """Rows that nobody finds were reported as done; no rank goes to the end of MPI with it open."""
     path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
-    process = start("run", path, "--out", out, "--ranks", 3, fake=f"hold=1 free={free}")
-    wait_until(lambda: done_rows(out) >= 1)
-    out.rename(tmp_path / "old.h5")
+    words, launched = started
+    process = start("run", path, "--out", out, *words, ranks=launched, fake=f"hold=1 free={free}")
+    wait_until(out.exists)
+    copy = out.read_bytes() if code == 74 else bytes(out.stat().st_size)
+    wait_until(lambda: done_rows(out) >= 2)
+    if done_to_it == "moved":
+        out.rename(tmp_path / "old.h5")
+    else:
+        out.write_bytes(copy)
     free.touch()
-    _, errors = process.communicate(timeout=150)
-    assert process.returncode == 74, errors
-    assert "r.h5 was moved, replaced or removed while a run wrote to it" in errors
-    (tmp_path / "old.h5").rename(out)
-    assert here(path, out).done == 8
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == code, errors
+    (line,) = (line for line in errors.splitlines() if line.startswith("adhesis run: "))
+    assert said in line
+    assert "Traceback" not in errors
+    if done_to_it == "moved":
+        assert here(path, (tmp_path / "old.h5").rename(out)).done == 8
 
 
 def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(tmp_path):
@@ -240,25 +258,6 @@ def test_an_error_under_mpirun_is_one_sentence(tmp_path):
     (line,) = (line for line in process.stderr.splitlines() if "adhesis" in line)
     assert "hurst is [1.5]: it must be a list" in line
     assert [path.name for path in tmp_path.iterdir()] == ["c.toml"]
-
-
-@pytest.mark.parametrize(
-    ("code", "sentence"), [(2, "or it is damaged"), (74, "of 8 finished tasks: another program")]
-)
-def test_ranks_whose_file_was_copied_over_end_with_one_sentence(tmp_path, code, sentence):
-    """By zeros, or by an older copy; no rank goes to the end of MPI with the file open."""
-    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
-    process = start("run", path, "--out", out, ranks=3, fake=f"hold=1 free={free}")
-    wait_until(lambda: out.exists())
-    copy = out.read_bytes() if code == 74 else bytes(out.stat().st_size)
-    wait_until(lambda: done_rows(out) >= 2)
-    out.write_bytes(copy)
-    free.touch()
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == code, errors
-    (line,) = (line for line in errors.splitlines() if line.startswith("adhesis run: "))
-    assert sentence in line
-    assert "Traceback" not in errors
 
 
 def test_a_run_that_starts_its_ranks_ends_with_one_sentence(tmp_path):
