@@ -276,6 +276,15 @@ def test_a_signal_in_a_finalizer_ends_a_command(number, code, capsys, monkeypatc
     assert len(timers) > 1  # more where what it raised was dropped once more
 
 
+def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
+    def interrupt(seconds):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("adhesis.ensemble.command.status.time.sleep", interrupt)
+    assert main(["status", "r.h5", "--watch"]) == 130
+    assert capsys.readouterr().err == "adhesis status: interrupted\n"
+
+
 def process(*words, package="adhesis", before="", **options) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, by a shell where something stands before it."""
     command = [sys.executable, "-m", package, *words]
