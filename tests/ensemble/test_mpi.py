@@ -1,7 +1,6 @@
 """Campaigns under mpirun: the same bits for any number of ranks, and what happens when some die."""
 
 import contextlib
-import json
 import os
 import random
 import shutil
@@ -22,7 +21,6 @@ from adhesis.ensemble.run.progress import Summary
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     adhesis,
-    adhesis_here,
     campaign_text,
     differences,
     done_rows,
@@ -93,82 +91,82 @@ def goes_on(path, out, whole) -> int:
     return done
 
 
-@pytest.mark.parametrize("victim", ["worker", "master"])
-def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
-    """A kill of all ranks: test_precision.py, and with the other writer below."""
-    path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
-    process = start("run", path, "--out", out, ranks=3, fake="hold=2")
-    wait_until(lambda: done_rows(out) >= 3)
-    os.kill(ranks_of(process.pid)[0 if victim == "master" else -1], signal.SIGKILL)
-    process.communicate(timeout=150)
-    assert process.returncode not in (0, 1, 2, 75)
-    kept = done_rows(out)
-    assert here(path, out, f"log={log}").done == 8
-    assert differences(out, whole) == []
-    # Ranks that outlived their launcher by a moment may have finished a row meanwhile.
-    assert 8 - kept - 2 <= len(log.read_text().splitlines()) <= 8 - kept
+MPI, OWN = ((), 3), (("--ranks", 3), 0)
+ENDLESS = "step=0.1 hang=0.8:0.04:1"  # one of the tasks never ends
+LAUNCHER, FIRST, LAST = "the launcher", "the first rank", "the last rank"
+BY_SIGNAL = ("stopped early: SIGUSR1 received",)
+BY_CTRL_C = (
+    "stopped early: Ctrl-C (SIGINT) received",
+    "Ctrl-C (SIGINT) received: tasks in progress have up to 30 s to stop",
+)
+SILENT = "rank 2 has not answered for 1 s; what the file holds is kept, run the same command again"
 
 
-def test_ranks_of_a_run_stop_with_it_in_order(tmp_path):
-    """What each signal is called: test_run.py."""
-    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, "--ranks", 2, fake="hold=1")
-    wait_until(lambda: done_rows(out) >= 1)
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=150)
-    assert process.returncode == 75, errors
-    assert "stopped early: Ctrl-C (SIGINT) received" in errors
-    assert "Ctrl-C (SIGINT) received: tasks in progress have up to 30 s to stop" in errors
-
-
-def test_ranks_end_when_the_results_file_is_moved(tmp_path):
-    """The run would have gone on, and reported rows as done that nobody finds."""
+@pytest.mark.parametrize(
+    ("started", "fake", "hit", "number", "code", "said"),
+    [
+        (MPI, "hold=2", LAST, signal.SIGKILL, None, ()),
+        (MPI, "hold=2", FIRST, signal.SIGKILL, None, ()),
+        (MPI, ENDLESS, LAUNCHER, signal.SIGUSR1, 75, BY_SIGNAL),
+        (MPI, ENDLESS, LAST, signal.SIGUSR1, 75, BY_SIGNAL),
+        (OWN, "hold=1", LAUNCHER, signal.SIGINT, 75, BY_CTRL_C),
+        (OWN, "hold=1", LAUNCHER, signal.SIGKILL, -signal.SIGKILL, ()),
+        # as if its node hung; it never comes back
+        (OWN, "hold=1 silence=1", LAST, signal.SIGSTOP, 75, (SILENT,)),
+    ],
+)
+def test_ranks_end_with_their_run_and_the_next_one_goes_on(
+    tmp_path, whole, started, fake, hit, number, code, said
+):
+    """A kill of all ranks: test_precision.py, and with the other writer below; see test_run.py."""
+    if code == -signal.SIGKILL and sys.platform != "linux":
+        pytest.skip("the system ends children on Linux alone")
     path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
-    process = start("run", path, "--out", out, "--ranks", 3, fake=f"hold=1 free={free}")
-    wait_until(lambda: done_rows(out) >= 1)
-    out.rename(tmp_path / "old.h5")
-    free.touch()
-    _, errors = process.communicate(timeout=150)
-    assert process.returncode == 74, errors
-    assert "r.h5 was moved, replaced or removed while a run wrote to it" in errors
-    (tmp_path / "old.h5").rename(out)
-    assert here(path, out).done == 8
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="the system ends children on Linux alone")
-def test_ranks_end_with_a_run_that_is_killed_and_the_next_one_resumes(tmp_path, whole):
-    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, "--ranks", "3", fake="hold=1")
-    wait_until(lambda: done_rows(out) >= 1)
-    left = ranks_of(process.pid)
-    assert len(left) == 2
-    process.kill()
-    process.wait()
-    wait_until(lambda: all(map(has_ended, left)))
-    assert goes_on(path, out, whole) >= 1
-
-
-def test_a_rank_that_hangs_ends_the_job_and_the_same_command_goes_on(tmp_path, whole):
-    """Rank 2 is stopped in its second task, as if its node hung; it never comes back.
-
-    Until then the file can be read: its status is that of the running campaign.
-    """
-    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
-    process = start(
-        *("run", path, "--out", out, "--ranks", "3"), fake=f"hold=1 free={free} silence=1"
-    )
+    words, launched = started
+    process = start("run", path, "--out", out, *words, ranks=launched, fake=f"{fake} free={free}")
     wait_until(lambda: done_rows(out) >= 2)
-    status = json.loads(adhesis_here("status", out, "--json").stdout)
-    assert (status["done"], status["pending"]) == (2, 6)
-    os.kill(ranks_of(process.pid)[-1], signal.SIGSTOP)
-    free.touch()
+    ranks = ranks_of(process.pid)
+    assert len(ranks) == (launched or 2)
+    os.kill({LAUNCHER: process.pid, FIRST: ranks[0], LAST: ranks[-1]}[hit], number)
+    if number == signal.SIGSTOP:
+        free.touch()
     _, errors = process.communicate(timeout=150)
-    assert process.returncode == 75, errors
-    assert errors.splitlines()[-1] == (
-        "adhesis run: rank 2 has not answered for 1 s; what the file holds is kept, run the same "
-        "command again to resume"
-    )
+    assert process.returncode == code or (code is None and process.returncode not in (0, 1, 2, 75))
+    assert all(phrase in errors for phrase in said), errors
+    wait_until(lambda: all(map(has_ended, ranks)))
     assert goes_on(path, out, whole) >= 2
+
+
+@pytest.mark.parametrize(
+    ("started", "done_to_it", "code", "said"),
+    [
+        (OWN, "moved", 74, "r.h5 was moved, replaced or removed while a run wrote to it"),
+        (MPI, "zeros", 2, "or it is damaged"),
+        (MPI, "an older copy", 74, "of 8 finished tasks: another program"),
+    ],
+)
+def test_ranks_whose_file_is_taken_away_end_with_one_sentence(
+    tmp_path, started, done_to_it, code, said
+):
+    """Rows that nobody finds were reported as done; no rank goes to the end of MPI with it open."""
+    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
+    words, launched = started
+    process = start("run", path, "--out", out, *words, ranks=launched, fake=f"hold=1 free={free}")
+    wait_until(out.exists)
+    copy = out.read_bytes() if code == 74 else bytes(out.stat().st_size)
+    wait_until(lambda: done_rows(out) >= 2)
+    if done_to_it == "moved":
+        out.rename(tmp_path / "old.h5")
+    else:
+        out.write_bytes(copy)
+    free.touch()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == code, errors
+    (line,) = (line for line in errors.splitlines() if line.startswith("adhesis run: "))
+    assert said in line
+    assert "Traceback" not in errors
+    if done_to_it == "moved":
+        assert here(path, (tmp_path / "old.h5").rename(out)).done == 8
 
 
 def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(tmp_path):
@@ -232,18 +230,6 @@ def rows_done(path) -> set[str]:
         }
 
 
-@pytest.mark.parametrize("to", ["launcher", "one rank"])
-def test_a_signal_stops_every_rank_within_a_load_step(tmp_path, whole, to):
-    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, ranks=3, fake="step=0.1 hang=0.8:0.04:1")
-    wait_until(lambda: done_rows(out) >= 2)
-    os.kill(process.pid if to == "launcher" else ranks_of(process.pid)[-1], signal.SIGUSR1)
-    _, errors = process.communicate(timeout=150)  # one of the tasks would never end
-    assert process.returncode == 75, errors
-    assert "stopped early: SIGUSR1 received" in errors
-    assert goes_on(path, out, whole) >= 2
-
-
 def test_an_error_that_is_not_a_tasks_ends_the_job(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = adhesis("run", path, "--out", out, ranks=3, fake="crash=0.8:0.01:0")
@@ -272,25 +258,6 @@ def test_an_error_under_mpirun_is_one_sentence(tmp_path):
     (line,) = (line for line in process.stderr.splitlines() if "adhesis" in line)
     assert "hurst is [1.5]: it must be a list" in line
     assert [path.name for path in tmp_path.iterdir()] == ["c.toml"]
-
-
-@pytest.mark.parametrize(
-    ("code", "sentence"), [(2, "or it is damaged"), (74, "of 8 finished tasks: another program")]
-)
-def test_ranks_whose_file_was_copied_over_end_with_one_sentence(tmp_path, code, sentence):
-    """By zeros, or by an older copy; no rank goes to the end of MPI with the file open."""
-    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
-    process = start("run", path, "--out", out, ranks=3, fake=f"hold=1 free={free}")
-    wait_until(lambda: out.exists())
-    copy = out.read_bytes() if code == 74 else bytes(out.stat().st_size)
-    wait_until(lambda: done_rows(out) >= 2)
-    out.write_bytes(copy)
-    free.touch()
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == code, errors
-    (line,) = (line for line in errors.splitlines() if line.startswith("adhesis run: "))
-    assert sentence in line
-    assert "Traceback" not in errors
 
 
 def test_a_run_that_starts_its_ranks_ends_with_one_sentence(tmp_path):

@@ -97,7 +97,7 @@ def test_jumps_under_a_weight_do_work_on_their_branch(rough):
     assert loop.work_spent - loop.work_gained == pytest.approx(loop.loss, rel=1e-12)
 
 
-@pytest.mark.parametrize("relative", [1.0, 0.0])
+@pytest.mark.parametrize("relative", [np.inf, 1.0, 0.0])
 def test_the_two_methods_agree_under_every_control(relative):
     profile = scenes.rough(2, 4, 2, period=PERIOD)
     unit = Problem(profile, HALF_SPACE, 0.0).stress_scale / profile.h_max
@@ -106,7 +106,7 @@ def test_the_two_methods_agree_under_every_control(relative):
     grid = scenes.loop_of(problem, "grid", nodes_per_wave=128, load_steps=4, **turn)
     sharp = scenes.loop_of(problem, load_steps=4, **turn)
     assert abs(grid.audit_residual) < 2e-3
-    assert grid.loss == pytest.approx(sharp.loss, rel=0.01)
+    assert grid.loss == pytest.approx(sharp.loss, rel=2e-3)
     assert grid.pull_off_stress == pytest.approx(sharp.pull_off_stress, rel=0.01)
 
 

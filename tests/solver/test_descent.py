@@ -149,17 +149,7 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
 
 
-def test_a_step_after_which_a_gap_needs_more_nodes_is_judged():
-    """Without that it passed a minimum 0.04 λ_min beyond a fold: one jump less, loss 3e-3 off."""
-    profile = scenes.rough(6, 2, 432018, hurst=0.269, h_rms=7.815913146729246e-5)
-    problem = Problem(profile, HALF_SPACE, 56.953749479986186, strength=7.224849617527944e7)
-    path = {"max_penetration": 0.8079232131592422, "load_steps": 18}
-    coarse, fine = scenes.loops_at(problem, 1e-3, 1e-4, **path)
-    assert [jump.kind for jump in coarse.jumps] == [jump.kind for jump in fine.jumps]
-    assert abs(coarse.loss - fine.loss) < coarse.loss_error + fine.loss_error
-
-
-def test_later_steps_after_which_a_gap_needs_more_nodes_are_judged_too():
+def test_later_steps_after_which_a_gap_needs_more_nodes_are_judged():
     """Without that the gap beside a new patch closed beyond a minimum: the loss was 4 % off."""
     profile = of_paper(5, ratio=10)
     method = SharpMethod(Problem(profile, HALF_SPACE, 0.01), accuracy=1e-6)

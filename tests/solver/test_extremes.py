@@ -113,22 +113,17 @@ def test_no_loss_without_adhesion(name, rounding):
 
 
 @pytest.mark.parametrize("name", ["sharp", "grid"])
-def test_first_touch_may_run_to_almost_full_contact(name):
-    """Strong adhesion: one jump closes all but the last gap, which stays as the mean gap is s."""
-    result = loop_by(name, 5.0, 0.5)
-    assert result.jumps[0].kind == "snap-in"
-    assert result.jumps[0].contact_after > 0.85
-    assert result.contact_fraction.max() < 1
-    assert abs(result.audit_residual) < AUDIT[name]
-    assert result.patches[-1] == 0
-
-
-@pytest.mark.parametrize("name", ["sharp", "grid"])
-@pytest.mark.parametrize("hurst", [0.05, 0.999])
-def test_any_hurst_exponent_gives_an_audited_loop(name, hurst):
-    result = loop_by(name, 0.01, hurst=hurst)
+@pytest.mark.parametrize(
+    ("gamma", "depth", "hurst"), [(0.01, 0.9, 0.05), (0.01, 0.9, 0.999), (5.0, 0.5, 0.8)]
+)
+def test_any_hurst_exponent_and_strong_adhesion_give_an_audited_loop(name, gamma, depth, hurst):
+    """By strong adhesion one jump closes all but the last gap, which stays as the mean gap is s."""
+    result = loop_by(name, gamma, depth, hurst=hurst)
     assert result.loss > 0
     assert abs(result.audit_residual) < AUDIT[name]
+    assert result.contact_fraction.max() < 1
+    first = result.jumps[0]
+    assert (first.kind, first.contact_after > 0.85) == ("snap-in", gamma == 5.0)
 
 
 @pytest.mark.parametrize(("name", "near"), [("sharp", 1e-5), ("grid", 1e-2)])

@@ -86,17 +86,6 @@ def wavy_up_to(theta: float, recedes: bool) -> float:
     return float(theta + 0.5 - 0.5 * np.cos(theta))
 
 
-def wavy_above(theta: float, recedes: bool) -> tuple[float, float]:
-    """Return w that varies about a larger mean, and its slope."""
-    work, slope = wavy(theta, recedes)
-    return work + 0.8, slope
-
-
-def wavy_above_up_to(theta: float, recedes: bool) -> float:
-    """Integrate w that varies about a larger mean."""
-    return wavy_up_to(theta, recedes) + 0.8 * theta
-
-
 def test_a_law_that_keeps_its_contract_is_taken() -> None:
     problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
     SharpMethod(problem, adhesion=PythonAdhesion(False, 0.5, 1.5, wavy, wavy_up_to))
@@ -128,7 +117,10 @@ def test_equal_parts_and_mirror_images_are_those_that_a_law_of_its_own_shares(ph
     ("work", "up_to", "pins", "rule"),
     [
         (lambda a, r: (np.sin(a), np.cos(a)), lambda a, r: 1 - np.cos(a), False, "be positive"),
-        (wavy_above, wavy_above_up_to, False, "be at most 2, its largest"),
+        (
+            *(lambda a, r: (wavy(a, r)[0] + 0.8, wavy(a, r)[1]),),
+            *(lambda a, r: wavy_up_to(a, r) + 0.8 * a, False, "be at most 2, its largest"),
+        ),
         (lambda a, r: (wavy(a, r)[0] - 0.2, wavy(a, r)[1]), wavy_up_to, False, "be at least 0.5"),
         (lambda a, r: (1 + 0.01 * a, 0.01), lambda a, r: a + 5e-3 * a**2, False, "period 2π"),
         (lambda a, r: (wavy(a, r)[0], 0.0), wavy_up_to, False, "slope"),

@@ -1,9 +1,13 @@
 """Method sharp, whole loops: exact losses, the grid's limit, invariances and hard cases."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from adhesis import Problem, Profile, make_method, run_loop, self_affine_profile
+from adhesis import Problem, Profile, make_method, run_loop, self_affine_profile, single_wave
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp.continuation.branch import Fold, StableBranch, Target
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support import scenes
 from tests.support.scenes import HALF_SPACE, loop_of, of_paper
@@ -20,19 +24,6 @@ def loop(profile, gamma, **path):
     return loop_of(Problem(profile, HALF_SPACE, gamma), **path)
 
 
-def test_grid_converges_to_sharp():
-    """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
-    problem = Problem(rough(n0=2, ratio=6), HALF_SPACE, 0.01)
-    path = {"max_penetration": 0.9, "load_steps": 10}
-    sharp = loop_of(problem, **path).loss
-    errors = []
-    for nodes in (8, 64):
-        grid = loop_of(problem, "grid", nodes_per_wave=nodes, **path)
-        errors.append(abs(grid.loss / sharp - 1))
-    assert errors[1] < errors[0]
-    assert errors[1] < 2e-3
-
-
 @pytest.mark.parametrize(("seed", "gamma"), [(1, 0.02), (2, 0.1)])
 def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     """Edges that race make a path sensitive; steps that are minima in their box decide it."""
@@ -45,10 +36,26 @@ def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     assert losses == pytest.approx([losses[1]] * 3, rel=1e-3)
 
 
-def test_touching_is_looked_for_before_a_branch_ends():
-    """Surfaces touch at s = 0.10517 h_max, just before a branch that is followed finely ends."""
-    losses = [loop(of_paper(5), 0.04, accuracy=a).loss for a in (1e-3, 1e-5)]
-    assert losses[0] == pytest.approx(losses[1], rel=1e-3)
+@pytest.mark.parametrize("resolution", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked(resolution):
+    """In steps that no integral shortens, from half of the depth of a wave, in units of h_max."""
+    amplitude = 1e-8
+    wave = SingleWave.with_alpha(0.2, amplitude, 1e-3, HALF_SPACE.modulus, "arc")
+    problem = Problem(single_wave(amplitude, 1e-3), HALF_SPACE, wave.work_of_adhesion)
+    method = SharpMethod(problem, accuracy=1e-8)
+    edges, h_max = method.edges, method.resolution.h_max
+    state = method.follow(method.detached(amplitude), 0.5 * amplitude).states[-1]
+    point = edges.equilibrium(state.internal.gaps, 0.5 * h_max, edges.wave)
+    finer = replace(method.resolution, jump=resolution * h_max, bend=np.inf)
+    target = Target(3 * h_max, 3 * amplitude, "unloading")
+    branch, places = StableBranch(edges, finer, method.states, point, target), []
+    before = edges.count.newton_steps
+    while not isinstance(event := branch.advance(), Fold):
+        places.append(event.point.d)
+    assert event.point.d < method.q0 * wave.loop.fold_separation < event.d
+    assert event.d - event.point.d < 2 * finer.jump
+    assert edges.count.newton_steps - before < 45  # 30 to 37
+    assert places == sorted(places)
 
 
 def test_ten_thousand_waves():
@@ -99,21 +106,6 @@ def test_fields_obey_the_boundary_conditions():
     assert abs(fields.displacement.mean()) < 1e-4 * profile.h_rms
     # sums over nodes miss the square-root edges: error ~ sqrt(dx)
     assert fields.stress.mean() == pytest.approx(state.mean_stress, rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("hurst", "n0", "ratio", "gamma", "seed", "accuracy", "max_penetration"),
-    [
-        # a minimum at a fold that the field's error hides and shows again, from step to step
-        (0.43401581445546505, 4, 10, 0.16417912944464388, 798665, 1e-4, 0.5263623158621008),
-        (0.8, 5, 8, 0.01, 1511, 1e-3, 0.9),
-    ],
-)
-def test_loops_that_once_did_not_end(hurst, n0, ratio, gamma, seed, accuracy, max_penetration):
-    profile = rough(seed, n0=n0, ratio=ratio, hurst=hurst)
-    result = loop(profile, gamma, accuracy=accuracy, max_penetration=max_penetration)
-    assert result.patches[-1] == 0
-    assert abs(result.audit_residual) < 1e-4
 
 
 def test_a_path_goes_on_from_a_minimum_next_to_a_fold():

@@ -149,16 +149,6 @@ def test_two_patches_that_are_mirror_images_part_as_soon_as_they_are_a_saddle():
     assert one.separation == pytest.approx(other.separation, abs=2e-5 * problem.profile.h_max)
 
 
-def test_equal_parts_are_left_in_the_same_modes_at_every_accuracy():
-    """The field's error mixed the soft modes of six parts: the loss was 5e-4 off."""
-    amplitudes = np.zeros(19, dtype=complex)
-    phases = np.array([2.53786772, -1.69909405, 1.32173731])
-    amplitudes[6::6] = [6.29675005e-7, 2.74081965e-7, 1.68488766e-7] * np.exp(1j * phases)
-    problem = Problem(Profile(2e-3, amplitudes), SOFT, 9.93808898912e-4)
-    coarse, fine = loops_at(problem, 1e-3, 1e-4, max_penetration=0.7399679303, load_steps=10)
-    assert abs(coarse.loss - fine.loss) < coarse.loss_error
-
-
 def test_grid_takes_mirror_images_one_after_the_other_too():
     """Two outer crests of one height, which touch at once; the trough between them stays open."""
     profile = Profile(2e-3, np.array([0, 1e-7, -4e-7, -1e-7], dtype=complex))

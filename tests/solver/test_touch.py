@@ -1,14 +1,13 @@
 """Where surfaces touch: which of several places gets a patch, and how wide its seed is."""
 
 import numpy as np
-import pytest
 
-from adhesis import HalfSpace, Problem, single_wave
+from adhesis import Problem, single_wave
 from adhesis.solver._kernels import local_minima
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation
-from tests.support.scenes import HALF_SPACE, loop_of, of_paper, rough
+from tests.support.scenes import HALF_SPACE
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3
 
@@ -47,14 +46,6 @@ def test_seeds_that_meet_are_one_patch() -> None:
     assert first_gap(1.02, 1.98) == [1.07, 1.93]
 
 
-@pytest.mark.parametrize("seed", [1, 9])
-def test_a_touch_is_found_in_a_gap_whose_other_minimum_is_far_from_touching(seed: int) -> None:
-    """In stiff contact the surfaces come together beside an edge, at a minimum that appears."""
-    stiff = Problem(rough(1, 10, seed), HalfSpace(1e12, 0.5), 0.04)
-    found = loop_of(stiff, accuracy=1e-2, max_penetration=0.9, load_steps=4)
-    assert abs(found.audit_residual) < 1e-4
-
-
 def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None:
     """Nodes that are not quite evenly spaced, minima anywhere between them."""
     rng = np.random.default_rng(7)
@@ -65,20 +56,3 @@ def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None
         (place,), (low,), (error,) = local_minima(nodes, opening)
         assert abs(place - at) < 0.3
         assert abs(low - 1) <= error
-
-
-@pytest.mark.parametrize(
-    ("hurst", "seed", "gamma", "depth"),
-    [
-        # the third derivative is large beside the curvature: the parabola errs by 5e-5 h_max
-        (0.9, 2384431779287079, 0.04, 0.6),
-        # two gaps close at once, one fast, one slowly
-        (0.7, 1734347148937202, 0.04, 0.6),
-        # the cubic between two points of the branch begins no equilibrium, their tangents do
-        (0.8, 8788061040437920, 0.01, 0.9),
-    ],
-)
-def test_every_touch_of_paper_scale_is_located(hurst, seed, gamma, depth):
-    problem = Problem(of_paper(seed, hurst), HALF_SPACE, gamma)
-    loop = loop_of(problem, max_penetration=depth, load_steps=40)
-    assert abs(loop.audit_residual) < 1e-4

@@ -7,12 +7,11 @@ import pytest
 
 from adhesis import Control, PathError, Problem, Profile, make_method, run_path, single_wave
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp.continuation.branch import StableBranch
 from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE as SOLID
-from tests.support.scenes import loop_of, loops_at, rough
+from tests.support.scenes import loop_of, rough
 from tools.hostile import draw
 
 A, PERIOD, GAMMA = 1e-6, 1e-4, 0.004
@@ -99,18 +98,6 @@ def test_a_minor_loop_within_the_pinned_range_is_reversible(control):
     assert path.friction > long.loss_from_drops
 
 
-def test_a_fold_of_receding_edges_is_not_passed():
-    """They were held beyond it: at 1e-3 it came late, at 1e-5 contact was never lost."""
-    heights = 1e-6 * np.array([0, 0.212617666 + 0.431181519j, -0.0647779269 + 0.108238956j])
-    problem = Problem(
-        Profile(PERIOD, heights), SOLID, 0.003851, work_of_adhesion_open=0.005139147130894255
-    )
-    path = {"max_penetration": 0.8668, "load_steps": 20}
-    coarse, fine, finest = loops_at(problem, 1e-3, 1e-4, 1e-5, **path)
-    assert abs(coarse.loss - finest.loss) < coarse.loss_error + finest.loss_error
-    assert abs(fine.loss - finest.loss) < fine.loss_error + finest.loss_error
-
-
 def test_a_loop_of_many_patches_closes_its_audit():
     """Most of its gaps lie apart in the tree, and some edges are pinned at most of its states."""
     problem = Problem(rough(10, 4, 3), SOLID, 2e-3, work_of_adhesion_open=3e-3)
@@ -163,22 +150,6 @@ def test_a_loop_under_a_load_does_not_creep() -> None:
     assert loop.method.newton_steps < 1000
     assert abs(loop.audit_residual) < 1e-4
     assert loop.friction > 0
-
-
-def test_edges_that_begin_to_move_together_do_not_hold_each_other_back(monkeypatch):
-    """The error of an equilibrium pins some again, by turns, at each smallest step."""
-    advance, steps = StableBranch.advance, [0]
-
-    def counted(branch):
-        steps[0] += 1
-        assert steps[0] < 20_000  # 5,000 without such steps
-        return advance(branch)
-
-    monkeypatch.setattr(StableBranch, "advance", counted)
-    scene = draw(9001, 0, "open")
-    problem = scene.problem()
-    coarse, fine = loops_at(problem, 1e-4, 1e-6, **scene.turn(problem))
-    assert abs(coarse.loss - fine.loss_from_drops) < coarse.loss_error
 
 
 @pytest.mark.parametrize("ratio", [1.0, 2.0])

@@ -14,11 +14,17 @@ TOGETHER = {
 }
 LONG = (
     *("ranks", "test_kinetics.py", "test_docs.py", "test_notebook.py", "test_report.py"),
-    *("test_grid.py", "test_run.py", "test_merge.py", "test_staging.py", "test_precision.py"),
-    *("test_sharp_path.py", "test_trace_answer.py", "test_damage.py", "test_preload.py"),
-    *("test_every_claim", "readers", "test_two_works.py", "test_store.py", "test_report_axes.py"),
-    *("test_symmetry.py", "test_finite_range.py", "test_interior.py", "test_sharp_many.py"),
-    *("test_opened.py", "test_loop_command.py", "test_extremes.py", "test_hostile.py"),
+    *("test_hostile.py", "test_grid.py", "test_run.py", "test_merge.py", "test_staging.py"),
+    *("test_precision.py", "test_sharp_path.py", "test_trace_answer.py", "test_damage.py"),
+    *("test_preload.py", "test_every_claim", "readers", "test_two_works.py", "test_store.py"),
+    *(
+        "test_report_axes.py",
+        "test_symmetry.py",
+        "test_finite_range.py",
+        "test_interior.py",
+        "test_sharp_many.py",
+    ),
+    *("test_opened.py", "test_loop_command.py", "test_extremes.py"),
     *("test_sharp.py", "test_bench.py", "test_limits.py", "test_pattern.py", "test_paths.py"),
 )
 
