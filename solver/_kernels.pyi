@@ -11,6 +11,8 @@ COMPILER: str
 
 CLOSING_SHARE: float
 
+FORCES_FELL: float
+
 ELSEWHERE: float
 
 SHAPE_NODES: float
@@ -211,6 +213,9 @@ class Descent:
 
     @property
     def raced(self) -> bool: ...
+
+    @property
+    def passed(self) -> NDArray[numpy.float64]: ...
 
 class LinearResponse:
     @property

@@ -377,7 +377,8 @@ void bind_response(nb::module_& m) {
       .def_prop_ro(
           "gaps", [](const Descent& d) { return pairs_of(d.ends); }, new_array)
       .def_ro("steps", &Descent::steps)
-      .def_ro("raced", &Descent::raced);
+      .def_ro("raced", &Descent::raced)
+      .def_prop_ro("passed", [](const Descent& d) { return pairs_of(d.passed); }, new_array);
   nb::class_<LinearResponse>(m, "LinearResponse")
       .def_prop_ro("gap_count", &LinearResponse::gap_count)
       .def_prop_ro("orders", [](const LinearResponse& r) { return r.nodes.orders; })
@@ -529,6 +530,7 @@ NB_MODULE(_kernels, m) {
   m.doc() = "Kernels of the methods sharp and grid.";
   m.attr("COMPILER") = ADHESIS_COMPILER;
   m.attr("CLOSING_SHARE") = adhesis::CLOSING_SHARE;
+  m.attr("FORCES_FELL") = adhesis::FORCES_FELL;
   m.attr("ELSEWHERE") = adhesis::ELSEWHERE;
   m.attr("SHAPE_NODES") = adhesis::SHAPE_NODES;
   m.attr("STEP_GROWTH") = adhesis::STEP_GROWTH;

@@ -209,13 +209,10 @@ double next_reach(double before, double length, double error) {
 // Let held edges flow through the model; `strongest` is the largest norm of forces so far.
 //
 // A long step that comes to rest, or to where a gap or patch vanishes, is taken as a short one.
-ModelFlow flow_on(const Integers& edges, const Vector& residual, const Matrix& tangent,
-                  const Vector& ends, double& strongest, double reach, bool equal_speeds,
-                  const EdgeLaw& law, const Panels& panels) {
+ModelFlow flow_on(const EdgeModel& start, const Integers& edges, const Vector& ends,
+                  double strongest, double reach, bool equal_speeds, const EdgeLaw& law) {
   const int count = int(edges.size());
-  const EdgeModel start(edges, ends, residual, tangent, law, panels);
   const double force = norm(start.forces());
-  strongest = std::max(strongest, force);
   const std::vector<Gap> gaps = map_gaps(ends);
   bool is_long = reach >= LEAST_REACH && !near_balance(force, strongest, law);
   while (true) {
@@ -308,10 +305,10 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
   double reach = FIRST_REACH;  // of the next long step, in longest steps
   EdgeStates states = held_edges(runs, ends, law);
   Integers edges = indices(states.held), modelled;
-  Vector before = ends;
+  Vector before = ends, fallen;
   ModelFlow flow;
   Matrix tangent;
-  double pressure = response.pressure_at(prescribed, device), strongest = 0;
+  double pressure = response.pressure_at(prescribed, device), strongest = 0, least = infinity;
   bool moved = true, judges = false;
   bool is_first = true;  // whether no step has been judged yet
   while (out.steps < most_steps) {
@@ -367,7 +364,15 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
     if (!more) {
       tangent = condensed.tangent();
       modelled = edges;
-      flow = flow_on(edges, residual, tangent, ends, strongest, reach, equal_speeds, law, panels);
+      const EdgeModel start_of_step(edges, ends, residual, tangent, law, panels);
+      const double force = norm(start_of_step.forces());
+      strongest = std::max(strongest, force);
+      if (near_balance(force, strongest, law) && force < least) {
+        least = force;
+        fallen = ends;
+      }
+      if (force > FORCES_FELL * least) out.passed = fallen;
+      flow = flow_on(start_of_step, edges, ends, strongest, reach, equal_speeds, law);
       way = condensed.follow(flow.motion, pressure);
       const Vector here = response.motion_to(ends);
       for (size_t e = 0; e < way.size(); ++e) way[e] -= here[e];

@@ -27,6 +27,9 @@ struct Descent {
   // Whether the order in which the edges ran may have decided where they ended: some took so much
   // force from others. Edges that increase each other's force end alike in any order.
   bool raced = false;
+  // Ends where forces had fallen most before they rose again, empty if nowhere: whether there is a
+  // minimum may be decided by the error of the field.
+  Vector passed;
 };
 
 // Descend until an event; `start` is where the edges began to run. Without adhesion the edges are

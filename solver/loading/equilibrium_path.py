@@ -241,7 +241,7 @@ class EquilibriumPath(ByValue, ResultViews):
 
     @property
     def races(self) -> int:
-        """Number of jumps whose end state depends on assumed speeds or order (``Jump.raced``)."""
+        """Number of jumps whose end depends on speeds, order or the field (``Jump.raced``)."""
         return sum(jump.raced for jump in self.jumps)
 
     @property

@@ -59,13 +59,13 @@ class Jump(NotebookDisplay):
     patch_length : float
         Length in m of the largest patch, before or after it.
     raced : bool
-        True if the end state depends on the assumed speeds of the edges, on which of two events
-        comes first that are too near to each other to tell, or on which of two mirror images is
-        taken.
+        True if the end state depends on the assumed speeds of the edges, on which of two mirror
+        images is taken, or on the error of the field: which of two near events comes first, or
+        whether there is a minimum on the way.
     at_stake : float
         |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
-        at the other speeds or in the other order; 0 unless ``raced``, or where that end is a
-        mirror image or not known.
+        at the other speeds, in the other order or on the way; 0 unless ``raced``, or where that end
+        is a mirror image or not known.
     barrier : float
         Of an opening, the energy per unit nominal area, in J/m², up to the crack that grows by
         itself, which adhesion of zero range has to be lifted over; else 0.

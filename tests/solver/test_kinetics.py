@@ -147,12 +147,21 @@ def test_a_touch_and_a_fold_too_near_to_be_told_apart_are_a_race():
     assert same.energy_drop - raced.energy_drop == pytest.approx(raced.at_stake, rel=0.05)
 
 
-def test_two_folds_too_near_to_be_told_apart_are_a_race():
-    """At a finer accuracy the other one comes first, and another loss: the coarser loop says so."""
-    profile = rough(8, 46, 849858, hurst=0.815, amplitudes="rayleigh")
-    gamma = 0.3660918153358999 * SOLID.modulus * 1e-12 * profile.q0 * 8
-    problem, depth = Problem(profile, SOLID, gamma), 0.8667227826221429
-    coarse, fine = loops_at(problem, 1e-3, 1e-4, max_penetration=depth, load_steps=31)
+@pytest.mark.parametrize(
+    ("hurst", "n0", "ratio", "seed", "adhesion", "depth", "load_steps"),
+    [
+        (0.815, 8, 46, 849858, 0.3660918153358999, 0.8667227826221429, 31),
+        (0.813, 12, 44, 538639, 0.9431944887625059, 0.7226418526188358, 33),
+    ],
+    ids=["which of two folds is first", "whether there is a minimum on the way"],
+)
+def test_what_the_error_of_the_field_decides_is_a_race(
+    hurst, n0, ratio, seed, adhesion, depth, load_steps
+):
+    """At a finer accuracy a jump ends elsewhere, with another loss: the coarser loop says so."""
+    profile = rough(n0, ratio, seed, hurst=hurst, amplitudes="rayleigh")
+    problem = Problem(profile, SOLID, adhesion * SOLID.modulus * 1e-12 * profile.q0 * n0)
+    coarse, fine = loops_at(problem, 1e-3, 1e-4, max_penetration=depth, load_steps=load_steps)
     assert abs(coarse.loss - fine.loss) > 3 * (coarse.loss_error + fine.loss_error)
     (raced,) = (jump for jump in coarse.jumps if jump.raced)
     same = min(fine.jumps, key=lambda jump: abs(jump.separation - raced.separation))

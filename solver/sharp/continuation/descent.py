@@ -7,11 +7,13 @@ and whether the minimum that was reached depends on the speeds of the edges.
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 
 import numpy as np
+from numpy.linalg import norm
 
-from adhesis.solver._kernels import CLOSING_SHARE, DescentEvent, EdgeLaw
+from adhesis.solver._kernels import CLOSING_SHARE, FORCES_FELL, DescentEvent, EdgeLaw
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.threads import one_thread
 from adhesis.solver.sharp.errors import FullContact, NoState
@@ -27,6 +29,7 @@ from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     ENDLESS,
     EQUAL,
+    FIELD_ACCURACY,
     FINER_STEPS,
     OTHER_MINIMUM,
     RESTS,
@@ -55,23 +58,23 @@ class Descents:
 
         Where edges may have raced, finer steps decide, if they end with less energy: more may be
         that of a minimum on the way that the field's error shows. A minimum that equal speeds or
-        steps of the other length lead to instead is added to ``rivals``, unless there is one.
+        steps of the other length lead to instead is added to ``rivals``, unless there is one; or
+        where edges passed what a finer field may show to be one.
         """
-        point, raced = self.relax(gaps, d)
-        if not (raced and self.may_race):
-            return point
         others: list[Rival] = []
-        try:
-            others.append(self.relax(gaps, d, equal_speeds=True)[0])
-        except (FullContact, NoState) as unknown:
-            others.append(unknown)
-        with suppress(NoState, FullContact):
-            finer, _ = self.relax(gaps, d, share=FINER_STEPS)
-            if point and finer and not self.is_same_minimum(point, finer):
-                end, other = (self._states.of_point(one).potential for one in (finer, point))
-                if end < other:
-                    point, finer = finer, point
-                others.append(finer)
+        point, raced = self.relax(gaps, d, passed=others)
+        if raced and self.may_race:
+            try:
+                others.append(self.relax(gaps, d, equal_speeds=True)[0])
+            except (FullContact, NoState) as unknown:
+                others.append(unknown)
+            with suppress(NoState, FullContact):
+                finer, _ = self.relax(gaps, d, share=FINER_STEPS)
+                if point and finer and not self.is_same_minimum(point, finer):
+                    end, other = (self._states.of_point(one).potential for one in (finer, point))
+                    if end < other:
+                        point, finer = finer, point
+                    others.append(finer)
         for rival in others:
             if not rivals and self._is_rival(rival, gaps, point):
                 rivals.append(rival)
@@ -98,13 +101,20 @@ class Descents:
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
     def relax(
-        self, gaps: Array, prescribed: float, *, equal_speeds: bool = False, share: float = 1.0
+        self,
+        gaps: Array,
+        prescribed: float,
+        *,
+        equal_speeds: bool = False,
+        share: float = 1.0,
+        passed: list[Rival] | None = None,
     ) -> tuple[Point | None, bool]:
         """Descend in energy at a prescribed value to the next minimum; None if no contact is left.
 
         By linear kinetics, or with ``equal_speeds``, to be compared with that; in steps of at most
         this share of the longest. Gaps and patches that close or vanish on the way are left out.
-        Returns also whether the order in which edges ran may have decided the end.
+        Returns also whether the order in which edges ran may have decided the end. Appends to
+        ``passed`` what a finer field may show to be a minimum on the way.
 
         Raises
         ------
@@ -115,7 +125,9 @@ class Descents:
         """
         raced = False
         while len(gaps):
-            found, by_order = self._relax_until_one_vanishes(gaps, prescribed, equal_speeds, share)
+            found, by_order = self._relax_until_one_vanishes(
+                gaps, prescribed, equal_speeds, share, passed
+            )
             raced = raced or by_order
             if isinstance(found, Point):
                 return found, raced
@@ -123,7 +135,12 @@ class Descents:
         return None, raced
 
     def _relax_until_one_vanishes(
-        self, gaps: Array, prescribed: float, equal_speeds: bool, share: float
+        self,
+        gaps: Array,
+        prescribed: float,
+        equal_speeds: bool,
+        share: float,
+        passed: list[Rival] | None,
     ) -> tuple[Point | Array, bool]:
         """Descend to the next minimum, or until a gap or patch vanishes: the gaps without it."""
         edges = self._edges
@@ -143,6 +160,8 @@ class Descents:
                 edges.forget()
                 raise NoState("there is no field of these edges", prescribed)
             gaps, raced = end.gaps, raced or end.raced
+            if passed is not None and len(end.passed):
+                passed += self._hidden_minimum(end.passed, prescribed, law)
             if end.event == DescentEvent.VANISHED:
                 rest = without_small(gaps, edges.smallest)
                 if rest is not None:
@@ -169,6 +188,17 @@ class Descents:
                 elif not strict and rests <= 2 * RESTS:
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
+
+    def _hidden_minimum(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Rival]:
+        """Return where forces are so small that a finer field may have a minimum, if it may."""
+        edges = self._edges
+        coarse, fine = (
+            edges.solution(gaps, prescribed, share).edge_opening for share in (1, FIELD_ACCURACY)
+        )
+        force = law.critical_of(gaps, coarse) ** 2 - coarse**2
+        if norm(force) > FORCES_FELL * norm(fine**2 - coarse**2):
+            return []
+        return [Point(prescribed, edges.field(gaps, prescribed), np.zeros(gaps.size), math.nan)]
 
     def ways_off_saddle(
         self, gaps: Array, prescribed: float, law: EdgeLaw, at_fold: bool = False
