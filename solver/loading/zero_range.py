@@ -281,9 +281,10 @@ def limit_text(
     if math.isfinite(valid_range):
         inside += f": {length_text(valid_range)}"
     least = float(least_range(valid_range, edge_range, touch_range, turn_range))
+    known = "; ".join(filter(None, (inside, outside_text(edge_range, touch_range, turn_range))))
     return (
         "the zero-range model is valid if the real adhesion reaches less than "
-        f"{length_text(least)} ({inside}; {outside_text(edge_range, touch_range, turn_range)})"
+        f"{length_text(least)} ({known})"
     )
 
 
