@@ -137,11 +137,11 @@ def _numerical(data: Aggregate) -> str:
         shares = np.divide(_all(data, name), np.abs(loss), out=0 * loss, where=loss != 0)
         return percent(shares.max())
 
-    elsewhere = "no jump would have ended elsewhere by another rule of descent, or order"
+    elsewhere = "no jump would have ended elsewhere by other speeds, order or a finer field"
     if raced := int(np.sum(races > 0)):
         elsewhere = (
-            f"in {raced} of {loss.size} loops another rule of descent, or order, would have ended "
-            f"a jump elsewhere (at most {most('energy_at_stake')} of a loop's loss at stake)"
+            f"in {raced} of {loss.size} loops other speeds, order or a finer field might end a jump "
+            f"elsewhere (at most {most('energy_at_stake')} of a loop's loss at stake)"
         )
     return (
         f"The estimated numerical error of a loss is at most {most('loss_error')} of it; the "
@@ -203,6 +203,12 @@ def agreement(data: Aggregate) -> Iterator[str]:
 
 def quality(data: Aggregate) -> Iterator[str]:
     """Sentences on the error of the losses, and on what the file's shape cut off."""
+    audit = _all(data, "audit_residual")
+    yield (
+        "Energy audit: loop integral and sum of the drops differ by "
+        f"{percent(np.sqrt(np.mean(audit**2)))} of the loss (root mean square over loops), "
+        f"{percent(np.max(np.abs(audit)))} in the worst loop."
+    )
     if wrong := doubtful_loops(data.cells):
         rows = [f"row {c.rows[k]}, {c.name} ({percent(c.doubt[k])})" for c, k in wrong]
         yield (

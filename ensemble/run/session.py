@@ -193,10 +193,10 @@ class _Session:
         """Return the counts, and how the run has ended.
 
         What a run has finished is read once more: another program may have written to the file
-        (InputError, WriteError), or have copied an older one over it.
+        (InputError, WriteError), or have copied an older one over rows that the run wrote.
         """
         summary, batches = self._counts, self.plan.batches
-        if self.plan.rows and not summary.pending:
+        if self.plan.rows:
             with Results(path) as results:
                 finished = np.isin(results.status(), (DONE, FAILED))
                 checksums = results.column(CHECKSUM.name)

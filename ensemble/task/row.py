@@ -85,7 +85,7 @@ NUMBERS = (
     _number("loss_error", "J m-2", "estimated numerical error of the loss"),
     _number("zone_error", "J m-2", "estimated change of the loss by zones at edges"),
     _number(
-        *("races", "1", "jumps that another rule of descent or order would have ended elsewhere"),
+        *("races", "1", "jumps that other speeds, order or a finer field might end elsewhere"),
         dtype=COUNT,
     ),
     _number("energy_at_stake", "J m-2", "energy between the ends of those jumps"),

@@ -554,8 +554,8 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     races = answer.main["races"]
     if races:
         found.append(
-            f"{checks.counted(round(races), 'jump')} would have ended elsewhere under another rule "
-            f"of descent, or order ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
+            f"{checks.counted(round(races), 'jump')} might end elsewhere by other speeds, order "
+            f"or a finer field ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
     others = [(r.name, answer.result(r.name)) for r in answer.plan.runs if r.name != "answer"]
     short = [f"“{name}”" for name, of in others if of is not None and of["preload_warnings"]]

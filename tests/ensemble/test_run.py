@@ -353,20 +353,26 @@ def test_what_is_asked_to_stop_at_its_last_task_reads_the_file_too(tmp_path):
         asked.summary("SIGTERM received", out)
 
 
-def test_an_older_row_in_the_place_of_one_that_was_computed_again_is_no_finished_run(tmp_path):
+@pytest.mark.parametrize("stops", [False, True], ids=["the run ends", "the run is stopped"])
+def test_an_older_file_copied_over_in_a_run_ends_it_with_an_error(tmp_path, stops):
     campaign, out = load_campaign(write_campaign(tmp_path)), tmp_path / "r.h5"
     create(out, campaign)
-    write_results(out, campaign, range(8))
-    plan = Plan(campaign.tasks(), [7], 7, 0)
-    with Writer(out) as writer:
-        again = session._Session(campaign, plan, writer, Options(), StopSignals(), Engine())
-        done = again._write(Outcome(7, 0, 1.0, result=fake_result(campaign, campaign.tasks()[7])))
-    again._counts.done += 1
-    again._written[7] = done.result["checksum"]
-    assert again.summary(None, out).pending == 0
-    write_results(out, campaign, [7], loss=1.0)  # as of the file before
-    with pytest.raises(WriteError, match=r"holds 7 of 8 finished tasks: another program"):
-        again.summary(None, out)
+    write_results(out, campaign, range(8), loss=1.0)
+    older = out.read_bytes()
+    out.unlink()
+    begun = itertools.count()
+
+    def compute(campaign, task, progress=None):
+        number = next(begun)
+        if number == 3:
+            with out.open("r+b") as file:
+                file.write(older)
+        if number == 4 and stops:
+            signal.raise_signal(signal.SIGTERM)
+        return fake_result(campaign, task)
+
+    with pytest.raises(WriteError, match=r"finished tasks: another program has changed it"):
+        run_campaign(campaign, out, engine=Engine(compute, lambda campaign, task: None))
 
 
 def test_processes_of_another_mpi_are_reported_by_rank_0(tmp_path, monkeypatch):

@@ -105,7 +105,7 @@ def losses(data: Aggregate) -> Table:
             lambda cell: int(cell.values["races"].sum()) if cell.done else None,
             "races",
             only_if_any=True,
-            note="races: jumps of all loops that another rule or order would have ended elsewhere",
+            note="races: jumps that other speeds, order or a finer field might end elsewhere",
         ),
         *estimated("energy_at_stake_dimensionless"),
         TableColumn(

@@ -62,7 +62,8 @@ class Descents:
         where edges passed what a finer field may show to be one.
         """
         others: list[Rival] = []
-        point, raced = self.relax(gaps, d, passed=others)
+        passed: list[Rival] = []
+        point, raced = self.relax(gaps, d, passed=passed)
         if raced and self.may_race:
             try:
                 others.append(self.relax(gaps, d, equal_speeds=True)[0])
@@ -75,7 +76,7 @@ class Descents:
                     if end < other:
                         point, finer = finer, point
                     others.append(finer)
-        for rival in others:
+        for rival in others + passed:
             if not rivals and self._is_rival(rival, gaps, point):
                 rivals.append(rival)
         return point

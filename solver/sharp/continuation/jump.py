@@ -164,7 +164,7 @@ class Jumps:
                     raise rivals[0]
                 rival = self._end_of(rivals[0], d, equal_speeds=True)
                 at_stake = self._at_stake(before, point, rival, d)
-            elif event.orders is not None and self.descents.may_race:
+            if at_stake is None and event.orders is not None and self.descents.may_race:
                 at_stake = self._at_stake_beyond(before, point, event.orders)
         except (FullContact, NoState):  # elsewhere, or unknown where: no energy to be compared
             at_stake = 0.0
