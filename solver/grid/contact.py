@@ -11,7 +11,8 @@ the stress with s: σ = σ₀ - (s - s₀) σ₁, with s from the prescribed val
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from copy import deepcopy
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +54,6 @@ class SeparationResponse:
     stress: Array
     displacement: Array
 
-    def copy(self) -> SeparationResponse:
-        """Return a copy that shares no array with this one."""
-        return SeparationResponse(self.stress.copy(), self.displacement.copy())
-
 
 @dataclass
 class Contact:
@@ -96,13 +93,7 @@ class Contact:
 
     def copy(self) -> Contact:
         """Return a copy that shares no array with this one."""
-        return replace(
-            self,
-            mask=self.mask.copy(),
-            stress=self.stress.copy(),
-            displacement=self.displacement.copy(),
-            response=self.response.copy() if self.response is not None else None,
-        )
+        return deepcopy(self)
 
 
 class ContactSolver:

@@ -43,10 +43,10 @@ class Edges:
     overlap: NDArray[np.bool_]
 
 
-def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
+def survey(contact: Contact, lattice: Lattice) -> Edges:
     """Compute the energy of moving every edge of a solved contact.
 
-    A node counts as overlapping where the gap in m is below ``overlap_below``.
+    A node counts as overlapping where it does so by more than the residual inside contact.
     """
     n, dx = lattice.n, lattice.dx
     compliance, adhesion = lattice.compliance, lattice.adhesion
@@ -85,7 +85,7 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         s_recede += factor * gap_rate**2  # with that of the free node next to the one removed
     t = lattice.gap(contact, outer)
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
-    overlap = t < overlap_below
+    overlap = t < -contact.residual
     # The last free node never joins: the mean gap is the separation, and it is positive.
     free = n - total
     if free <= 1:

@@ -98,8 +98,6 @@ class Lattice:
         Under a tension W of a state without contact is -∞.
         """
         energy = contact.elastic_energy + self.adhesion_energy(contact)
-        if self.control.is_fixed:
-            return energy
         if self.control.is_load and contact.prescribed > 0 and not contact.mask.any():
             return -np.inf
         mean_stress = total(contact.stress) / self.n

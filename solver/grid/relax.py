@@ -111,10 +111,6 @@ class Relaxation:
             f"{contact.separation:.6g} m; the method 'sharp', or other nodes, may"
         )
 
-    def edges(self, contact: Contact) -> Edges:
-        """Return the edges of a solved contact with the energies of their moves."""
-        return survey(contact, self.lattice, -contact.residual)
-
     def touching(self, contact: Contact) -> Indices:
         """Find the nodes away from all edges where the surfaces touch first; empty if none.
 
@@ -187,7 +183,7 @@ class _Descent:
 
     def run(self) -> Contact | None:
         for _ in range(_MAX_SWEEPS):
-            edges = self.rules.edges(self.current)
+            edges = survey(self.current, self.lattice)
             if edges.overlap.any():
                 longest = self.rules.longest_step
                 self.rules.flips += join_overlaps(self.current, edges, self.lattice, longest)
@@ -215,7 +211,7 @@ class _Descent:
                 self.anchor_energy = energy
             else:
                 self._undo()
-                edges = self.rules.edges(self.current)
+                edges = survey(self.current, self.lattice)
             if self._move(edges):
                 self._sweep()
             elif self._has_converged():

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver._kernels import total
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.edges import Indices
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.method import ContactState
@@ -19,16 +16,11 @@ EDGE_OFFSET = 0.190
 edge stress against K/sqrt(2πr))."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Patches:
-    """Contact set of a state, from which the method continues."""
-
-    first: Indices
-    width: Indices
-
-
 def state_of(lattice: Lattice, contact: Contact) -> ContactState:
-    """Make the contact state of a solved contact."""
+    """Make the contact state of a solved contact.
+
+    Its private data are the first node and the number of nodes of each patch, shape (patches, 2).
+    """
     first, width = patch_ranges(contact.mask)
     if first.size == 0:
         return ContactState.detached(contact.separation)
@@ -41,9 +33,7 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
     left, right = left + wrapped * period, right + wrapped * period
     order = np.argsort(left, kind="stable")
     mean_stress = total(contact.stress) / lattice.n
-    control, hold_energy = lattice.control, 0.0
-    if not control.is_fixed:
-        hold_energy = control.potential(0.0, contact.separation, mean_stress, lattice.h_max, period)
+    hold = lattice.control.potential(0.0, contact.separation, mean_stress, lattice.h_max, period)
     area = float(width.sum()) - 2 * EDGE_OFFSET * first.size
     return ContactState(
         separation=contact.separation,
@@ -52,8 +42,8 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
         elastic_energy=contact.elastic_energy,
         adhesion_energy=lattice.adhesion_energy(contact),
         contact_fraction=max(0.0, area / lattice.n),
-        hold_energy=hold_energy,
-        internal=_Patches(first, width),
+        hold_energy=hold,
+        internal=np.column_stack((first, width)),
     )
 
 
@@ -68,9 +58,8 @@ def mask_of(lattice: Lattice, state: ContactState) -> NDArray[np.bool_]:
     mask = np.zeros(lattice.n, dtype=bool)
     if state.patches == 0:
         return mask
-    patches = state.internal
-    if not isinstance(patches, _Patches):
+    if not isinstance(state.internal, np.ndarray):
         raise ValueError("this state was not made by the method grid")
-    for a, w in zip(patches.first.tolist(), patches.width.tolist(), strict=True):
-        mask[np.arange(a, a + w) % lattice.n] = True
+    for first, width in state.internal.tolist():
+        mask[np.arange(first, first + width) % lattice.n] = True
     return mask

@@ -94,9 +94,9 @@ def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
         else:
             cuts = np.sort(rng.choice(n - 1, 2 * patches, replace=False))
         mask = contact_between(cuts, n)
-        contact = Contact(1.0, 1.0, mask, -np.ones(n) * mask, np.zeros(n))
+        contact = Contact(1.0, 1.0, mask, -np.ones(n) * mask, np.zeros(n), residual=1.0)
         # Unit gap, unit tension, no adhesion: the prices are S itself.
-        edges = survey(contact, lattice, -1.0)
+        edges = survey(contact, lattice)
         for k in range(edges.side.size):
             nodes = np.flatnonzero(mask)
             exact = schur(kernel, nodes, int(edges.outer[k]))
@@ -150,7 +150,7 @@ def test_energy_never_rises_in_a_relaxation_and_ends_in_a_local_minimum(seed, ga
     assert np.diff(energies).max() <= 1e-5 * unit
     lowest = exact_energy(method, relaxed.mask, separation)
     assert lowest <= energies[-1] + 1e-9 * unit
-    edges = method.relaxation.edges(relaxed)
+    edges = survey(relaxed, method.lattice)
     for node in {*edges.inner.tolist(), *edges.outer.tolist()}:
         flipped = relaxed.mask.copy()
         flipped[node] ^= True
