@@ -16,6 +16,7 @@ from adhesis.solver.checks import counted
 from adhesis.solver.loading.ledger import Ledger, estimated_error, states_before_jumps
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.loading.zero_range import (
+    RANGES,
     SMEARED,
     TOUCH_SHARE,
     InteriorTension,
@@ -521,10 +522,7 @@ class EquilibriumPath(ByValue, ResultViews):
             "load_steps": self.load_steps,
             **values,
             "loss_over_work_of_adhesion": values["loss"] / gamma if gamma > 0 else None,
-            "valid_range": finite(self.valid_range),
-            "edge_range": finite(self.edge_range),
-            "touch_range": finite(self.touch_range),
-            "turn_range": finite(self.turn_range),
+            **{name: finite(getattr(self, name)) for name in RANGES},
             "seconds": self.seconds,
             "method": self.method.name,
         }

@@ -76,7 +76,7 @@ def up_to(method: Method, state: ContactState, path: Path, excess: Excess) -> tu
     k = next((k for k in range(1, len(states)) if excess(states[k]) >= -REACHED), None)
     if k is None:
         return path, False
-    if k - 1 in _before_jumps(states, path.jumps) or excess(states[k]) <= REACHED:
+    if k - 1 in before_jumps(states, path.jumps) or excess(states[k]) <= REACHED:
         return _first(path, k, states), True
     located = locate(method, states[k - 1], states[k], excess)
     return _joined(_first(path, k - 1, states), located), True
@@ -111,16 +111,16 @@ def locate(method: Method, start: ContactState, end: ContactState, excess: Exces
     return found.get(root, Path((end,), (), 0.0))
 
 
-def _before_jumps(states: Sequence[ContactState], jumps: Sequence[Jump]) -> set[int]:
-    """Return the indices of the states before the jumps of a path."""
+def before_jumps(states: Sequence[ContactState], jumps: Sequence[Jump]) -> list[int]:
+    """Return the index of the state before each jump of a path; the next one is that after it."""
     separation = np.array([state.separation for state in states])
     contact = np.array([state.contact_fraction for state in states])
-    return set(states_before_jumps(jumps, separation, contact))
+    return states_before_jumps(jumps, separation, contact)
 
 
 def _first(path: Path, count: int, states: Sequence[ContactState]) -> Path:
     """Return the first ``count`` states of a path, with their jumps; its error is a bound."""
-    jumps = sum(before < count for before in sorted(_before_jumps(states, path.jumps)))
+    jumps = sum(before < count for before in before_jumps(states, path.jumps))
     return replace(path, states=path.states[:count], jumps=path.jumps[:jumps])
 
 

@@ -297,7 +297,8 @@ def run_path(
     function("on_state", on_state)
     started = process_time()
     with progress_of(progress, max(points), method.problem.control) as report:
-        record = _PathRecord(method, Axis(max(points), load_steps), on_state, report)
+        record = _PathRecord(method, Axis(max(points), load_steps))
+        record.on_state, record.progress = on_state, report
         for point in points:
             record.follow_leg(point)
         if out:
@@ -316,8 +317,8 @@ class _Turn:
 class _PathRecord(Record):
     """Record of a path that notes the minor loops as they close."""
 
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
+    def __init__(self, method: Method, axis: Axis) -> None:
+        super().__init__(method, axis)
         self.open_turns: list[_Turn] = []
         self.closed: list[tuple[_Turn, _Turn, int]] = []  # start, turn, number of states at the end
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from adhesis.solver import views
 from adhesis.solver.checks import function
-from adhesis.solver.loading.ledger import states_before_jumps
-from adhesis.solver.loading.mean_stress_event import follow_to_stress
+from adhesis.solver.loading.mean_stress_event import before_jumps, follow_to_stress
 from adhesis.solver.method import ContactState, Method, PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Branch, Jump
@@ -123,15 +122,10 @@ class Record:
         Sum of the method's estimates of its error, in J/m²; NaN if it has none.
     """
 
-    def __init__(
-        self,
-        method: Method,
-        axis: Axis,
-        on_state: OnState | None = None,
-        progress: Progress | None = None,
-    ) -> None:
+    def __init__(self, method: Method, axis: Axis) -> None:
         self.method, self.problem, self.axis = method, method.problem, axis
-        self.on_state, self.progress = on_state, progress
+        self.on_state: OnState | None = None
+        self.progress: Progress | None = None
         self.branches: list[Branch] = []
         self.ends_load_step: list[bool] = []
         self.legs: list[int] = []
@@ -234,8 +228,7 @@ class Record:
 
     def before_jumps(self) -> list[int]:
         """Return the index of the state before each jump; the next one is that after it."""
-        separation, contact = self.column("separation"), self.column("contact_fraction")
-        return states_before_jumps(self.jumps, separation, contact)
+        return before_jumps(self.states, self.jumps)
 
     def copy(self) -> Self:
         """Return a copy with lists of its own."""

@@ -166,13 +166,11 @@ def _narrowest_moved(before: Array, after: Array, period: float) -> float:
     """Return the least length of the patches and gaps of ``before`` beside edges that move."""
     if not len(before):
         return math.inf
-    others = np.sort(after.ravel() % period)
-    others = np.concatenate([others[-1:] - period, others, others[:1] + period])
-    edges = before.ravel() % period
-    right = np.searchsorted(others, edges).clip(1, max(len(others) - 1, 1))
-    if len(others) < 2:
-        moved = np.ones(edges.shape, dtype=bool)
-    else:
+    edges, others = before.ravel() % period, np.sort(after.ravel() % period)
+    moved = np.ones(edges.shape, dtype=bool)
+    if len(others):
+        others = np.concatenate([others[-1:] - period, others, others[:1] + period])
+        right = np.searchsorted(others, edges)  # others lie on both sides
         nearest = np.minimum(np.abs(edges - others[right - 1]), np.abs(edges - others[right]))
         moved = nearest > _SAME * period
     patch = before[:, 1] - before[:, 0]
@@ -367,9 +365,9 @@ def range_warnings(
     bounds = {"edge_range": edge_range, "touch_range": touch_range, "turn_range": turn_range}
     gamma = problem.work_of_adhesion
     if math.isfinite(problem.strength):
-        excess = gamma / range_ / problem.strength
+        largest_tension = gamma / range_
+        excess = largest_tension / problem.strength
         if excess > DOUBTFUL_EXCESS:
-            largest_tension = gamma / range_
             out.append(
                 f"the tension inside patches reaches {largest_tension:.3g} Pa, {excess:.3g} times "
                 f"the strength ({problem.strength:.3g} Pa), where no crack that fits grows: how "

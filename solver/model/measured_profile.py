@@ -12,6 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.polynomial import legendre
 
+from adhesis.solver.checks import choice
 from adhesis.solver.model.profile import Array, Profile, profile_from_heights
 from adhesis.solver.values import ByValue
 
@@ -81,10 +82,7 @@ def one_period(
         For an unknown continuation or a part outside its range.
     """
     n = heights.size
-    if continuation not in CONTINUATIONS:
-        raise ValueError(
-            f"continuation is {continuation!r}: it must be one of {', '.join(CONTINUATIONS)}"
-        )
+    choice("continuation", continuation, CONTINUATIONS)
     if not 0 < part < 0.5:
         raise ValueError(f"part is {part!r}: it must lie between 0 and 0.5, both excluded")
     ends = max(2, round(part * n))

@@ -40,7 +40,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -319,16 +319,14 @@ class SingleWave:
         # the slope is negative at both ends and has at most one positive stretch between them
         ends = 1e-9 * self.period, (0.5 - 1e-9) * self.period
         a = np.linspace(*ends, 20001)
-        slope = self._prescribed_slope(a, stiffness)
+        slope_at = partial(self._prescribed_slope, stiffness=stiffness)
+        slope = slope_at(a)
         top = int(np.argmax(slope))
         if slope[top] <= 0:
             raise ValueError(f"no state is stable with a stiffness of {stiffness!r} Pa/m")
 
-        def function(x: float) -> Array:
-            return self._prescribed_slope(x, stiffness)
-
-        full = _root(function, a[top], ends[1]) if slope[-1] < 0 else ends[1]
-        return _root(function, ends[0], a[top]) if slope[0] < 0 else 0.0, full
+        full = _root(slope_at, a[top], ends[1]) if slope[-1] < 0 else ends[1]
+        return _root(slope_at, ends[0], a[top]) if slope[0] < 0 else 0.0, full
 
     def half_width_under(self, stiffness: float, prescribed: float) -> float:
         """Compute a in m of the stable state at u = ``prescribed`` in m (k = 0: p̄ in Pa).

@@ -228,12 +228,10 @@ class SharpMethod(Method):
         states = history.states
         if self.edges.adhesion.pins:
             states = self.states.with_friction(state, states)
-        return Path(tuple(states), tuple(history.jumps), self._error(history))
-
-    def _error(self, history: History) -> float:
-        """Estimate the error of the loss, in J/m²: of the location of jumps, and of the field."""
         drops = sum(abs(jump.energy_drop) for jump in history.jumps)
-        return history.misplaced + self.resolution.field_share * drops
+        # that of the location of jumps, and that of the field
+        error = history.misplaced + self.resolution.field_share * drops
+        return Path(tuple(states), tuple(history.jumps), error)
 
     def _history(self, state: ContactState, target: Target) -> History:
         """Follow the path from ``state`` to the target."""

@@ -24,7 +24,6 @@ from dataclasses import replace
 import numpy as np
 
 from adhesis.solver.loading.loop import run_loop
-from adhesis.solver.method import ContactState
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.problem import Problem, griffith_length
 from adhesis.solver.model.profile import Array, Profile, self_affine_profile
@@ -102,13 +101,8 @@ def losses(judge: Judge) -> Iterator[Row]:
     """Loss of the single wave."""
     for alpha in ALPHAS:
         wave, result = judge.wave_loop(alpha)
-        exact = wave.loop.loss
-        for what, value, bound in (
-            ("sum of drops", result.loss_from_drops, judge.standard.loss),
-            ("loop integral", result.loss, judge.standard.loop_integral),
-        ):
-            claim = f"loss of the single wave, α = {alpha:g}, {what}"
-            yield judge.row(claim, value / exact - 1, bound)
+        claim = f"loss of the single wave, α = {alpha:g}"
+        yield from judge.losses(claim, result, wave.loop.loss)
 
 
 def order(judge: Judge) -> Iterator[Row]:
@@ -188,22 +182,17 @@ def westergaard(judge: Judge) -> Iterator[Row]:
     wave = wave_of(0.0)
     problem = problem_of(wave)
     method = judge.method(problem)
-    found: list[ContactState] = []
-    result = run_loop(
-        method,
-        max_penetration=0.9,
-        load_steps=10,
-        on_state=lambda _, state: found.append(state),
-    )
+    result = run_loop(method, max_penetration=0.9, load_steps=10)
     below = result.separation < problem.profile.h_max  # at first touch the width is zero
-    pressed = [found[i] for i in np.flatnonzero(result.load_step & below)]
-    s = np.array([state.separation for state in pressed])
+    pressed = np.flatnonzero(result.load_step & below)
+    s = result.separation[pressed]
     a = np.array([wave.half_width(float(value)) for value in s])
     p_star = wave.full_contact_stress
-    width = np.array([state.contact_fraction / 2 for state in pressed]) - a / PERIOD
-    off = (np.array([state.mean_stress for state in pressed]) - wave.mean_stress(a)) / p_star
+    width = result.contact_fraction[pressed] / 2 - a / PERIOD
+    off = (result.mean_stress[pressed] - wave.mean_stress(a)) / p_star
     nodes = judge.standard.nodes or GRIDS[-1]
-    peak = np.array([method.fields(state, nodes).stress[0] for state in pressed]) / p_star
+    states = [result.contact_states[i] for i in pressed]
+    peak = np.array([method.fields(state, nodes).stress[0] for state in states]) / p_star
 
     def highest(a: Array, s: Array) -> Array:
         """Compute σ(0) with the half-width a at s."""
@@ -323,11 +312,7 @@ def controls(judge: Judge) -> Iterator[Row]:
             a = wave.half_width_under(0.0, exact.fold_mean_stress + judge.standard.stress * p_star)
             way = exact.fold_separation - float(wave.separation(a))
             late = abs(way * exact.fold_mean_stress) / exact.loss
-        for what, value, bound in (
-            ("sum of drops", result.loss_from_drops, judge.standard.loss),
-            ("loop integral", result.loss, judge.standard.loop_integral),
-        ):
-            yield judge.row(f"{held}: loss, {what}", value / exact.loss - 1, bound + late)
+        yield from judge.losses(f"{held}: loss", result, exact.loss, late)
         last = np.flatnonzero(result.patches)[-1]
         off = (result.mean_stress[last] - exact.fold_mean_stress) / p_star
         s = np.array([exact.fold_separation])

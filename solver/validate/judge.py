@@ -12,7 +12,7 @@ The waves are so shallow (A q0 = 6e-6) that the flat and the arc measure of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,6 +125,16 @@ class Judge:
         """Make one row, with the absolute value of the error."""
         where = resolution or self.standard.resolution
         return Row(claim, self.name, where, abs(float(error)), float(bound), note)
+
+    def losses(
+        self, claim: str, result: LoopResult, exact: float, late: float = 0.0
+    ) -> Iterator[Row]:
+        """Make the rows of both losses of a loop; ``late`` adds to the relative bound."""
+        for what, value, bound in (
+            ("sum of drops", result.loss_from_drops, self.standard.loss),
+            ("loop integral", result.loss, self.standard.loop_integral),
+        ):
+            yield self.row(f"{claim}, {what}", value / exact - 1, bound + late)
 
     def worst(self, claim: str, errors: Array, bounds: Array, note: str = "") -> Row:
         """Make the row of the state with the largest ratio of error to bound.

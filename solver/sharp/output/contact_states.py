@@ -149,19 +149,18 @@ class States:
 
     def work(self, before: ContactState, after: ContactState, way: float) -> float:
         """Compute |Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""
-        control, h_max = self.problem.control, self.problem.profile.h_max
-        conjugate = [control.conjugate(s.separation, s.mean_stress, h_max) for s in (before, after)]
-        unit = self._half if control.is_load else 1 / self.q0
-        return abs(conjugate[0] - conjugate[1]) * way * unit
+        unit = self._half if self.problem.control.is_load else 1 / self.q0
+        return abs(self._conjugate(before) - self._conjugate(after)) * way * unit
+
+    def _conjugate(self, state: ContactState) -> float:
+        h_max = self.problem.profile.h_max
+        return self.problem.control.conjugate(state.separation, state.mean_stress, h_max)
 
     def energy_residual(self, before: ContactState, after: ContactState) -> float:
         """Compute the change of energy between two states of a branch, less the work, in J/m²."""
-        control, h_max = self.problem.control, self.problem.profile.h_max
-        both = before, after
-        x = [control.prescribed(state.separation, state.mean_stress) for state in both]
-        y = [control.conjugate(state.separation, state.mean_stress, h_max) for state in both]
-        way, change = x[1] - x[0], after.tangent - before.tangent
-        work = 0.5 * way * (y[0] + y[1]) - way**2 * change / 12
+        way = self.problem.prescribed_in(after) - self.problem.prescribed_in(before)
+        work = 0.5 * way * (self._conjugate(before) + self._conjugate(after))
+        work -= way**2 * (after.tangent - before.tangent) / 12
         return (after.potential - before.potential) / self.period + work
 
     def jump(
