@@ -95,7 +95,7 @@ class EdgeCompliance:
             neighbours without gaps: far away only their number matters.
         """
         if neighbours is None:
-            key = self._rounded_patch(width)[:1]
+            key = self._rounded_patch(width)
         else:
             near, far_gap, far = neighbours
             key = tuple(_rounded(k) for k in (width, gap, near, far_gap, far))
@@ -117,12 +117,12 @@ class EdgeCompliance:
         contact nodes beyond them; 0 for none.
         """
         if before == 0 and after == 0:
-            key = (0, *self._rounded_patch(width))
+            key = self._rounded_patch(width)
         else:
-            key = (0, *(_rounded(k) for k in (width, left, right, before, after)))
+            key = tuple(_rounded(k) for k in (width, left, right, before, after))
         known = self._pairs.get(key)
         if known is None:
-            _, width, left, right, before, after = key
+            width, left, right, before, after = key
             # Rounded lengths must not reach round the period.
             left = min(left, self.n - 2)
             right = min(right, self.n - 1 - left)
@@ -143,10 +143,10 @@ class EdgeCompliance:
 
         From the nodes of the patch before the gap, of the gap, and of the patch after it.
         """
-        key = (1, *(_rounded(k) for k in (near, gap, far)))
+        key = tuple(_rounded(k) for k in (near, gap, far))
         known = self._pairs.get(key)
         if known is None:
-            _, near, gap, far = key
+            near, gap, far = key
             # Rounded lengths must not reach round the period.
             gap = min(gap, self.n - 2)
             near = min(near, self.n - gap - 1)
@@ -159,8 +159,6 @@ class EdgeCompliance:
 
     def _compute(self, key: tuple[int, ...]) -> float:
         """Compute the Schur complement of the node at 0; the patch starts at -1."""
-        if len(key) == 1:
-            return float(self._schur([(0, -1, _fine_both(key[0]))], (0,))[0, 0])
         width, gap, next_width, other_gap, other_width = key
         # Rounded lengths must not reach round the period.
         gap = min(gap, self.n - 1)

@@ -52,12 +52,8 @@ def survey(contact: Contact, lattice: Lattice) -> Edges:
     compliance, adhesion = lattice.compliance, lattice.adhesion
     first, width = patch_ranges(contact.mask)
     count = first.size
-    if count == 0:
-        none = np.empty(0, dtype=np.intp)
-        nothing = np.empty(0)
-        return Edges(none, none, none, none, none, nothing, nothing, np.empty(0, dtype=bool))
     last = first + width - 1
-    after_patch = np.append(first[1:], first[0] + n) - last - 1  # free nodes
+    after_patch = np.append(first[1:], first[:1] + n) - last - 1  # free nodes
     gap = np.concatenate([np.roll(after_patch, 1), after_patch])
     inner, outer = np.concatenate([first, last % n]), np.concatenate([first - 1, last + 1]) % n
     grow, recede = [0.0] * (2 * count), [0.0] * (2 * count)
@@ -79,10 +75,9 @@ def survey(contact: Contact, lattice: Lattice) -> Edges:
             recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
     s_grow, s_recede = np.array(grow), np.array(recede)
 
-    if contact.response is not None:
-        factor, gap_rate = lattice.extra_compliance(contact, outer)
-        s_grow += factor * gap_rate**2
-        s_recede += factor * gap_rate**2  # with that of the free node next to the one removed
+    factor, gap_rate = lattice.extra_compliance(contact, outer)
+    s_grow += factor * gap_rate**2
+    s_recede += factor * gap_rate**2  # with that of the free node next to the one removed
     t = lattice.gap(contact, outer)
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < -contact.residual

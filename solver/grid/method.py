@@ -160,7 +160,6 @@ class GridMethod(Method):
 
 
 def _node_count(harmonic: int, accuracy: float, nodes_per_wave: int | None) -> int:
-    """Compute the number of nodes of the grid."""
     if nodes_per_wave is None:
         per_wave = min(max(_FIRST_ORDER / accuracy, _FEWEST_NODES_PER_WAVE), _MOST_NODES_PER_WAVE)
         wanted = max(round(per_wave) * harmonic, _FEWEST_NODES)

@@ -84,14 +84,12 @@ class Steps:
         crests = np.rint(position / self.lattice.dx).astype(np.intp)
         contact.mask[crests % self.lattice.n] = True
         self.solver.solve(contact, self.relaxation.tight)
-        if self.energy(contact) < 0:
-            relaxed = self.relaxation.relax(contact)
-            assert relaxed is not None
-            self._jump(before, contact, relaxed)
-            contact = relaxed
-        else:
-            contact = self.solver.empty(separation)
-        return contact
+        if self.energy(contact) >= 0:
+            return self.solver.empty(separation)
+        relaxed = self.relaxation.relax(contact)
+        assert relaxed is not None
+        self._jump(before, contact, relaxed)
+        return relaxed
 
     def run(self, contact: Contact, prescribed: float) -> None:
         """Follow the path from a relaxed contact to x = ``prescribed``, appending states and jumps.

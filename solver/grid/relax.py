@@ -132,8 +132,6 @@ class Relaxation:
         tied = crests[least <= lowest + self.tie_height]
         # A crest halfway between two nodes must nucleate only once.
         tied = tied[np.diff(tied, prepend=tied[-1] - self.lattice.n) > 1]
-        if tied.size < 2:
-            return tied
         lattice = self.lattice
         part = lattice.n / lattice.equal_parts
         return tied[first_of_equal(tied.astype(float), lattice.origin, part, lattice.n, _SAME_NODE)]
@@ -141,8 +139,6 @@ class Relaxation:
     def nucleate(self, contact: Contact) -> bool:
         """Add the nodes where the surfaces touch; returns True if there are any."""
         nodes = self.touching(contact)
-        if nodes.size == 0:
-            return False
         lattice = self.lattice
         gap = lattice.gap(contact, nodes)
         cost = 0.5 * np.maximum(gap, 0.0) ** 2 / lattice.compliance(0, lattice.n, None)

@@ -48,7 +48,7 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
 
 
 def mask_of(lattice: Lattice, state: ContactState) -> NDArray[np.bool_]:
-    """Return the contact set of a state made by :func:`state_of`.
+    """Return the contact set of a state in contact made by :func:`state_of`.
 
     Raises
     ------
@@ -56,8 +56,6 @@ def mask_of(lattice: Lattice, state: ContactState) -> NDArray[np.bool_]:
         If another method made the state.
     """
     mask = np.zeros(lattice.n, dtype=bool)
-    if state.patches == 0:
-        return mask
     if not isinstance(state.internal, np.ndarray):
         raise ValueError("this state was not made by the method grid")
     for first, width in state.internal.tolist():

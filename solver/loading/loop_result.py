@@ -145,9 +145,8 @@ class LoopResult(EquilibriumPath):
     @property
     def preload_warnings(self) -> list[str]:
         """Return a sentence where the mean stress does not reach the preload, or jumps beyond."""
-        found: list[str] = []
         if self.preload is None:
-            return found
+            return []
         if not self.preload_reached:
             loading = np.where(self.branch == "loading", self.mean_stress, -np.inf)
             highest = int(loading.argmax())
@@ -157,17 +156,17 @@ class LoopResult(EquilibriumPath):
             )
             if loading[highest] <= 0:
                 most = "a tension in every state of contact"
-            found.append(
+            return [
                 f"the preload of {stress_text(self.preload)} is not reached: on loading the mean "
                 f"stress is {most}; the loop turns at {self._where}, with "
                 f"{stress_text(self.turning_stress)}"
-            )
-        elif self._turned_after_jump:
-            found.append(
+            ]
+        if self._turned_after_jump:
+            return [
                 f"a jump goes beyond the preload of {stress_text(self.preload)}: the loop turns at "
                 f"its end, with {stress_text(self.turning_stress)}"
-            )
-        return found
+            ]
+        return []
 
     def _warnings_of_way(self) -> list[str]:
         return self.preload_warnings + self.fall_warnings()

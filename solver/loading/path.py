@@ -370,7 +370,6 @@ class _PathRecord(Record):
         return with_turn_range(result, self, started)
 
     def _minor_loop(self, ledger: Ledger, start: _Turn, turn: _Turn, stop: int) -> MinorLoop:
-        """Make the minor loop from ``start`` over ``turn``."""
         part = ledger.part(start.state, stop)
         stress, contact = (
             self.column(name)[start.state : stop] for name in ("mean_stress", "contact_fraction")

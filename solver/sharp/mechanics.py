@@ -334,7 +334,6 @@ class EdgeMechanics:
         return Point(d, self.field(point.gaps, d), point.rate, math.nan)
 
     def _point(self, prescribed: float, found: Equilibrium) -> Point:
-        """Make the point of an equilibrium."""
         gaps = found.gaps
         nearly = found.pressure, found.separation
         field = GapField(

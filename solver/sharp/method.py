@@ -234,7 +234,6 @@ class SharpMethod(Method):
         return Path(tuple(states), tuple(history.jumps), error)
 
     def _history(self, state: ContactState, target: Target) -> History:
-        """Follow the path from ``state`` to the target."""
         history = History()
         self.edges.forget()
         control = self.problem.control

@@ -112,7 +112,6 @@ class Cracks:
         return near or value > -0.5 * self.tolerance
 
     def _crack_at(self, field: GapField, maximum: TensionMaximum) -> Crack:
-        """Judge one maximum of tension."""
         wave, critical = self.edges.wave, self.edges.critical
         theta, tension, distance = maximum
         work, _ = self.edges.adhesion.work(theta, False)
