@@ -119,12 +119,8 @@ def interior_tension(method: Method, record: Record) -> InteriorTension | None:
 
 def _sampled(record: Record) -> list[int]:
     """Return the indices of the states that are searched where nothing opens."""
-    starts = [
-        (jump.energy_drop, index)
-        for jump, index in zip(record.jumps, record.before_jumps(), strict=True)
-        if jump.branch == "unloading"
-    ]
-    starts.sort(key=lambda entry: -entry[0])
+    before = zip(record.jumps, record.before_jumps(), strict=True)
+    starts = sorted((-jump.energy_drop, i) for jump, i in before if jump.branch == "unloading")
     spaced = np.linspace(0, len(record.states) - 1, _SAMPLES + 2)[1:-1].astype(int)
     return sorted({*(index for _, index in starts[:_JUMPS]), *spaced.tolist()})
 
