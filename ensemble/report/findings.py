@@ -140,8 +140,8 @@ def _numerical(data: Aggregate) -> str:
     elsewhere = "no jump would have ended elsewhere by other speeds, order or a finer field"
     if raced := int(np.sum(races > 0)):
         elsewhere = (
-            f"in {raced} of {loss.size} loops other speeds, order or a finer field might end a jump "
-            f"elsewhere (at most {most('energy_at_stake')} of a loop's loss at stake)"
+            f"in {raced} of {loss.size} loops other speeds, order or a finer field might end "
+            f"a jump elsewhere (at most {most('energy_at_stake')} of a loop's loss at stake)"
         )
     return (
         f"The estimated numerical error of a loss is at most {most('loss_error')} of it; the "

@@ -198,11 +198,11 @@ class _Session:
         summary, batches = self._counts, self.plan.batches
         if self.plan.rows:
             with Results(path) as results:
-                finished = np.isin(results.status(), (DONE, FAILED))
+                finished = int(np.isin(results.status(), (DONE, FAILED)).sum())
                 checksums = results.column(CHECKSUM.name)
-            other = [row for row, known in self._written.items() if checksums[row] != known]
-            finished[other] = False
-            if (held := int(finished.sum())) < (count := summary.done + summary.failed):
+            other = sum(checksums[row] != known for row, known in self._written.items())
+            count = summary.done + summary.failed
+            if (held := min(finished, count - other)) < count:
                 raise WriteError(
                     f"{path} holds {held} of {count} finished tasks: another program has "
                     "changed it while a run wrote to it"

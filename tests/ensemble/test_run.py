@@ -19,9 +19,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import session
-from adhesis.ensemble.run.dispatch import Outcome
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
@@ -345,11 +343,12 @@ def test_a_file_that_is_copied_over_meanwhile_is_no_finished_run(tmp_path, how):
 def test_what_is_asked_to_stop_at_its_last_task_reads_the_file_too(tmp_path):
     campaign, out = load_campaign(write_campaign(tmp_path)), tmp_path / "r.h5"
     create(out, campaign)
+    write_results(out, campaign, range(7))
     plan = Plan(campaign.tasks(), [7], 7, 0)
     asked = session._Session(campaign, plan, None, Options(), StopSignals(), Engine())
     assert asked.summary("SIGTERM received", out).stopped == "SIGTERM received"
     asked._counts.done += 1
-    with pytest.raises(WriteError, match=r"holds 0 of 8 finished tasks: another program"):
+    with pytest.raises(WriteError, match=r"holds 7 of 8 finished tasks: another program"):
         asked.summary("SIGTERM received", out)
 
 
