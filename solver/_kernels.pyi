@@ -11,8 +11,6 @@ COMPILER: str
 
 CLOSING_SHARE: float
 
-FORCES_FELL: float
-
 ELSEWHERE: float
 
 SHAPE_NODES: float

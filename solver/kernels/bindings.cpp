@@ -530,7 +530,6 @@ NB_MODULE(_kernels, m) {
   m.doc() = "Kernels of the methods sharp and grid.";
   m.attr("COMPILER") = ADHESIS_COMPILER;
   m.attr("CLOSING_SHARE") = adhesis::CLOSING_SHARE;
-  m.attr("FORCES_FELL") = adhesis::FORCES_FELL;
   m.attr("ELSEWHERE") = adhesis::ELSEWHERE;
   m.attr("SHAPE_NODES") = adhesis::SHAPE_NODES;
   m.attr("STEP_GROWTH") = adhesis::STEP_GROWTH;

@@ -13,7 +13,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.linalg import norm
 
-from adhesis.solver._kernels import CLOSING_SHARE, FORCES_FELL, DescentEvent, EdgeLaw
+from adhesis.solver._kernels import CLOSING_SHARE, DescentEvent, EdgeLaw
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.threads import one_thread
 from adhesis.solver.sharp.errors import FullContact, NoState
@@ -197,7 +197,7 @@ class Descents:
             edges.solution(gaps, prescribed, share).edge_opening for share in (1, FIELD_ACCURACY)
         )
         force = law.critical_of(gaps, coarse) ** 2 - coarse**2
-        if norm(force) > FORCES_FELL * norm(fine**2 - coarse**2):
+        if norm(force) > 2 * norm(fine**2 - coarse**2):  # twice: the least is between two steps
             return []
         return [Point(prescribed, edges.field(gaps, prescribed), np.zeros(gaps.size), math.nan)]
 
