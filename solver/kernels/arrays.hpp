@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <span>
 #include <vector>
@@ -21,6 +22,16 @@
 namespace adhesis {
 
 using Vector = std::vector<double>;
+
+// Memory of numbers that are not set to zero.
+struct AsFound : std::allocator<double> {
+  template <class T>
+  struct rebind {
+    using other = AsFound;
+  };
+  void construct(double*) {}
+};
+using Unset = std::vector<double, AsFound>;  // computed before they are read
 using Integers = std::vector<int>;
 using Pair = std::array<Vector, 2>;
 using Flags = std::vector<char>;  // true or false; not bool, so that each has an address

@@ -34,7 +34,9 @@ WIDE void solve_column(const double* factor, int n, int stride, double* x) {
 }
 
 WIDE bool invert_definite(const double* matrix, int n, double* inverse) {
-  Vector factor(matrix, matrix + n * n), unit(n * n, 0.0);
+  thread_local Vector factor, unit;
+  factor.assign(matrix, matrix + n * n);
+  unit.assign(n * n, 0.0);
   if (!factor_rows(factor.data(), n, n)) return false;
   for (int i = 0; i < n; ++i) unit[i * n + i] = 1;
   // Lᵀ Y = 1, then L X = Y, for all columns at once

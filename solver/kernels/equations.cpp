@@ -80,7 +80,7 @@ bool Nodes::raise(int k, int order) {
 
 Equations allocate_equations(const Nodes& nodes) {
   const int n = nodes.size();
-  return {Vector(nodes.square.back()), Vector(n), Vector(n),
+  return {Unset(nodes.square.back()), Vector(n), Vector(n),
           std::vector<EndTerms>(nodes.gap_count())};
 }
 
@@ -88,7 +88,8 @@ WIDE void fill_gap(int k, int load_count, Nodes& nodes, Equations& equations,
                    const FieldModel& model) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
-  Vector s(m * load_count);
+  thread_local Vector s;
+  s.assign(m * load_count, 0.0);
   EndTerms ends = {};
   gap_moments(nodes.gaps[k], *model.panels, m, load_count, s.data(), ends);
   equations.end_terms[k] = subtract_modes(s, m, load_count, ends);

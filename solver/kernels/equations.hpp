@@ -36,7 +36,7 @@ using EndTerms = std::array<std::array<double, 2>, 2>;  // [side][load]
 
 // Diagonal blocks of B + G, flat, and loads; X is the weight of the nodes.
 struct Equations {
-  Vector blocks;
+  Unset blocks;
   Vector load, load_of_slope;       // S~, and S~' if asked for
   std::vector<EndTerms> end_terms;  // terms that the modes of S and S' above M add at the ends
 };

@@ -29,7 +29,7 @@ Tree build_tree(const Nodes& nodes, double digits) {
 }
 
 // Multiply a column by the inverse diagonal blocks.
-Vector apply_inverse(const Nodes& nodes, const Vector& inverse, const Vector& x) {
+Vector apply_inverse(const Nodes& nodes, const Unset& inverse, const Vector& x) {
   Vector out(x.size());
   for (int k = 0; k < nodes.gap_count(); ++k) {
     const int m = nodes.size_of(k), first = nodes.offset[k];
@@ -40,8 +40,8 @@ Vector apply_inverse(const Nodes& nodes, const Vector& inverse, const Vector& x)
 }
 
 // Apply (B + G)⁻¹ to a load.
-Vector solve_load(const Nodes& nodes, const Vector& inverse, const Tree& tree,
-                  const Vector& weights, const Vector& load) {
+Vector solve_load(const Nodes& nodes, const Unset& inverse, const Tree& tree, const Vector& weights,
+                  const Vector& load) {
   const int n = nodes.size();
   Charges charges(tree.size());
   Vector potential(tree.size());
@@ -85,7 +85,7 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
   const int n = nodes.size();
-  Vector inverse(nodes.square.back());
+  Unset inverse(nodes.square.back());
   for (int k = 0; k < count; ++k) {
     fill_gap(k, 1, field.nodes, field.equations, model);
     const int at = nodes.square[k];

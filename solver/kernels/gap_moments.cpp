@@ -113,8 +113,9 @@ struct Tile {
 };
 
 // Tile the gap between finest panels `first` and `last`, for as many modes.
-std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes, const Panels& panels) {
-  std::vector<Tile> tiles;
+void tile_gap(const Gap& gap, long first, long last, int modes, const Panels& panels,
+              std::vector<Tile>& tiles) {
+  tiles.clear();
   const int levels = int(panels.level_start.size());
   for (long panel = first; panel < last; panel += tiles.back().size) {
     int level = 0;
@@ -138,7 +139,6 @@ std::vector<Tile> tile_gap(const Gap& gap, long first, long last, int modes, con
     long row = (panel >> level) & ((panels.finest_count >> level) - 1);
     tiles.push_back({panel, size, panels.level_start[level] + int(row)});
   }
-  return tiles;
 }
 
 // Place the nodes of compressed panels.
@@ -207,7 +207,8 @@ void place_moment_nodes(const Gap& gap, int modes, int load_count, const Panels&
   long last = long(std::ceil(gap.end[1] / width)) - 2;
   if (last < first)
     return place_short_gap(gap, modes, load_count, panels, nodes);  // they would meet
-  std::vector<Tile> tiles = tile_gap(gap, first, last, modes, panels);
+  thread_local std::vector<Tile> tiles;
+  tile_gap(gap, first, last, modes, panels, tiles);
   const int most = most_end_nodes(gap, panels) + int(tiles.size()) * panels.nodes();
   nodes.begin(most + 4, load_count);
   place_end_piece(gap, 0, double(first) * width - gap.end[0], panels, nodes);
@@ -228,7 +229,8 @@ WIDE void gap_moments(const Gap& gap, const Panels& panels, int modes, int load_
     for (int which = 0; which < load_count; ++which) nodes.source[which][nodes.count] = 0;
   }
   // sin((n+1)t), cos t = η, by its recurrence; four nodes at a time, for all modes
-  Vector total(8 * modes);  // four of each load
+  double total[8 * MOST_CHARGES];  // four of each load
+  std::fill_n(total, 8 * modes, 0.0);
   Four low[2] = {}, high[2] = {};
   for (int i = 0; i < nodes.count; i += 4) {
     const Four minus = load_four(&nodes.from_end[1][i]), plus = load_four(&nodes.from_end[0][i]);

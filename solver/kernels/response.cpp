@@ -12,15 +12,10 @@ enum Column { by_field, by_pressure, by_motion, by_left_end };
 
 // What is computed on the way, for the nodes of the gap.
 struct Space {
-  std::array<Vector, columns> loads, solved;
-  std::array<Vector, 2> singular;  // charges of both ends' openings
-  Vector near, near_slope, smooth, density;
-
-  explicit Space(int m) : near(m), near_slope(m), smooth(m), density(m) {
-    for (Vector& column : loads) column.resize(m);
-    for (Vector& column : solved) column.resize(m);
-    for (Vector& column : singular) column.resize(m);
-  }
+  using Column = std::array<double, MOST_CHARGES>;
+  std::array<Column, columns> loads, solved;
+  std::array<Column, 2> singular;  // charges of both ends' openings
+  Column near = {}, near_slope = {}, smooth, density;
 };
 
 // Compute the potential g of both neighbours at the nodes of a gap, and its derivative by θ.
@@ -91,12 +86,11 @@ WIDE void LinearResponse::linearise(int k, const EdgeLaw& law) {
   const GaussRule& rule = gauss_rules()[nodes.orders[k]];
   const int m = rule.count, first = nodes.offset[k];
   const double* own = &inverse[nodes.square[k]];
-  Space space(m);
+  Space space;
   load_gap(*this, k, rule, space);
   for (int c = 0; c < columns; ++c)
     for (int i = 0; i < m; ++i) space.solved[c][i] = dot(own + i * m, space.loads[c].data(), m);
-  std::copy(space.solved[by_field].begin(), space.solved[by_field].end(),
-            scaled_opening.begin() + first);
+  std::copy_n(space.solved[by_field].data(), m, &scaled_opening[first]);
 
   // C at both edges by each load, and the strength of the edges' singular openings
   std::array<std::array<double, columns>, 2> opening;

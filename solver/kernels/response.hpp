@@ -50,7 +50,7 @@ struct ResponseSolution {
 struct LinearResponse {
   Nodes nodes;          // between the reference edges
   Equations equations;  // with S and S'
-  Vector inverse;       // of the blocks
+  Unset inverse;        // of the blocks
   Tree tree;
   std::array<Charges, 2> charges;  // without potentials and p, and by a unit of p
   Vector about, about_pressure;    // potentials and p of the references

@@ -63,7 +63,7 @@ const ChebyshevRule& chebyshev_rule(int rank) {
 // Compute K between two sets of charges.
 WIDE void fill_kernel(const double* theta, const double* stretch, int rows, const double* other,
                       const double* other_stretch, int columns, double* out) {
-  Vector sine(columns), cosine(columns);
+  double sine[MOST_CHARGES], cosine[MOST_CHARGES];
   for (int j = 0; j < columns; ++j) {
     sine[j] = std::sin(0.5 * other[j]);
     cosine[j] = std::cos(0.5 * other[j]);

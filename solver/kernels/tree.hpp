@@ -54,13 +54,13 @@ struct Charges {
 // First the L gaps, then pairs of runs, the last one the whole.
 struct Tree {
   std::vector<Run> runs;
-  int count = 0;           // of gaps
-  Vector theta, stretch;   // θ and dθ/dη of all charges
-  Vector kernel;           // K12 of all pairs
-  Vector interpolation;    // E of both halves of all pairs
-  Vector response;         // R of all runs
-  Vector inverse;          // (1 - K12 R2 K21 R1)⁻¹ of all pairs
-  Vector inner_potential;  // D of both halves of all pairs
+  int count = 0;          // of gaps
+  Vector theta, stretch;  // θ and dθ/dη of all charges
+  Unset kernel;           // K12 of all pairs
+  Unset interpolation;    // E of both halves of all pairs
+  Unset response;         // R of all runs
+  Unset inverse;          // (1 - K12 R2 K21 R1)⁻¹ of all pairs
+  Unset inner_potential;  // D of both halves of all pairs
 
   // Allocate the tree of gaps, with room for so many times the charges.
   explicit Tree(const Nodes& nodes, double digits, double room = 1);
