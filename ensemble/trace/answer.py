@@ -539,7 +539,8 @@ def _cut_offs(answer: Answer) -> dict[float, tuple[str, Result]]:
 def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     """Return what is doubtful: what changes the answer most first, loops that failed last."""
     adhesive = answer.main["work_of_adhesion"] > 0  # else the loss is nought, but for rounding
-    found = [*answer.main["preload_warnings"], *_one_patch(answer)]
+    preload = answer.main["preload_warnings"]
+    found = [*preload, *_one_patch(answer)]
     found += _not_converged(answer) if adhesive else []
     if adhesive and loss.relative > 0.5:
         largest = max(loss.doubts, key=lambda name: loss.doubts[name])
@@ -549,8 +550,7 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
             f"“{largest}” ({words[largest]}; standard uncertainty "
             f"{100 * loss.doubts[largest]:.0f} %): {_REMEDIES[largest]}"
         )
-    for kind in ("fall_warnings", "range_warnings", "strain_warnings"):
-        found += answer.main[kind]
+    found += [text for text in answer.main["warnings"] if text not in preload]
     races = answer.main["races"]
     if races:
         found.append(

@@ -139,10 +139,8 @@ def compute(run: Run, progress: Progress | None = None) -> Result:
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
     drops = loop.loss_from_drops - loop.closing_drop
     return loop.numbers() | {
-        "range_warnings": loop.range_warnings(),
-        "strain_warnings": loop.strain_warnings(),
         "preload_warnings": loop.preload_warnings,
-        "fall_warnings": loop.fall_warnings(),
+        "warnings": list(loop.warnings),
         "loss_note": loop.loss_note,
         "range_summary": loop.range_summary(),
         "contact_fraction": loop.largest_contact_fraction,

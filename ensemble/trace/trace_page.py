@@ -171,8 +171,7 @@ def table_of_runs(answer: Answer) -> Any:
     import pandas as pd
 
     rows = pd.DataFrame(run_rows(answer)).rename(columns={"said": "description"})
-    hidden = ["range_warnings", "preload_warnings", "fall_warnings", "strain_warnings", "failed"]
-    rows = rows.drop(columns=hidden, errors="ignore")
+    rows = rows.drop(columns=["preload_warnings", "warnings", "failed"], errors="ignore")
     return with_units(rows, answer.cycle.control.is_load)
 
 

@@ -319,7 +319,7 @@ def with_losses(
         own: Any = {"name": name, "group": group, "description": "", "changes": changes}
         runs.append(dataclasses.replace(answer.plan.runs[0], **own))
     results = {
-        name: answer.main | {"loss": loss, "range_warnings": [], "strain_warnings": [], "races": 0}
+        name: answer.main | {"loss": loss, "warnings": [], "races": 0}
         for name, loss in losses.items()
     }
     plan = dataclasses.replace(answer.plan, runs=tuple(runs))
