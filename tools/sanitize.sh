@@ -16,5 +16,5 @@ LD_PRELOAD="$(c++ -print-file-name=libasan.so) $(c++ -print-file-name=libubsan.s
 export PYTHONPATH=$PWD
 "$python" -m pytest -q -p no:cacheprovider \
     tests/solver/test_descent.py tests/solver/test_sharp_field.py tests/solver/test_touch.py \
-    tests/solver/test_sharp_many.py "$@"
+    tests/solver/test_sharp_many.py tests/solver/test_hostile.py "$@"
 "$python" tools/fuzz/loops.py --seed 1 --scenes "${SCENES:-200}"
