@@ -109,18 +109,6 @@ def test_first_touch_is_a_jump_at_the_highest_crest():
     assert [s.patches for s in path.states[:2]] == [0, 1]
 
 
-def test_two_equal_maxima_touch_together_and_leave_as_in_sharp():
-    """Apart they are unstable before both could leave together: one of them leads."""
-    two = Profile(PERIOD, np.array([0, 0, AMPLITUDE / 2], dtype=complex))
-    problem = Problem(two, HALF_SPACE, 0.1 * wave(0.2).work_of_adhesion)
-    grid = run_loop(grid_of(problem, nodes=2048), max_penetration=0.5, load_steps=10)
-    sharp = loop_of(problem, max_penetration=0.5, load_steps=10)
-    steps = [(0, 2), (2, 1), (1, 0)]
-    for result in (grid, sharp):
-        assert [(j.patches_before, j.patches_after) for j in result.jumps] == steps
-    assert grid.loss == pytest.approx(sharp.loss, rel=5e-3)
-
-
 def test_number_of_nodes():
     problem = Problem(rough_profile(), HALF_SPACE, 1e-3)  # highest harmonic 12
     assert GridMethod(problem).nodes == 1024
