@@ -72,6 +72,10 @@ validate --method magic -> method is 'magic': it must be one of grid, sharp
 BENCH --budget 0 -> --budget is '0': it must be a positive number of seconds
 BENCH --to /proc/x -> --to is /proc/x: it cannot be written
 doctor --in none -> --in is none: it must be a folder that can be written
+# options of any command
+LOOP {{--young,--measure,--seed,--json,--path}}=-- -> {{}} is '--'
+LOOP --seed 1 --seed={{1,2}} -> --seed is given twice: give it once
+LOOP --field-penetrations 0.1 --field-penetrations 0.2 0.3 -> --field-penetrations is given twice
 # the profile and the material of a loop
 loop -> no profile is given: give one of --hurst, --heights and --trace
 LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
@@ -88,6 +92,12 @@ loop --heights none.npy --period 1e-3 -> with --heights the material has to be g
 loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
     --heights needs --period
+WAVE --heights nan.npy -> has no finite height at index 1: --heights needs every
+WAVE --heights scalar.npy -> heights hold 1 value(s): at least 3 are needed
+WAVE --heights grid.npy -> holds 4 × 4 numbers: --heights takes one column
+WAVE --heights {{text,complex}}.npy -> heights are real numbers
+WAVE --heights object.npy -> is no .npy of numbers
+WAVE --heights ragged.csv -> at least 3 of one length are needed
 WAVE --hurst 0.8 -> --hurst and --heights are given: give one of them
 WAVE --seed 4 -> --seed belongs to --hurst
 WAVE --delimiter : -> --delimiter is ':': it must be one of
@@ -206,6 +216,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+ARRAYS = {
+    "nan": [1.0, np.nan, 2.0, 3.0],
+    "scalar": 1.0,
+    "grid": np.ones((4, 4)),
+    "text": np.array(["a", "b", "c"]),
+    "complex": np.ones(4) * 1j,
+    "object": np.array([{}, 1, 2], dtype=object),
+}
+
+
 def fill(folder: Path) -> None:
     create(folder / "r.h5", load_campaign(write_campaign(folder)))
     for name in ("directory", "sub", "ow", "r", "way/trace.html"):
@@ -218,6 +238,9 @@ def fill(folder: Path) -> None:
     heights = 1e-9 * np.cos(np.arange(16) * np.pi / 8)
     Path("wave.csv").write_text("\n".join(map(repr, heights.tolist())))
     os.link("wave.csv", "hard.csv")
+    Path("ragged.csv").write_text("1;2\n1\n3;4;5\n")
+    for name, array in ARRAYS.items():
+        np.save(f"{name}.npy", np.asarray(array))
     x = np.arange(200)
     lines = [f"{a / 2} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
     for name in ("t.txt", "ow/trace.md"):
