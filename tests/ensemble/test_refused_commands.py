@@ -15,7 +15,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.run import launch
-from tests.support.campaign_support import write_campaign
+from tests.support.campaign_support import campaign_text, write_campaign
 from tests.support.options import forbid_work, replacing
 
 # A case begins with a command or one of these, whose options give way to those of the case.
@@ -46,6 +46,8 @@ run c.toml --max-failures {{x,-1,nan,1e99,inf}} -> --max-failures is '{{}}'
 run c.toml --patience {{x,-1,nan,1e99,inf}} -> --patience is '{{}}'
 run c.toml --out p.h5 --part {{x,0/3,4/3,1/0}} -> --part is '{{}}': it must be K/N
 run c.toml --part 1/2 -> --part needs --out
+run c.toml {{--patience=0,--dry-run}} --out p.h5 --part 9/9 -> the campaign has 8 tasks and so at
+run stop.toml {{--patience=0,--dry-run}} --out p.h5 --part 1/2 -> its batches are decided on whole
 run c.toml --redo some -> --redo is 'some'
 run c.toml --dry-run --redo all -> --redo and --dry-run cannot be given together
 run c.toml --dry-run --walltime x -> --walltime is 'x': it must
@@ -228,6 +230,7 @@ ARRAYS = {
 
 def fill(folder: Path) -> None:
     create(folder / "r.h5", load_campaign(write_campaign(folder)))
+    Path("stop.toml").write_text(campaign_text() + "[stop]\nrelative_error = 0.1\nmost = 40\n")
     for name in ("directory", "sub", "ow", "r", "way/trace.html"):
         Path(name).mkdir(parents=True)
     Path("text").write_text("notes")
