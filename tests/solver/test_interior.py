@@ -33,7 +33,7 @@ from adhesis.solver.references.single_wave import SingleWave
 from tests.support import scenes
 from tests.support.dugdale_wave import DugdaleWave
 from tests.support.exact_wave import ExactWave
-from tests.support.explicit_solution import explicit_openings, explicit_solution
+from tests.support.explicit_solution import explicit_openings, explicit_solution, scaled_stress
 
 PERIOD = 2e-3
 
@@ -65,13 +65,7 @@ def test_the_tension_is_that_of_an_independent_solution():
     half = (gaps[0, 1] - gaps[0, 0]) / 2
     angle = np.linspace(0, np.pi, theta.shape[1])  # θ = centre - half cos
     weight = half * np.sin(angle) * np.pi / (theta.shape[1] - 1)
-    m = np.arange(1, 3)
-
-    def full(places):
-        phase = np.exp(1j * np.multiply.outer(np.asarray(places), m))
-        return 2 * (phase @ (m * profile.coefficients[1:] * profile.q0)).real
-
-    pressure = state.mean_stress / unit
+    full, pressure = scaled_stress(profile), state.mean_stress / unit
     constants, _ = explicit_solution(full, gaps, state.separation * profile.q0, 96)
     # its basis has each factor sin(·/2) half as large as the product of the edges has
     assert abs(constants[0]) / 2 == pytest.approx(abs(pressure), rel=1e-6)
