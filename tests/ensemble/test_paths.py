@@ -75,23 +75,19 @@ NAMED = {
     "a path too long": 2100 * "z/" + "x",
     "a device": "/dev/zero",
 }
-LONG = ("a name too long", "a name of a folder too long", "a path too long")
-OF_READING = (
-    *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
-    *("link to an endless device", "link to nothing", "link to itself"),
-    *("a file for a folder", "no folder", "a device", *LONG),
+
+
+def all_but(*kinds: str) -> tuple[str, ...]:
+    return tuple(kind for kind in (*MADE, *NAMED) if kind not in kinds)
+
+
+ANOTHER = ("link of another user", "link to that of another user")
+OF_READING = all_but("file", "link to a file", "second name", *ANOTHER)
+OF_WRITING = all_but(
+    *("file", "link to a file", "link to nothing", "second name"),
+    *("link to an endless device", "a device"),
 )
-OF_WRITING = (
-    *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
-    *("link to itself", "link of another user", "link to that of another user"),
-    *("a file for a folder", "no folder"),
-    *LONG,
-)
-OF_FOLDERS = (
-    *("pipe", "socket", "file", "link to a pipe", "link to a socket", "link to a file"),
-    *("link to an endless device", "link to nothing", "link to itself", "link of another user"),
-    *("a file for a folder", "a device", *LONG),
-)
+OF_FOLDERS = all_but("folder", "link to a folder", "no folder", "second name", ANOTHER[1])
 
 
 def kept(folder: Path) -> dict[str, Any]:
