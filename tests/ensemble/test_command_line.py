@@ -268,9 +268,9 @@ def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
     assert capsys.readouterr().err == "adhesis status: interrupted\n"
 
 
-def process(*words, package="adhesis", before="", **options) -> subprocess.CompletedProcess[str]:
+def process(*words, before="", **options) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, by a shell where something stands before it."""
-    command = [sys.executable, "-m", package, *words]
+    command = [sys.executable, "-m", "adhesis", *words]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
     if before:
         command = ["sh", "-c", f'"$@" {before}', "sh", *command]

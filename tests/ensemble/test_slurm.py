@@ -56,8 +56,8 @@ class Cluster:
     folder: Path
     env: dict[str, str]
 
-    def call(self, *command: str | Path, cwd: Path | None = None) -> str:
-        done = ran(*command, env=self.env, cwd=cwd, timeout=None)
+    def call(self, *command: str) -> str:
+        done = ran(*command, env=self.env, timeout=None)
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
         return done.stdout
 

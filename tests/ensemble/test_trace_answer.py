@@ -306,9 +306,7 @@ def test_the_page_shows_names_headers_and_warnings_as_texts(spoiled_answer, tmp_
     assert "\x1b" not in what_was_read(answer.prepared)
 
 
-def with_losses(
-    answer: Answer, losses: dict[str, float], limits: dict[str, float], noise: float = 0.0
-) -> Answer:
+def with_losses(answer: Answer, losses: dict[str, float], limits: dict[str, float]) -> Answer:
     """The answer of a plan whose loops end with these losses in J/m²."""
     trace = dataclasses.replace(answer.prepared, cut_off=10e-6, limits=limits)
     runs = []

@@ -31,17 +31,17 @@ def rows(
     return [line.replace(".", decimal).replace("\0", delimiter) for line in lines]
 
 
-def read(tmp_path: Path, lines: list[str], name: str = "t.txt", **options: object) -> Trace:
-    path = tmp_path / name
+def read(tmp_path: Path, lines: list[str], **options: object) -> Trace:
+    path = tmp_path / "t.txt"
     path.write_bytes("\n".join(lines).encode())
     return read_trace(path, **options)  # type: ignore[arg-type]
 
 
-def assert_right(trace: Trace, tolerance: float = 1e-11) -> None:
+def assert_right(trace: Trace) -> None:
     assert trace.points == N
     assert trace.step == pytest.approx(STEP, rel=1e-6)
     assert trace.length == pytest.approx(X[-1], rel=1e-6)
-    np.testing.assert_allclose(trace.heights, Z, atol=tolerance)
+    np.testing.assert_allclose(trace.heights, Z, atol=1e-11)
 
 
 UM = "x (µm);z (µm)"
