@@ -97,10 +97,6 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
-    "a line of the heights of a raster": (
-        [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
-        {"columns": [3], "row": 1, **Z_UM},
-    ),
     "a line of the heights of a raster that lacks its first one": (
         [f"{XS[k]},{y},{ZS[k] if y + k else 'nan'}" for y in range(2) for k in range(N)],
         {"columns": [3], "row": 1, **Z_UM},
@@ -413,11 +409,6 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um", "columns": [1, 3]},
         "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
     ),
-    "the heights alone of a raster": (
-        [f"{x},{y},{z}" for y in range(3) for x, z in PAIRS],
-        {"columns": [3], **Z_UM},
-        "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
-    ),
     "a word for a height": (
         ["x (um),z (um),I", *(f"{x},{'NG' if x == '20.000' else z},5" for x, z in PAIRS)],
         {"columns": [1, 2]},
@@ -561,11 +552,6 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         "steps of the positions are unequal",
     ),
     "no position": ([UM, *TWO[:9], ",1.0", *TWO[9:]], {}, "line 11.*no position"),
-    "positions and heights back and forth": (
-        [UM, *TWO, *TWO[::-1]],
-        {},
-        "positions stand still at line 402",
-    ),
     "a map with positions": (
         [",".join(["", *XS]), *(",".join([str(k), *ZS]) for k in range(3))],
         {"row": 1, "step": STEP, "unit": "um"},
