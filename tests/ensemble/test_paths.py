@@ -23,7 +23,7 @@ from adhesis.ensemble.run.session import run_campaign
 from tests.support.campaign_support import campaign_text
 from tests.support.exact_wave import ExactWave
 from tests.support.fake_run import fake_engine
-from tests.support.options import forbid_work
+from tests.support.options import WAVE_HEIGHTS, forbid_work
 from tests.support.synthetic_results import campaign, write
 
 ANOTHER_USER = 12345
@@ -114,7 +114,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     monkeypatch.chdir(tmp_path / "apart")
     _socket(Path("socket"))
     monkeypatch.chdir(tmp_path)
-    Path("wave.csv").write_text("\n".join(map(repr, np.cos(np.arange(16) * np.pi / 8) * 1e-9)))
+    Path("wave.csv").write_text("\n".join(map(str, WAVE_HEIGHTS)))
     x = np.arange(200)
     lines = [f"{a} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
     Path("trace.csv").write_text("\n".join(lines))

@@ -16,13 +16,13 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.run import launch
 from tests.support.campaign_support import campaign_text, write_campaign
-from tests.support.options import forbid_work, replacing
+from tests.support.options import OF_WAVE, WAVE_HEIGHTS, forbid_work, replacing
 
 # A case begins with a command or one of these, whose options give way to those of the case.
 BASES = {
     "LOOP": "loop --hurst 0.8 --n0 2 --ratio 4",
-    "WAVE": "loop --heights wave.csv --period 1e-3 --work-of-adhesion 1e-10 --young 1e6"
-    " --poisson 0.5 --load-steps 2 --max-penetration 0.5",
+    "WAVE": f"loop --heights wave.csv {' '.join(map(str, OF_WAVE))} --load-steps 2"
+    " --max-penetration 0.5",
     "TRACE": "trace t.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5",
     "BENCH": "bench --quick",
 }
@@ -238,8 +238,7 @@ def fill(folder: Path) -> None:
         Path(name).touch()
     with h5py.File("other.h5", "w") as file:
         file["x"] = 1
-    heights = 1e-9 * np.cos(np.arange(16) * np.pi / 8)
-    Path("wave.csv").write_text("\n".join(map(repr, heights.tolist())))
+    Path("wave.csv").write_text("\n".join(map(repr, WAVE_HEIGHTS.tolist())))
     os.link("wave.csv", "hard.csv")
     Path("ragged.csv").write_text("1;2\n1\n3;4;5\n")
     for name, array in ARRAYS.items():
