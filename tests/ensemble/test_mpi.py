@@ -183,12 +183,10 @@ def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(t
     assert "stopped early" not in process.stderr
 
 
-KILLS = int(os.environ.get("ADHESIS_KILLS", "0"))
+KILLS = 20  # of each victim
 
 
-@pytest.mark.skipif(
-    KILLS == 0, reason="long: ADHESIS_KILLS=20 kills each of three victims 20 times"
-)
+@pytest.mark.slow(reason="sixty kills")
 @pytest.mark.parametrize("victim", ["worker", "master", "all"])
 def test_kills_at_random_moments(tmp_path, victim):
     random.seed(victim)
