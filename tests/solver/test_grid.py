@@ -35,14 +35,11 @@ def loop() -> LoopResult:
     return rough_loop(rough_profile())
 
 
-def test_loop_integral_is_the_sum_of_drops(loop):
+def test_loop_integral_is_the_sum_of_drops_and_mean_stress_the_slope_of_the_energy(loop):
     assert loop.loss > 0
     assert len(loop.jumps) >= 3
     assert abs(loop.audit_residual) < 2e-3
     assert all(j.energy_drop >= 0 for j in loop.jumps)
-
-
-def test_mean_stress_is_the_slope_of_the_energy(loop):
     # Independent of the drops: dU = -λ p̄ ds between neighbouring states that no jump separates.
     s, p, u = loop.separation, loop.mean_stress, loop.energy
     smooth = np.diff(s) != 0
