@@ -128,6 +128,7 @@ LOOP --preload 20kPa --stiffness 0 -> For a weight give --max-stress 20kPa with
 LOOP --preload 20kPa --max-stress 1 -> --max-stress and --preload are given
 LOOP --preload 20kPa --max-penetration 0.5,0.6 -> beside --preload: it must be one
 LOOP --preload 20bar -> --preload is '20bar': its unit must be one of Pa, kPa
+LOOP --stiffness 0 --max-stress 0.2kPa,5bar -> --max-stress is '5bar': its unit must be one of Pa
 LOOP --preload 20kPa,2e4 -> --preload is 20kPa,2e4: turning points must differ
 # outputs of a loop
 LOOP --figure loop.bmp -> --figure is loop.bmp: the name must end in .png
