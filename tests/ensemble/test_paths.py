@@ -139,12 +139,6 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     signal.signal(signal.SIGALRM, before)
 
 
-@pytest.fixture
-def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    forbid_work(monkeypatch)
-    monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", None)
-
-
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> str:
     small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
@@ -226,11 +220,12 @@ CASES = [
 ]
 
 
-@pytest.mark.usefixtures("no_work")
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_a_crafted_path_is_refused_in_one_sentence_before_anything_is_done(
-    name, kind, place, results, loop, capsys
+    name, kind, place, results, loop, capsys, monkeypatch
 ):
+    forbid_work(monkeypatch)
+    monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", None)
     if "->" in name:
         text, _, ending = (word.strip() for word in name.partition("->"))
         text = text.replace("LOOP", " ".join(LOOP)).replace("MATERIAL", " ".join(MATERIAL))
