@@ -97,18 +97,22 @@ def between(spans):
     return np.stack([spans[:, 1], np.append(spans[1:, 0], spans[0, 0] + 2 * np.pi)], axis=1)
 
 
+def explicit_nodes(profile, gaps, least_nodes=96):
+    """Return how many nodes every gap has in :func:`explicit_openings`."""
+    widest = float(np.diff(gaps, axis=1).max()) / 2
+    patch = np.diff(between(gaps), axis=1)[:, 0]
+    # a narrow patch beside a wide gap asks for nodes as dense as it is, and 1/sqrt of it suffices
+    narrow = float(np.sqrt(widest / patch.min()))
+    return int(np.ceil(max(least_nodes, 12 * widest * profile.highest_harmonic, 12 * narrow)))
+
+
 def explicit_openings(profile, gaps, separation, least_nodes=96):
     """Return θ and the opening q0 t of every gap, each of shape (L, nodes + 1).
 
     From the profile's own coefficients, for gaps and separation in units of 1/q0: nothing of the
     method ``sharp`` takes part. The nodes are so dense that the shortest wave has 24 at least.
     """
-    widest = float(np.diff(gaps, axis=1).max()) / 2
-    patch = np.diff(between(gaps), axis=1)[:, 0]
-    # a narrow patch beside a wide gap asks for nodes as dense as it is, and 1/sqrt of it suffices
-    narrow = float(np.sqrt(widest / patch.min()))
-    densest = max(least_nodes, 12 * widest * profile.highest_harmonic, 12 * narrow)
-    nodes = int(np.ceil(densest))
+    nodes = explicit_nodes(profile, gaps, least_nodes)
     _, theta, slope = _solve(scaled_stress(profile), gaps, separation, nodes)
     # x = cos φ: dt/dφ = -slope, with t = 0 at φ = 0; slope is a polynomial in x, a cosine series
     series = dct(slope, type=1, axis=1) / nodes
