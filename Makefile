@@ -39,7 +39,7 @@ test: setup-slurm  ## the whole test suite, with MPI, Slurm and a browser where 
 
 test-kills: setup-test  ## 20 kills each of a worker, of rank 0 and of the whole job (about 4 minutes)
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
-	    export MPIRUN ADHESIS_KILLS=20 && exec $(bin)/python -m pytest tests/ensemble/test_mpi.py -k random_moments
+	    export MPIRUN && exec $(bin)/python -m pytest --slow tests/ensemble/test_mpi.py -k random_moments
 
 fuzz: setup-test  ## new examples from a seed that is printed, for FOR=600 seconds
 	@$(bin)/python tools/fuzz.py --seconds $(FOR)

@@ -18,9 +18,9 @@ from adhesis.ensemble.run.launch import peak_bytes
 REFERENCE = Reference(1.0, "made up")
 
 
-def line(method, setting, seconds, error, scene=ONE_WAVE) -> Line:
+def line(method, setting, seconds, error) -> Line:
     measured = Measurement(seconds, 200.0, 190.0, 1.0 + error, 2.0, 1e-3, 10, 2, 1)
-    return Line(Run(scene, method, setting, 10, 60.0), REFERENCE, measured)
+    return Line(Run(ONE_WAVE, method, setting, 10, 60.0), REFERENCE, measured)
 
 
 def failed(method, setting, scene=ONE_WAVE) -> Line:

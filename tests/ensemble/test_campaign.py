@@ -233,6 +233,14 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
             )
             for text in ("0,5", ".5", "1/2", "0.5 // rubber")
         ),
+        *(
+            (campaign_text(young="1e6").replace(old, new, 1), f"{place}, where TOML has {plain}")
+            for old, new, place, plain in (
+                ("1e6", "“1 MPa”", "line 8, column 9 holds “ (U+201C)", '"'),
+                ("1e6", "−1e6", "line 8, column 9 holds − (U+2212)", "-"),
+                ("= ", "=\u3000", "line 2, column 9 holds a blank (U+3000)", "a plain blank"),
+            )
+        ),
         ("x = " + "[" * 5000, "is not valid TOML"),
         ("# " + "x" * 70_000, "bytes"),
         ("", "[profile] period is missing"),

@@ -286,12 +286,11 @@ def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
     assert [message[0] for message in sent[-2:]] == ["outcome", "goodbye"]
 
 
-def hand_out(channel, tasks, limits=None, tick=lambda: None):
+def hand_out(channel, tasks, limits=None):
     group_of = dict.fromkeys(range(tasks), 0)
     outcomes: list[Outcome] = []
     schedule = schedule_of(range(tasks), group_of)
-    limits = limits or Limits()
-    reason = Master(channel, schedule, outcomes.append, limits, tick).run()
+    reason = Master(channel, schedule, outcomes.append, limits or Limits()).run()
     return outcomes, reason
 
 

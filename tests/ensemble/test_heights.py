@@ -17,14 +17,11 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.model.profile import Array, self_affine_profile, single_wave
-from adhesis.solver.references.single_wave import SingleWave
 from tests.support.campaign_support import campaign_text
+from tests.support.options import OF_WAVE
+from tests.support.options import WAVE_HEIGHTS as WAVE
 
-N = 16
 SINGLE = single_wave(1e-9, 1e-3)
-WAVE = 1e-9 * np.cos(2 * np.pi * np.arange(N) / N)
-GAMMA = SingleWave.with_alpha(0.2, 1e-9, 1e-3, 1e6 / 0.75).work_of_adhesion
-CONTACT = ("--work-of-adhesion", GAMMA, "--young", 1e6, "--poisson", 0.5)
 
 NM = [f"{1e9 * h:.6f}" for h in WAVE]
 METRES = [repr(float(h)) for h in WAVE]
@@ -248,7 +245,7 @@ def test_the_warning_goes_to_stderr_json_and_exit_code(path, tmp_path, monkeypat
     monkeypatch.setattr(loop_command, "profile_from_heights", lambda heights, period: SINGLE)
     Path("a.csv").write_text("\n".join(repr(float(h)) for h in CUT["tilted"]))
     Path("b.csv").write_text("\n".join(METRES))
-    words = (*CONTACT, "--period", 1e-3, "--load-steps", 2, "--json", "o.json", "--quiet", *path)
+    words = (*OF_WAVE, "--load-steps", 2, "--json", "o.json", "--quiet", *path)
 
     def run(*more: object) -> tuple[int, str]:
         code = main(["loop", *map(str, (*words, *more))])

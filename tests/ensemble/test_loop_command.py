@@ -310,37 +310,6 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
     assert not any(turn["warnings"] for turn in data.get("turns", []))
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "sentence"),
-    [
-        (
-            "nan.npy",
-            [1.0, np.nan, 2.0, 3.0],
-            "has no finite height at index 1: --heights needs every",
-        ),
-        ("scalar.npy", 1.0, "heights hold 1 value(s): at least 3 are needed"),
-        ("grid.npy", np.ones((4, 4)), "holds 4 × 4 numbers: --heights takes one column"),
-        ("text.npy", np.array(["a", "b", "c"]), "heights are real numbers"),
-        ("complex.npy", np.ones(4) * 1j, "heights are real numbers"),
-        ("object.npy", np.array([{}, 1, 2], dtype=object), "is no .npy of numbers"),
-        ("ragged.csv", "1;2\n1\n3;4;5\n", "at least 3 of one length are needed"),
-    ],
-)
-def test_files_that_are_not_one_period_of_heights_are_refused(
-    name, content, sentence, tmp_path, capsys, monkeypatch
-):
-    monkeypatch.setattr(loop_command, "run_loop", None)  # no loop is started
-    path = tmp_path / name
-    if isinstance(content, str):
-        path.write_text(content)
-    else:
-        np.save(path, np.asarray(content), allow_pickle=True)
-    assert run(*wave_words(path)) == 2
-    printed = capsys.readouterr()
-    assert (printed.out, printed.err.count("\n")) == ("", 1)
-    assert sentence in printed.err
-
-
 def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(capsys):
     words = ("--hurst", 0.8, "--n0", 4, "--ratio", 4, "--load-steps", 2, "--young", 1e6, "--quiet")
     assert run(*words) == 0

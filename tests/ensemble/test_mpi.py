@@ -81,16 +81,6 @@ def test_loops_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
     assert differences(tmp_path / "merged.h5", whole) == []
 
 
-def goes_on(path, out, whole) -> int:
-    """Run what is left, each task that is not done once; returns how many were done."""
-    done, log = done_rows(out), out.with_name("rest.log")
-    again = here(path, out, f"log={log}")
-    assert (again.done, again.computed) == (8, 8 - done)
-    assert len(log.read_text().splitlines()) == 8 - done
-    assert differences(out, whole) == []
-    return done
-
-
 MPI, OWN = ((), 3), (("--ranks", 3), 0)
 ENDLESS = "step=0.1 hang=0.8:0.04:1"  # one of the tasks never ends
 LAUNCHER, FIRST, LAST = "the launcher", "the first rank", "the last rank"
@@ -134,7 +124,12 @@ def test_ranks_end_with_their_run_and_the_next_one_goes_on(
     assert process.returncode == code or (code is None and process.returncode not in (0, 1, 2, 75))
     assert all(phrase in errors for phrase in said), errors
     wait_until(lambda: all(map(has_ended, ranks)))
-    assert goes_on(path, out, whole) >= 2
+    kept, log = done_rows(out), tmp_path / "rest.log"
+    again = here(path, out, f"log={log}")
+    assert (again.done, again.computed) == (8, 8 - kept)
+    assert kept >= 2
+    assert len(log.read_text().splitlines()) == 8 - kept  # none is begun twice
+    assert differences(out, whole) == []
 
 
 @pytest.mark.parametrize(
@@ -183,12 +178,10 @@ def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(t
     assert "stopped early" not in process.stderr
 
 
-KILLS = int(os.environ.get("ADHESIS_KILLS", "0"))
+KILLS = 20  # of each victim
 
 
-@pytest.mark.skipif(
-    KILLS == 0, reason="long: ADHESIS_KILLS=20 kills each of three victims 20 times"
-)
+@pytest.mark.slow(reason="sixty kills")
 @pytest.mark.parametrize("victim", ["worker", "master", "all"])
 def test_kills_at_random_moments(tmp_path, victim):
     random.seed(victim)

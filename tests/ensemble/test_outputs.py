@@ -15,13 +15,9 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json, write_new
 from adhesis.ensemble.report.figures import style
-from adhesis.solver.references.single_wave import SingleWave
+from tests.support.options import OF_WAVE, WAVE_HEIGHTS
 
-PERIOD, AMPLITUDE = 1e-3, 1e-9
-GAMMA = SingleWave.with_alpha(0.2, AMPLITUDE, PERIOD, 1e6 / 0.75).work_of_adhesion
-HEIGHTS = AMPLITUDE * np.cos(2 * np.pi * np.arange(16) / 16)
-CONTACT = ("--work-of-adhesion", GAMMA, "--young", 1e6, "--poisson", 0.5)
-LOOP = (*("--heights", "wave.csv", "--period", PERIOD), *CONTACT, "--load-steps", 2, "--quiet")
+LOOP = ("--heights", "wave.csv", *OF_WAVE, "--load-steps", 2, "--quiet")
 
 Ask = Callable[..., tuple[int, str, str]]
 
@@ -30,7 +26,7 @@ Ask = Callable[..., tuple[int, str, str]]
 def ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Run a command in a folder that holds wave.csv; gives exit code, output and last error."""
     monkeypatch.chdir(tmp_path)
-    Path("wave.csv").write_text("\n".join(map(repr, HEIGHTS.tolist())))
+    Path("wave.csv").write_text("\n".join(map(repr, WAVE_HEIGHTS.tolist())))
 
     def run(*words: object) -> tuple[int, str, str]:
         code = main([str(word) for word in words])

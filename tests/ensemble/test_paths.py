@@ -23,7 +23,7 @@ from adhesis.ensemble.run.session import run_campaign
 from tests.support.campaign_support import campaign_text
 from tests.support.exact_wave import ExactWave
 from tests.support.fake_run import fake_engine
-from tests.support.options import forbid_work
+from tests.support.options import WAVE_HEIGHTS, forbid_work
 from tests.support.synthetic_results import campaign, write
 
 ANOTHER_USER = 12345
@@ -75,23 +75,19 @@ NAMED = {
     "a path too long": 2100 * "z/" + "x",
     "a device": "/dev/zero",
 }
-LONG = ("a name too long", "a name of a folder too long", "a path too long")
-OF_READING = (
-    *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
-    *("link to an endless device", "link to nothing", "link to itself"),
-    *("a file for a folder", "no folder", "a device", *LONG),
+
+
+def all_but(*kinds: str) -> tuple[str, ...]:
+    return tuple(kind for kind in (*MADE, *NAMED) if kind not in kinds)
+
+
+ANOTHER = ("link of another user", "link to that of another user")
+OF_READING = all_but("file", "link to a file", "second name", *ANOTHER)
+OF_WRITING = all_but(
+    *("file", "link to a file", "link to nothing", "second name"),
+    *("link to an endless device", "a device"),
 )
-OF_WRITING = (
-    *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
-    *("link to itself", "link of another user", "link to that of another user"),
-    *("a file for a folder", "no folder"),
-    *LONG,
-)
-OF_FOLDERS = (
-    *("pipe", "socket", "file", "link to a pipe", "link to a socket", "link to a file"),
-    *("link to an endless device", "link to nothing", "link to itself", "link of another user"),
-    *("a file for a folder", "a device", *LONG),
-)
+OF_FOLDERS = all_but("folder", "link to a folder", "no folder", "second name", ANOTHER[1])
 
 
 def kept(folder: Path) -> dict[str, Any]:
@@ -118,7 +114,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     monkeypatch.chdir(tmp_path / "apart")
     _socket(Path("socket"))
     monkeypatch.chdir(tmp_path)
-    Path("wave.csv").write_text("\n".join(map(repr, np.cos(np.arange(16) * np.pi / 8) * 1e-9)))
+    Path("wave.csv").write_text("\n".join(map(str, WAVE_HEIGHTS)))
     x = np.arange(200)
     lines = [f"{a} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
     Path("trace.csv").write_text("\n".join(lines))
@@ -141,12 +137,6 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     yield make
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)
-
-
-@pytest.fixture
-def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    forbid_work(monkeypatch)
-    monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", None)
 
 
 @pytest.fixture(scope="module")
@@ -230,11 +220,12 @@ CASES = [
 ]
 
 
-@pytest.mark.usefixtures("no_work")
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_a_crafted_path_is_refused_in_one_sentence_before_anything_is_done(
-    name, kind, place, results, loop, capsys
+    name, kind, place, results, loop, capsys, monkeypatch
 ):
+    forbid_work(monkeypatch)
+    monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", None)
     if "->" in name:
         text, _, ending = (word.strip() for word in name.partition("->"))
         text = text.replace("LOOP", " ".join(LOOP)).replace("MATERIAL", " ".join(MATERIAL))

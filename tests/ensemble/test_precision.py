@@ -318,7 +318,7 @@ def test_ranks_and_kills_change_no_bit_of_a_precision_campaign(tmp_path, finishe
     assert differences(out, finished[0]) == []
 
 
-def test_what_a_stop_may_be(tmp_path):
+def test_what_a_stop_may_be():
     old, new = parse_campaign(text()), parse_campaign(text(0.1, 100))
     assert set(compare(old, new).grown) == {"stop.relative_error", "stop.most"}
     assert len(compare(new, old).other) == 2
@@ -327,8 +327,3 @@ def test_what_a_stop_may_be(tmp_path):
     assert compare(old, spelt) == ((), ())
     (phrase,) = compare(old, parse_campaign(text(quantity="loss"))).other
     assert phrase == "stop.quantity is 'loss' here and 'loss_dimensionless' there"
-    path = tmp_path / "c.toml"
-    path.write_text(text())
-    process = adhesis_here("run", path, "--part", "1/2", "--out", tmp_path / "p.h5")
-    assert process.returncode == 2
-    assert "its batches are decided on whole cells" in process.stderr

@@ -198,15 +198,6 @@ def test_a_part_costs_its_share():
     assert sum(shares) == pytest.approx(sum(cost(task) for task in campaign.tasks()))
 
 
-def test_a_part_that_no_run_would_take_has_no_price():
-    text = campaign_text(realisations="10")
-    with pytest.raises(InputError, match="the campaign has 40 tasks and so at most as many parts"):
-        price(parse_campaign(text), None, Part(41, 50), compute=compute)
-    stopped = parse_campaign(f"{text}\n[stop]\nrelative_error = 0.1\nmost = 40\n")
-    with pytest.raises(InputError, match="its batches are decided on whole cells"):
-        price(stopped, None, Part(1, 2), compute=compute)
-
-
 def test_a_dry_run_writes_nothing(tmp_path, monkeypatch):
     path = write_campaign(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -15,14 +15,14 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.run import launch
-from tests.support.campaign_support import write_campaign
-from tests.support.options import forbid_work, replacing
+from tests.support.campaign_support import campaign_text, write_campaign
+from tests.support.options import OF_WAVE, WAVE_HEIGHTS, forbid_work, replacing
 
 # A case begins with a command or one of these, whose options give way to those of the case.
 BASES = {
     "LOOP": "loop --hurst 0.8 --n0 2 --ratio 4",
-    "WAVE": "loop --heights wave.csv --period 1e-3 --work-of-adhesion 1e-10 --young 1e6"
-    " --poisson 0.5 --load-steps 2 --max-penetration 0.5",
+    "WAVE": f"loop --heights wave.csv {' '.join(map(str, OF_WAVE))} --load-steps 2"
+    " --max-penetration 0.5",
     "TRACE": "trace t.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5",
     "BENCH": "bench --quick",
 }
@@ -46,6 +46,8 @@ run c.toml --max-failures {{x,-1,nan,1e99,inf}} -> --max-failures is '{{}}'
 run c.toml --patience {{x,-1,nan,1e99,inf}} -> --patience is '{{}}'
 run c.toml --out p.h5 --part {{x,0/3,4/3,1/0}} -> --part is '{{}}': it must be K/N
 run c.toml --part 1/2 -> --part needs --out
+run c.toml {{--patience=0,--dry-run}} --out p.h5 --part 9/9 -> the campaign has 8 tasks and so at
+run stop.toml {{--patience=0,--dry-run}} --out p.h5 --part 1/2 -> its batches are decided on whole
 run c.toml --redo some -> --redo is 'some'
 run c.toml --dry-run --redo all -> --redo and --dry-run cannot be given together
 run c.toml --dry-run --walltime x -> --walltime is 'x': it must
@@ -72,6 +74,10 @@ validate --method magic -> method is 'magic': it must be one of grid, sharp
 BENCH --budget 0 -> --budget is '0': it must be a positive number of seconds
 BENCH --to /proc/x -> --to is /proc/x: it cannot be written
 doctor --in none -> --in is none: it must be a folder that can be written
+# options of any command
+LOOP {{--young,--measure,--seed,--json,--path}}=-- -> {{}} is '--'
+LOOP --seed 1 --seed={{1,2}} -> --seed is given twice: give it once
+LOOP --field-penetrations 0.1 --field-penetrations 0.2 0.3 -> --field-penetrations is given twice
 # the profile and the material of a loop
 loop -> no profile is given: give one of --hurst, --heights and --trace
 LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
@@ -88,6 +94,12 @@ loop --heights none.npy --period 1e-3 -> with --heights the material has to be g
 loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
     --heights needs --period
+WAVE --heights nan.npy -> has no finite height at index 1: --heights needs every
+WAVE --heights scalar.npy -> heights hold 1 value(s): at least 3 are needed
+WAVE --heights grid.npy -> holds 4 × 4 numbers: --heights takes one column
+WAVE --heights {{text,complex}}.npy -> heights are real numbers
+WAVE --heights object.npy -> is no .npy of numbers
+WAVE --heights ragged.csv -> at least 3 of one length are needed
 WAVE --hurst 0.8 -> --hurst and --heights are given: give one of them
 WAVE --seed 4 -> --seed belongs to --hurst
 WAVE --delimiter : -> --delimiter is ':': it must be one of
@@ -116,6 +128,7 @@ LOOP --preload 20kPa --stiffness 0 -> For a weight give --max-stress 20kPa with
 LOOP --preload 20kPa --max-stress 1 -> --max-stress and --preload are given
 LOOP --preload 20kPa --max-penetration 0.5,0.6 -> beside --preload: it must be one
 LOOP --preload 20bar -> --preload is '20bar': its unit must be one of Pa, kPa
+LOOP --stiffness 0 --max-stress 0.2kPa,5bar -> --max-stress is '5bar': its unit must be one of Pa
 LOOP --preload 20kPa,2e4 -> --preload is 20kPa,2e4: turning points must differ
 # outputs of a loop
 LOOP --figure loop.bmp -> --figure is loop.bmp: the name must end in .png
@@ -206,8 +219,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+ARRAYS = {
+    "nan": [1.0, np.nan, 2.0, 3.0],
+    "scalar": 1.0,
+    "grid": np.ones((4, 4)),
+    "text": np.array(["a", "b", "c"]),
+    "complex": np.ones(4) * 1j,
+    "object": np.array([{}, 1, 2], dtype=object),
+}
+
+
 def fill(folder: Path) -> None:
     create(folder / "r.h5", load_campaign(write_campaign(folder)))
+    Path("stop.toml").write_text(campaign_text() + "[stop]\nrelative_error = 0.1\nmost = 40\n")
     for name in ("directory", "sub", "ow", "r", "way/trace.html"):
         Path(name).mkdir(parents=True)
     Path("text").write_text("notes")
@@ -215,9 +239,11 @@ def fill(folder: Path) -> None:
         Path(name).touch()
     with h5py.File("other.h5", "w") as file:
         file["x"] = 1
-    heights = 1e-9 * np.cos(np.arange(16) * np.pi / 8)
-    Path("wave.csv").write_text("\n".join(map(repr, heights.tolist())))
+    Path("wave.csv").write_text("\n".join(map(repr, WAVE_HEIGHTS.tolist())))
     os.link("wave.csv", "hard.csv")
+    Path("ragged.csv").write_text("1;2\n1\n3;4;5\n")
+    for name, array in ARRAYS.items():
+        np.save(f"{name}.npy", np.asarray(array))
     x = np.arange(200)
     lines = [f"{a / 2} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
     for name in ("t.txt", "ow/trace.md"):

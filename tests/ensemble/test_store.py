@@ -29,6 +29,7 @@ from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS
 from tests.support.campaign_support import ROOT, campaign_text, run_python, started
 from tests.support.fake_run import fake_result
+from tools.interrupted import Interrupt
 
 
 @pytest.fixture
@@ -84,29 +85,13 @@ def test_a_new_file_is_whole_and_pending_with_units_names_and_scales(path, campa
             assert dataset.is_scale or all(len(dim) == 1 for dim in dataset.dims), name
 
 
-class Late(TimeoutError):
-    """What a user's handler of a time limit raises: an OSError, as the errors of a disk are."""
-
-
-@pytest.fixture
-def limit():
-    """Return what sends a signal whose handler raises."""
-
-    def handler(number, frame):
-        raise Late
-
-    before = signal.signal(signal.SIGALRM, handler)
-    yield lambda *_: signal.raise_signal(signal.SIGALRM)
-    signal.signal(signal.SIGALRM, before)
-
-
-def test_an_interrupt_of_writing_arrives_as_itself_after_a_whole_row(
-    path, campaign, limit, monkeypatch
-):
+@pytest.mark.usefixtures("alarm")
+def test_an_interrupt_of_writing_arrives_as_itself_after_a_whole_row(path, campaign, monkeypatch):
+    """Though it is of a class that errors of HDF5 are of."""
     result = fake_result(campaign, campaign.tasks()[0])
     writer = Writer(path)
-    monkeypatch.setattr(Writer, "flush", limit)
-    with pytest.raises(Late):
+    monkeypatch.setattr(Writer, "flush", lambda _: signal.raise_signal(signal.SIGALRM))
+    with pytest.raises(Interrupt):
         writer.write_result(0, result)
     monkeypatch.undo()
     writer.close()

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
@@ -30,17 +31,17 @@ def rows(
     return [line.replace(".", decimal).replace("\0", delimiter) for line in lines]
 
 
-def read(tmp_path: Path, lines: list[str], name: str = "t.txt", **options: object) -> Trace:
-    path = tmp_path / name
+def read(tmp_path: Path, lines: list[str], **options: object) -> Trace:
+    path = tmp_path / "t.txt"
     path.write_bytes("\n".join(lines).encode())
     return read_trace(path, **options)  # type: ignore[arg-type]
 
 
-def assert_right(trace: Trace, tolerance: float = 1e-11) -> None:
+def assert_right(trace: Trace) -> None:
     assert trace.points == N
     assert trace.step == pytest.approx(STEP, rel=1e-6)
     assert trace.length == pytest.approx(X[-1], rel=1e-6)
-    np.testing.assert_allclose(trace.heights, Z, atol=tolerance)
+    np.testing.assert_allclose(trace.heights, Z, atol=1e-11)
 
 
 UM = "x (µm);z (µm)"
@@ -232,6 +233,18 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
     "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),
     "a unit that is none": (BOTH, {"unit": 5}, TypeError, "unit is 5: it must be a text"),
+    "an array of xarray": (
+        xr.DataArray(Z),
+        {"step": STEP},
+        TypeError,
+        "it must be a path, .* list",
+    ),
+    "a dataset": (
+        xr.Dataset({"z": ("x", Z)}),
+        {"step": STEP},
+        TypeError,
+        "it must be a path, .* an",
+    ),
     "one column number": (BOTH, {"columns": 1}, TypeError, r"columns is 1: it must be a list"),
     "a text for a path": ("1,2\n3,4\n", {}, InputError, r"cannot read 1,2\\n3,4\\n: there is no"),
 }

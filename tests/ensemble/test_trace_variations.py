@@ -230,15 +230,3 @@ def test_two_columns_that_an_empty_line_divides_are_not_joined_in_silence(seed, 
         path.write_text("\n".join(lines))
         with pytest.raises(InputError, match=rf"the first on line {len(one) + 1}: write NaN where"):
             read_trace(path, **options)
-
-
-def test_one_profile_with_empty_lines_is_read_as_the_refusal_says(tmp_path):
-    one, options = column_text(3)
-    path = tmp_path / "one.txt"
-    for gap, missing in (("NaN", [30, 31]), (None, [])):
-        rows = [*one[:30], "", "", *one[32:]]
-        path.write_text("\n".join(rows))
-        with pytest.raises(InputError, match="unevenly at 1 place, the first on line 31: write"):
-            read_trace(path, **options)
-        path.write_text("\n".join(row or gap for row in rows if row or gap))
-        assert np.flatnonzero(np.isnan(read_trace(path, **options).heights)).tolist() == missing

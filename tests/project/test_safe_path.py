@@ -1,11 +1,7 @@
 """No process that adhesis starts imports anything from the user's working directory."""
 
-import json
 import os
-import signal
-import subprocess
 import sys
-from multiprocessing import Pipe
 
 import pytest
 
@@ -14,7 +10,7 @@ from adhesis.ensemble.run import launch
 from adhesis.ensemble.trace.loops import Cycle, Loops, Run
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import single_wave
-from tests.support.campaign_support import ROOT, environment, has_ended, wait_until
+from tests.support.campaign_support import ROOT, has_ended, started, wait_until
 
 # A loop that the solver refuses: no loop turns below full penetration.
 CYCLE = Cycle(HalfSpace(1.0, 0.5), (1.0,), (2.0,), 4, "grid")
@@ -54,40 +50,19 @@ def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
 
 
 PARENT = """
-import json, subprocess, sys, time
-from adhesis.ensemble.run.launch import python, python_environment
-worker = subprocess.Popen(
-    python("-m", "adhesis.ensemble.run.processes", "1", sys.argv[1]),
-    pass_fds=[int(sys.argv[1])],
-    env=python_environment(),
-)
-print(json.dumps(worker.pid), flush=True)
+import subprocess, time
+from adhesis.ensemble.run.launch import end_with_parent
+child = subprocess.Popen(["sleep", "600"], preexec_fn=end_with_parent)
+print(child.pid, flush=True)
 time.sleep(600)
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the system ends children on Linux alone")
-def test_a_worker_ends_with_its_parent_even_if_that_is_killed():
-    """Its socket is held open by this process, so that the socket's end does not end it."""
-    ours, theirs = Pipe()
-    parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(theirs.fileno())],
-        env=environment(),
-        stdout=subprocess.PIPE,
-        pass_fds=[theirs.fileno()],
-    )
-    try:
-        worker = json.loads(parent.stdout.readline())
-        ours.send((divmod, None, 10.0))
-        ours.send((False, ("task", 0)))
-        while (message := ours.recv())[0] == "alive":
-            pass
-        assert message[0] == "outcome"  # so it has come to its task
-        parent.send_signal(signal.SIGKILL)
-        parent.wait()
-        wait_until(lambda: has_ended(worker))
-    finally:
-        ours.close()
-        theirs.close()
-        parent.kill()
-        parent.wait()
+def test_a_process_ends_with_its_parent_even_if_that_is_killed():
+    """Workers, which also see that their sockets end, with a whole run: test_mpi.py."""
+    parent = started([sys.executable, "-c", PARENT])
+    child = int(parent.stdout.readline())
+    parent.kill()
+    parent.wait()
+    wait_until(lambda: has_ended(child))

@@ -290,8 +290,8 @@ def real(tmp_path: Path) -> Iterator[Site]:
         yield here
 
 
-def staged(here: Site, disk: str = "disk1") -> Path:
-    return next(here.folder.glob(f"{disk}/*/s.h5"), here.folder / "none")
+def staged(here: Site) -> Path:
+    return next(here.folder.glob("disk1/*/s.h5"), here.folder / "none")
 
 
 def test_rows_of_a_killed_run_come_back(real: Site) -> None:

@@ -58,6 +58,7 @@ SPECTRUM: dict[str, Any] = {
     "seed": 1,
     "h_rms": 1e-6,
 }
+RELOADED = type("Problem", (), {"__module__": Problem.__module__})
 LEFT_OUT = pd.Series(range(9), index=range(9), dtype=float).drop(4)
 TRACE = Trace(self_affine_profile(**SPECTRUM).heights(400), 5e-6, "t.csv")
 
@@ -279,6 +280,8 @@ REFUSED = r"""
 Problem(SOLID, WAVE, 0.04) -> TypeError: profile is a HalfSpace: it must be a Profile; make one
 Problem(WAVE, SOLID, 0.04, 'load') -> TypeError: control is 'load': it must be a Control
 Problem(WAVE, HalfSpace, 0.04) -> TypeError: half_space is the class HalfSpace: it
+checks.instance('problem', RELOADED(), Problem, 'Problem(…)') ->
+    TypeError: problem is a Problem made before a reload of adhesis
 make_method('auto', WAVE) -> TypeError: problem is a Profile: it must be a Problem; make one with
 make_method(PROBLEM, 'auto') -> TypeError: method is a Problem: it must be one of grid, sharp
 make_method('magic', PROBLEM) -> ValueError: method is 'magic': it must be one of grid, sharp, auto

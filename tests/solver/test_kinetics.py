@@ -245,11 +245,14 @@ def test_a_mode_that_has_softened_is_left_like_one_that_is_unstable():
 def test_grid_leaves_equal_crests_as_sharp_does_and_a_coarse_one_tells_what_it_misses():
     """128 nodes: 4 in the first equilibrium width, and the loss is a quarter off."""
     problem = equal_waves(4, 499277, 0.00879)
-    exact = loss(problem)
-    coarse, fine = (
-        run_loop(grid_of(problem, nodes=nodes), max_penetration=0.8, load_steps=10)
-        for nodes in (128, 2048)
-    )
+    path = {"max_penetration": 0.8, "load_steps": 10}
+    sharp = loop_of(problem, **path)
+    coarse, fine = (run_loop(grid_of(problem, nodes=nodes), **path) for nodes in (128, 2048))
+    # all touch together; apart they are unstable before all could leave together: one leads
+    steps = [(jump.patches_before, jump.patches_after) for jump in sharp.jumps]
+    assert (steps[0], steps[-1]) == ((0, 4), (1, 0))
+    assert [(jump.patches_before, jump.patches_after) for jump in fine.jumps] == steps
+    exact = sharp.loss_dimensionless
     assert fine.loss_dimensionless == pytest.approx(exact, rel=5e-3)
     reported = coarse.loss_error / coarse.loss
     assert abs(coarse.loss_dimensionless / exact - 1) < reported < 0.5

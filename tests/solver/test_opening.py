@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, make_method
-from adhesis.solver.loading.ledger import estimated_error
 from adhesis.solver.loading.zero_range import beyond_limit, range_warnings
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
@@ -151,14 +150,6 @@ def test_no_crack_is_tried_beyond_the_length_at_which_the_release_rate_falls():
     crack = judge_maximum(0.0, 1.0, 0.5, 1.0, release, 0.5, 10.0)
     assert crack.value == pytest.approx(1 - math.sqrt(0.5 / 1.1), rel=1e-3)
     assert 1.0 < tried[-1] < 1.3
-
-
-def test_an_energy_that_rises_by_a_barrier_is_no_error():
-    problem = troughs_problem()
-    rising = SimpleNamespace(energy_drop=-1.0, barrier=1.5, kind="opening")
-    assert estimated_error(0.0, [rising], 0.0, problem) == 0.0
-    beyond = SimpleNamespace(energy_drop=-1.0, barrier=0.25, kind="opening")
-    assert estimated_error(0.0, [beyond], 0.0, problem) == 0.75
 
 
 def test_openings_at_a_range_and_tensions_that_are_not_small_make_a_loss_doubtful():

@@ -96,13 +96,15 @@ def test_a_preload_is_the_two_step_solution(control):
     assert len(loop.jumps) == len(two_step.jumps)
 
 
-def test_the_turning_point_is_the_first_state_with_the_preload():
+def test_the_turning_point_is_the_first_state_with_the_preload_and_on_no_axis_of_load_steps():
     method = make_method("sharp", rough())
     loop = run_loop(method, preload=PRELOAD)
     loading = loop.mean_stress[loop.branch == "loading"]
     assert loading[:-1].max() < PRELOAD * (1 - 1e-9)
     assert loading[-1] == pytest.approx(PRELOAD, rel=1e-8)
     assert loop.load_steps == np.count_nonzero(loop.load_step & (loop.branch == "loading")) - 1
+    with pytest.raises(ValueError, match="between two load steps"):
+        loop.on_axis("loading", loop.mean_stress)
 
 
 def test_loops_of_several_preloads_are_those_of_each_alone():
@@ -169,12 +171,6 @@ def test_a_jump_beyond_the_preload_ends_the_leg_at_its_end():
     assert (part.states, part.jumps, reached) == ((before,), (), True)
     part, reached = up_to(method, start, path, lambda s: s.mean_stress / 7.0 - 1)
     assert (part, reached) == (path, False)
-
-
-def test_curves_of_a_preload_are_on_no_axis_of_load_steps():
-    loop = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=5)
-    with pytest.raises(ValueError, match="between two load steps"):
-        loop.on_axis("loading", loop.mean_stress)
 
 
 @pytest.mark.parametrize("name", ["exact", "sharp"])

@@ -1,5 +1,7 @@
 """Invariances of every kind of loop, mirror-symmetric profiles, and both measures of adhesion."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -175,6 +177,7 @@ PERIOD = 1e-3
 STEEP = Profile(PERIOD, 1e-5 * np.array([0, 1, 0.5j, -0.4, 0.3j, 0.2]))  # rms slope 0.12
 
 
+@cache
 def loop_in(
     profile: Profile, gamma: float, measure: Measure, method: MethodName = "sharp"
 ) -> LoopResult:

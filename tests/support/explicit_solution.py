@@ -10,6 +10,8 @@ in units of E*/2, lengths of 1/q0.
 import numpy as np
 from scipy.fft import dct
 
+from adhesis.solver.references.full_contact import full_contact_stress
+
 
 def explicit_solution(stress, gaps, separation, nodes):
     """Return p = 2p̄/E* and the opening C at every gap end, shape (L, 2), for L gaps.
@@ -21,6 +23,11 @@ def explicit_solution(stress, gaps, separation, nodes):
     half = np.diff(gaps, axis=1)[:, 0] / 2
     factor = 2 * np.sqrt(half / 2) / half
     return c, np.stack([slope[:, -1] * factor, -slope[:, 0] * factor], axis=1)
+
+
+def scaled_stress(profile):
+    """Return the function θ → 2σ_full/E*."""
+    return lambda theta: full_contact_stress(profile, 2.0, theta / profile.q0)
 
 
 def _solve(stress, gaps, separation, nodes):
@@ -105,15 +112,8 @@ def explicit_openings(profile, gaps, separation, least_nodes=96):
     From the profile's own coefficients, for gaps and separation in units of 1/q0: nothing of the
     method ``sharp`` takes part. The nodes are so dense that the shortest wave has 24 at least.
     """
-    m = np.arange(profile.coefficients.size)
-    weight = 2 * m * profile.coefficients * profile.q0
-
-    def stress(theta):
-        phase = np.exp(1j * np.multiply.outer(np.asarray(theta), m[1:]))
-        return (phase @ weight[1:]).real
-
     nodes = explicit_nodes(profile, gaps, least_nodes)
-    _, theta, slope = _solve(stress, gaps, separation, nodes)
+    _, theta, slope = _solve(scaled_stress(profile), gaps, separation, nodes)
     # x = cos φ: dt/dφ = -slope, with t = 0 at φ = 0; slope is a polynomial in x, a cosine series
     series = dct(slope, type=1, axis=1) / nodes
     series[:, [0, -1]] /= 2

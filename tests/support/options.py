@@ -1,10 +1,11 @@
-"""Words of a command whose options are replaced by others; a loop of a small rough scene."""
+"""Words of a command whose options are replaced by others; a wave and a small rough scene."""
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import adhesis.ensemble.command.loop as loop_command
@@ -23,6 +24,9 @@ def forbid_work(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trace_command, "run_plan", begins)
     monkeypatch.setattr("adhesis.ensemble.bench.benchmark.benchmark", begins)
 
+
+WAVE_HEIGHTS = 1e-9 * np.cos(2 * np.pi * np.arange(16) / 16)
+OF_WAVE = ("--period", 1e-3, "--work-of-adhesion", 2.6e-10, "--young", 1e6, "--poisson", 0.5)
 
 SCENE = [
     "loop", "--hurst", "0.8", "--seed", "4", "--period", "1e-3", "--n0", "3", "--ratio", "6",
