@@ -16,6 +16,7 @@ from tests.support import one_thread  # noqa: F401  # before what loads numpy
 from tests.support.figures import few_figures
 from tests.support.launcher_crash import pytest_runtest_protocol  # noqa: F401  # a hook
 from tests.support.launchers import without_mpi, without_slurm
+from tests.support.progress import Waiting
 from tests.support.scheduling import rank_of, scheduler
 from tools.interrupted import Interrupt
 
@@ -57,6 +58,15 @@ def quick_figures() -> Iterator[dict[str, Any]]:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run what is marked slow, too")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Name the tests under way when none ends for long."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        # The standard output of now: that of a test belongs to the test.
+        terminal = os.fdopen(os.dup(1), "w", buffering=1)
+        config.pluginmanager.register(Waiting(terminal), "waiting")
 
 
 @pytest.hookimpl(optionalhook=True)
