@@ -147,6 +147,8 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     forbid_work(monkeypatch)
     monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", None)
+    # a slow machine is no reason for a line of progress
+    monkeypatch.setattr("adhesis.ensemble.reporter.interval", lambda elapsed: 1e3)
 
 
 @pytest.fixture(scope="module")
