@@ -260,7 +260,7 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Callab
 behaviour="log=begun hold=2 silence={silence}"
 if [ "$1" = report ]; then exec mkdir "$4"; fi
 if [ -n "$SLURM_RESTART_COUNT$SLURM_ARRAY_TASK_ID" ]; then behaviour=log=begun; fi
-exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
+exec "{sys.executable}" "{ROOT}/tests/support/fake_run.py" "$behaviour" "$@"
 """
         )
         adhesis.chmod(0o755)

@@ -12,6 +12,7 @@ reach, ``full=BYTES`` no file may be written beyond so many bytes.
 """
 
 import os
+import re
 import resource
 import signal
 import sys
@@ -68,7 +69,8 @@ class FakeTask:
     """Computes a task as a behaviour has it; another process may have a copy."""
 
     def __init__(self, behaviour: str) -> None:
-        self.settings = dict(word.split("=", 1) for word in behaviour.split())
+        words = re.split(r"\s+(?=\w+=)", behaviour) if behaviour else []  # a path may have spaces
+        self.settings = dict(word.split("=", 1) for word in words)
         self.broken = False
         self.begun = 0
 
