@@ -69,8 +69,8 @@ def test_a_launcher_that_hangs_is_given_up_and_may_end_its_ranks(
     """It has its time limit as soon as it hangs, and all else the one of the product."""
     hanging, begun, ended = (tmp_path / name for name in ("mpirun", "begun", "ended"))
     hanging.write_text(
-        f"#!/bin/sh\n[ \"$1\" = --version ] && exit\ntrap 'echo > {ended}; kill $!; exit 1' TERM\n"
-        f"sleep 600 & echo > {begun}; wait\n"
+        '#!/bin/sh\n[ "$1" = --version ] && exit\n'
+        f'trap \'echo > "{ended}"; kill $!; exit 1\' TERM\nsleep 600 & echo > "{begun}"; wait\n'
     )
     hanging.chmod(0o755)
     communicate = subprocess.Popen.communicate

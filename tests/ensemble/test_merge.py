@@ -194,29 +194,36 @@ def test_a_part_is_what_it_is(tmp_path, capsys):
 
 
 MERGED = """
-import resource, sys
+import sys
+from adhesis.ensemble.results import checksum, layout
 from adhesis.ensemble.results.merge import merge
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-merge(sys.argv[2:], sys.argv[1])
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+from adhesis.ensemble.run.launch import peak_bytes
+checksum._BLOCK_BYTES = layout._BLOCK_BYTES = 2**20
+half, whole, *parts = sys.argv[1:]
+merge(parts[:2], half)
+before = peak_bytes()
+merge(parts[2:], whole)
+print(peak_bytes() - before)
 """
 
 
 def test_memory_of_a_merge_does_not_grow_with_the_files(tmp_path):
-    """Files of 45 MB are joined in two thirds of that; a block of rows is held at a time."""
-    text = campaign_text(realisations="1500", load_steps="100").replace("-3", "-1")
-    campaign = parse_campaign(text + "field_penetrations = []\nfield_realisations = 0\n")
-    names = [tmp_path / f"p{k}.h5" for k in (1, 2)]
-    for k, name in enumerate(names, start=1):
-        create(name, campaign, part=Part(k, 2))
-        with h5py.File(name, "r+") as file:
-            file["status"][:] = DONE
-            file["loss"][:] = np.arange(k - 1, campaign.task_count, 2)
-        sign(name)
-    out = tmp_path / "all.h5"
-    done = run_python("-c", MERGED, out, *names)
-    assert out.stat().st_size > 40e6
-    assert 1024 * int(done.stdout) < 30e6
+    """Blocks of 1 MB; once files are joined, those twice as large take no more memory."""
+    text = campaign_text(realisations="800", load_steps="100").replace("-3", "-1")
+    text += "field_penetrations = []\nfield_realisations = 0\n"
+    names = []
+    for campaign in (parse_campaign(text.replace("800", "400")), parse_campaign(text)):
+        for k in (1, 2):
+            names.append(tmp_path / f"{campaign.realisations}-{k}.h5")
+            create(names[-1], campaign, part=Part(k, 2))
+            with h5py.File(names[-1], "r+") as file:
+                file["status"][:] = DONE
+                file["loss"][:] = np.arange(k - 1, campaign.task_count, 2)
+            sign(names[-1])
+    half, out = tmp_path / "half.h5", tmp_path / "all.h5"
+    done = run_python("-c", MERGED, half, out, *names)
+    assert out.stat().st_size - half.stat().st_size > 19e6
+    assert int(done.stdout) < 6e6
     with Results(out) as results:
         np.testing.assert_array_equal(results.column("loss"), np.arange(campaign.task_count))
         assert PENDING not in results.status()

@@ -225,6 +225,8 @@ def test_a_crafted_path_is_refused_in_one_sentence_before_anything_is_done(
     name, kind, place, results, loop, capsys, monkeypatch
 ):
     forbid_work(monkeypatch)
+    # a slow machine is no reason for a line of progress
+    monkeypatch.setattr("adhesis.ensemble.reporter.interval", lambda elapsed: 1e3)
     monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", None)
     if "->" in name:
         text, _, ending = (word.strip() for word in name.partition("->"))

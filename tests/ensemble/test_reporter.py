@@ -54,7 +54,8 @@ class _Terminal(io.StringIO):
         return True
 
 
-def test_a_run_on_a_terminal_has_one_line_and_failures_above_it() -> None:
+def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")  # a line is cut where a terminal ends
     stream, counts = _Terminal(), Summary(total=3, done=1)
     with ProgressLine(counts, lambda: None, stream) as progress:
         wait_until(lambda: "1 of 3 tasks done" in stream.getvalue())

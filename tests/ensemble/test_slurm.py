@@ -7,8 +7,10 @@ submitted at once, since each mostly waits for Slurm; the tests then watch one e
 
 from __future__ import annotations
 
+import contextlib
 import getpass
 import os
+import random
 import re
 import signal
 import socket
@@ -43,10 +45,15 @@ def processes_in(folder: Path, word: str) -> list[int]:
     return found
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port: int = server.getsockname()[1]
-    return port
+def free_ports(count: int) -> list[int]:
+    """Return ports that are not of those which the system gives to ranks, and to any who ask."""
+    found: list[int] = []
+    for port in random.sample(range(20_000, 32_000), 1000):
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            found.append(port)
+        if len(found) == count:
+            break
+    return found
 
 
 @dataclass
@@ -104,13 +111,13 @@ def cluster() -> Iterator[Cluster]:
     key.write_bytes(os.urandom(1024))
     key.chmod(0o400)
     node = socket.gethostname().split(".")[0]
-    user = getpass.getuser()
+    user, ports = getpass.getuser(), free_ports(2)
     (folder / "slurm.conf").write_text(
         f"""
 ClusterName=adhesis-test
 SlurmctldHost={node}(127.0.0.1)
-SlurmctldPort={free_port()}
-SlurmdPort={free_port()}
+SlurmctldPort={ports[0]}
+SlurmdPort={ports[1]}
 SlurmUser={user}
 SlurmdUser={user}
 AuthType=auth/munge
@@ -253,7 +260,7 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Callab
 behaviour="log=begun hold=2 silence={silence}"
 if [ "$1" = report ]; then exec mkdir "$4"; fi
 if [ -n "$SLURM_RESTART_COUNT$SLURM_ARRAY_TASK_ID" ]; then behaviour=log=begun; fi
-exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
+exec "{sys.executable}" "{ROOT}/tests/support/fake_run.py" "$behaviour" "$@"
 """
         )
         adhesis.chmod(0o755)

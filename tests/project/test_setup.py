@@ -125,9 +125,9 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
 def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
     head = f"""
         set -eu
-        say() {{ printf 'setup: %s\\n' "$*" | tee -a {tmp_path}/said; }}
-        log={tmp_path}/log TELL_EVERY=1
-        . {ROOT}/tools/parts.sh
+        say() {{ printf 'setup: %s\\n' "$*" | tee -a '{tmp_path}/said'; }}
+        log='{tmp_path}/log' TELL_EVERY=1
+        . '{ROOT}/tools/parts.sh'
     """
     done = ran("bash", "-c", head + text, cwd=tmp_path)
     assert done.stderr == ""

@@ -284,7 +284,7 @@ def real(tmp_path: Path) -> Iterator[Site]:
         (tmp_path / "s.toml").write_text(campaign_text(realisations="10"))
         fake = JOBS.parent / "tests" / "support" / "fake_run.py"
         (tmp_path / "bin" / "adhesis").write_text(
-            f'#!/bin/sh\nexec {sys.executable} {fake} "hold=${{HOLD:-3}} free=free" "$@"\n'
+            f'#!/bin/sh\nexec "{sys.executable}" "{fake}" "hold=${{HOLD:-3}} free=free" "$@"\n'
         )
         here.env = environment()
         yield here
@@ -374,7 +374,8 @@ def shared() -> Iterator[Path]:
 def shell(shared: Path, script: str, account: int = VICTIM) -> subprocess.CompletedProcess[str]:
     """Run a script as an account where the tests may, in the folder of the results."""
     other = {"user": account, "group": account, "extra_groups": []} if os.geteuid() == 0 else {}
-    env = {"PATH": f"{shared}:/usr/bin:/bin", "stage": str(stage_of(shared))}
+    stage = os.path.relpath(stage_of(shared), shared / "work")  # a path from / may have spaces
+    env = {"PATH": f"{shared}:/usr/bin:/bin", "stage": stage}
     script = f". ../common.sh\nSTAGING=../disk file=s.h5 options=()\n{script}"
     return ran("bash", "-c", script, cwd=shared / "work", env=env, **other)
 

@@ -12,6 +12,7 @@ reach, ``full=BYTES`` no file may be written beyond so many bytes.
 """
 
 import os
+import re
 import resource
 import signal
 import sys
@@ -68,7 +69,8 @@ class FakeTask:
     """Computes a task as a behaviour has it; another process may have a copy."""
 
     def __init__(self, behaviour: str) -> None:
-        self.settings = dict(word.split("=", 1) for word in behaviour.split())
+        words = re.split(r"\s+(?=\w+=)", behaviour) if behaviour else []  # a path may have spaces
+        self.settings = dict(word.split("=", 1) for word in words)
         self.broken = False
         self.begun = 0
 
@@ -82,6 +84,7 @@ class FakeTask:
         while matches(settings.get("hang"), task):
             time.sleep(0.01)
         if matches(settings.get("deaf"), task):
+            signal.setitimer(signal.ITIMER_REAL, 0)  # which looks up for a task that does not
             time.sleep(0.3)
             return fake_result(campaign, task)
         free = Path(settings.get("free", "/dev/null/free"))
