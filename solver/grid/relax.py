@@ -96,6 +96,9 @@ class Relaxation:
             If the contact set does not converge.
         """
         contact = contact.copy()
+        if self.solver.control.is_load and contact.prescribed < 0 and not contact.mask.any():
+            # The load is carried by some nodes: those in tension leave.
+            contact.mask = self.lattice.height > self.lattice.height.min()
         for _ in range(_MAX_ACTIVE_SETS):
             self.solver.solve(contact, self.tight)
             self.sweeps += 1
