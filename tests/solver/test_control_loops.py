@@ -136,6 +136,8 @@ def test_a_wave_without_adhesion_carries_a_weight_as_westergaard_has_it(method, 
     assert loop.penetration[turning] == pytest.approx(share - share * np.log(share), rel=1e-4)
     stored = pressed * (AMPLITUDE + (pressed / stiffness if stiffness else 0.0))
     assert abs(loop.loss) <= 1e-4 * stored
+    if control.is_load:
+        assert loop.pull_off_penetration == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_stiff_machine_gives_the_loop_at_fixed_separation(rough):
