@@ -119,7 +119,8 @@ class Cell:
     @property
     def beyond_zero_range(self) -> NDArray[np.bool_]:
         """Which done tasks have a loss that a finite range may not have, shape (done,)."""
-        return beyond_zero_range({**self.values, "work_of_adhesion": self.work_of_adhesion})
+        values = {**self.values, "work_of_adhesion": self.work_of_adhesion}
+        return beyond_zero_range(values, self.campaign.cycle.stiffness)
 
     @property
     def short_of_preload(self) -> int:

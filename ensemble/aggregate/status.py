@@ -107,7 +107,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
 
 def _named(tasks: Tasks, row: int) -> dict[str, Any]:
     task = tasks[row]
-    return {"row": row, **{name: getattr(task, name) for name in _TASK}}
+    return {"row": row, "task": str(task), **{name: getattr(task, name) for name in _TASK}}
 
 
 def _group(cell: Cell) -> dict[str, Any]:
@@ -209,8 +209,7 @@ def _listed(
 ) -> list[str]:
     """Return a line for each of the first rows, and how many more there are."""
     lines = [
-        f"  row {row['row']}: H = {row['hurst']:g}, γ = {row['work_of_adhesion']:g} J/m², "
-        f"realisation {row['realisation']}, seed {row['seed']}{between}{about(row)}"
+        f"  row {row['row']}: {row['task']}, seed {row['seed']}{between}{about(row)}"
         for row in rows[:_MOST_FAILURES_SHOWN]
     ]
     if len(rows) > _MOST_FAILURES_SHOWN:

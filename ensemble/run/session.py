@@ -235,7 +235,8 @@ class _Session:
         else:
             counts.done += 1
             counts.computed += 1
-            counts.beyond_limit += bool(beyond_zero_range(row))
+            stiffness = self.campaign.at(self.plan.tasks[outcome.task]).cycle.stiffness
+            counts.beyond_limit += bool(beyond_zero_range(row, stiffness))
             if doubtful(row, self.campaign.solver.accuracy):
                 counts.doubtful += 1
                 progress.doubt(f"{what}: {errors_text(row)}")

@@ -24,6 +24,7 @@ from adhesis.solver.loading.zero_range import (
     DOUBTFUL_RANGE,
     EDGE_SHARE,
     beyond_limit,
+    stored_at_pull_off,
 )
 
 # Numbers of a row from which beyond_zero_range decides, in the order of beyond_limit.
@@ -31,7 +32,7 @@ _OF_LIMIT = (
     *("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction"),
     *("opening_strength", "barrier", "edge_range", "touch_range", "turn_range", "gamma_open"),
 )
-OF_DOUBT = ("audit_residual", "loss_error", *_OF_LIMIT)
+OF_DOUBT = ("audit_residual", "loss_error", "pull_off_stress", *_OF_LIMIT)
 """Numbers of a row from which its loss is judged."""
 INSTEAD = "Rougher profiles, a stiffer material or a smaller preload let loops reach it"
 
@@ -75,8 +76,16 @@ def doubtful(values: Mapping[str, Any], accuracy: float) -> NDArray[np.bool_]:
     return np.asarray(~(is_known | is_nothing))
 
 
-def beyond_zero_range(values: Mapping[str, Any]) -> NDArray[np.bool_]:
-    """Return which losses an adhesion of finite range may not have; see :func:`doubtful`."""
+def beyond_zero_range(
+    values: Mapping[str, Any], stiffness: float | None = None
+) -> NDArray[np.bool_]:
+    """Return which losses an adhesion of finite range may not have; see :func:`doubtful`.
+
+    What a ``stiffness`` (Pa/m) that holds the solid stores at pull-off is no loss of the solid.
+    """
+    if stiffness is not None:
+        stored = stored_at_pull_off(values["pull_off_stress"], stiffness)
+        values = {**values, "loss": values["loss"] - stored}
     return beyond_limit(*(values[name] for name in _OF_LIMIT))
 
 

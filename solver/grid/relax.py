@@ -96,6 +96,13 @@ class Relaxation:
             If the contact set does not converge.
         """
         contact = contact.copy()
+        if self.solver.control.is_load:
+            if contact.prescribed >= 0:  # no load, or a tension, at which the solid has fallen off
+                apart = self.solver.empty(self.lattice.h_max)
+                apart.prescribed = contact.prescribed
+                return apart
+            if not contact.mask.any():  # the load is carried by some nodes: those in tension leave
+                contact.mask = self.lattice.height > self.lattice.height.min()
         for _ in range(_MAX_ACTIVE_SETS):
             self.solver.solve(contact, self.tight)
             self.sweeps += 1

@@ -26,6 +26,7 @@ from adhesis.solver.loading.zero_range import (
     narrowest_length,
     outside_text,
     range_warnings,
+    stored_at_pull_off,
     stress_text,
     touch_stress,
     turn_range,
@@ -295,7 +296,9 @@ class EquilibriumPath(ByValue, ResultViews):
 
     def range_warnings(self) -> list[str]:
         """Return sentences where the range of adhesion may matter more than the model knows."""
-        given = self.problem, self.valid_range, self.lost, self.contact_fraction
+        tension = max(0.0, float(-self.mean_stress.min()))
+        lost = self.lost - stored_at_pull_off(tension, self.problem.control.stiffness)
+        given = self.problem, self.valid_range, lost, self.contact_fraction
         found = range_warnings(*given, *self.outer_ranges)
         if self.barrier > 0:  # at a tenth of edge_range losses were up to 23 % too small
             found.append(

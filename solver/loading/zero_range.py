@@ -299,6 +299,14 @@ def stress_text(pascals: float) -> str:
     return f"{1e-6 * pascals:.3g} MPa" if pascals >= 1e6 else f"{1e-3 * pascals:.3g} kPa"
 
 
+def stored_at_pull_off(tension: Any, stiffness: float) -> Any:
+    """Compute the energy p̄²/(2k) in J/m² that what holds the solid loses with it at pull-off.
+
+    Nothing at a fixed separation (k is infinite), nor under a load, where no energy is stored.
+    """
+    return tension**2 / (2 * stiffness) if stiffness else 0.0
+
+
 def beyond_limit(
     valid_range: Any,
     loss: Any,
@@ -355,7 +363,7 @@ def range_warnings(
 
     At a finite strength patches open from inside, and touches come earlier; doubtful is then a
     tension that exceeds it where no crack grows, and a range of adhesion that edges or turns do not
-    allow. ``range_`` is ``valid_range``.
+    allow. ``range_`` is ``valid_range``, ``loss`` that without what a stiffness stores at pull-off.
     """
     out: list[str] = []
     bounds = {"edge_range": edge_range, "touch_range": touch_range, "turn_range": turn_range}
@@ -393,9 +401,12 @@ def range_warnings(
     spent = problem.gamma_open
     if beyond_limit(math.inf, loss, spent, largest):
         ratio = loss / (spent * largest)
+        control = problem.control
+        held = "" if control.is_fixed or control.is_load else ", without p̄²/(2k) at pull-off,"
         out.append(
-            f"the loss is {ratio:.3g} times the work of adhesion of the largest contact, more "
-            f"than the {DOUBTFUL_LOSS:g} that adhesion explains: it is elastic energy of valleys "
-            "that the rule against opening inside a contact holds closed (docs/zero-range.md)"
+            f"the loss{held} is {ratio:.3g} times the work of adhesion of the largest contact, "
+            f"more than the {DOUBTFUL_LOSS:g} that adhesion explains: it is elastic energy of "
+            "valleys that the rule against opening inside a contact holds closed "
+            "(docs/zero-range.md)"
         )
     return out

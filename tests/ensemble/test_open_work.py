@@ -107,6 +107,9 @@ def test_a_loss_is_doubted_by_the_work_of_adhesion_that_it_spends():
     assert beyond_zero_range(values | {"gamma_open": 0.04})
     assert not beyond_zero_range(values | {"gamma_open": 0.4})
     assert beyond_zero_range(values | {"gamma_open": np.nan})
+    values |= {"gamma_open": 0.04, "pull_off_stress": 10.0}
+    assert not beyond_zero_range(values, stiffness=60.0)  # stores 0.83 J/m² of the 1 at pull-off
+    assert beyond_zero_range(values, stiffness=600.0)
 
 
 @pytest.fixture(scope="module")

@@ -281,6 +281,15 @@ def test_a_mean_without_the_loops_that_failed_is_hollow(with_failures):
     assert "line" not in item.caption.lower()  # two points are not joined
 
 
+def test_a_listed_row_is_named_by_all_its_axes(with_failures):
+    status = read_status(with_failures)
+    listed = [line.strip() for line in as_text(status).splitlines() if line.startswith("  row ")]
+    names = [failure["task"] for failure in status["failures"]]
+    assert len(set(names)) == len(names) == 4
+    assert "ratio = 50, h_rms = 1 µm, realisation" in names[-1]
+    assert all(name in line for name, line in zip(names, listed[-4:], strict=True))
+
+
 def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, quick_figures):
     write_report(with_failures, tmp_path / "report", io.StringIO())
     notes = {name: figure.get_supxlabel() for name, figure in quick_figures.items()}

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, single_wave
+from adhesis import (
+    Control,
+    HalfSpace,
+    LoopResult,
+    Problem,
+    Profile,
+    make_method,
+    run_loop,
+    single_wave,
+)
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support import scenes
 
@@ -108,6 +117,27 @@ def test_the_two_methods_agree_under_every_control(relative):
     assert abs(grid.audit_residual) < 2e-3
     assert grid.loss == pytest.approx(sharp.loss, rel=2e-3)
     assert grid.pull_off_stress == pytest.approx(sharp.pull_off_stress, rel=0.01)
+
+
+@pytest.mark.parametrize("method", ["grid", "sharp"])
+@pytest.mark.parametrize("stiffness", [0.0, 1e6])
+def test_a_wave_without_adhesion_carries_a_weight_as_westergaard_has_it(method, stiffness):
+    """What holds the solid is so soft that first touch carries next to nothing."""
+    pressed = 300.0
+    control = Control(stiffness)
+    turn = {"preload": pressed} if stiffness else {"max_stress": pressed}
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, 0.0, control)
+    loop = run_loop(make_method(method, problem), **turn, load_steps=5)
+    share = pressed / (np.pi * 1e6 * AMPLITUDE / PERIOD)
+    turning = int(np.argmax(loop.mean_stress))
+    assert loop.turning_stress == pytest.approx(pressed)
+    contact = 2 / np.pi * np.arcsin(np.sqrt(share))
+    assert loop.contact_fraction[turning] == pytest.approx(contact, rel=0.02)
+    assert loop.penetration[turning] == pytest.approx(share - share * np.log(share), rel=1e-4)
+    stored = pressed * (AMPLITUDE + (pressed / stiffness if stiffness else 0.0))
+    assert abs(loop.loss) <= 1e-4 * stored
+    if control.is_load:
+        assert loop.pull_off_penetration == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_stiff_machine_gives_the_loop_at_fixed_separation(rough):

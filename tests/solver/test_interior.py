@@ -131,6 +131,17 @@ def test_either_reason_makes_a_loss_doubtful():
     assert not beyond_limit(math.inf, 1.0, 0.0, 0.5)  # nothing adheres
 
 
+@pytest.mark.parametrize("stiffness", [1e5, 4e6])
+def test_a_loss_of_a_soft_machine_is_not_taken_for_that_of_closed_valleys(stiffness):
+    """Its spring loses p̄²/(2k) at pull-off, most of the loss."""
+    control = Control(stiffness)
+    problem = Problem(single_wave(1e-6, PERIOD), HalfSpace(1e6, 0.5), 1e-3, control)
+    loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
+    assert loop.loss > 20 * 1e-3 * loop.largest_contact_fraction
+    assert loop.pull_off_stress**2 / (2 * stiffness) == pytest.approx(loop.loss, rel=0.3)
+    assert loop.range_warnings() == []
+
+
 def test_where_and_when_are_those_of_a_state_also_of_a_path_and_of_one_loading_branch():
     method, loop = method_of(rough(), 1e8), loop_of(1e8)
     path = run_path(method, [0.9], load_steps=20)
