@@ -434,9 +434,11 @@ def check_index(name: str, values: Any) -> None:
         )
 
 
-def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np.float64]:
+def finite_row(
+    name: str, values: object, *, entry: str = "value", imaginary: bool = False
+) -> NDArray[Any]:
     """Return a row of finite numbers, as :func:`row`; ValueError if one is not finite."""
-    array = row(name, values, entry=entry)
+    array = row(name, values, entry=entry, imaginary=imaginary)
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise ValueError(

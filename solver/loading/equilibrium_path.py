@@ -406,6 +406,7 @@ class EquilibriumPath(ByValue, ResultViews):
             f"largest contact fraction {self.contact_fraction.max():.4g}, most patches "
             f"{self.patches.max()}"
         )
+        energies = problem.full_contact_energy, problem.work_of_adhesion
         rows = [
             (
                 "profile",
@@ -419,7 +420,7 @@ class EquilibriumPath(ByValue, ResultViews):
             ),
             *self._rows_of_way(contact),
             ("friction", self.friction_summary()),
-            ("sticking", self.sticking_note),
+            ("sticking", sticking_text(*energies, self.largest_contact_fraction)),
             ("range", self.range_summary()),
             ("audit", self._audit_text()),
             (
@@ -460,12 +461,6 @@ class EquilibriumPath(ByValue, ResultViews):
         if gamma is None:
             return ""
         return friction_text(gamma, self.lost, self.friction, varies=pattern is not None)
-
-    @property
-    def sticking_note(self) -> str:
-        """Return a clause where adhesion makes the contact nearly full; else empty."""
-        energies = self.problem.full_contact_energy, self.problem.work_of_adhesion
-        return sticking_text(*energies, self.largest_contact_fraction)
 
     def range_summary(self) -> str:
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""

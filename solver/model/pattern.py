@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.checks import FINITE, HARMONIC, SHARE, real, row, whole
+from adhesis.solver.checks import FINITE, HARMONIC, SHARE, finite_row, real, whole
 from adhesis.solver.model.profile import EQUAL_CRESTS, MIRRORED, Array, Profile
 from adhesis.solver.values import ByValue
 
@@ -51,11 +51,8 @@ class AdhesionPattern(ByValue):
     coefficients: NDArray[np.complex128]
 
     def __post_init__(self) -> None:
-        name = "coefficients of a pattern"
-        c = row(name, self.coefficients, entry="coefficient", imaginary=True).astype(np.complex128)
-        bad = np.flatnonzero(~np.isfinite(c))
-        if bad.size:
-            raise ValueError(f"{name} hold {c[bad[0]]} at {bad[0]}: all must be finite")
+        name, entry = "pattern coefficients", "coefficient"
+        c = finite_row(name, self.coefficients, entry=entry, imaginary=True)
         if c.size and c[0] != 0:
             raise ValueError(f"c_0 of a pattern is {c[0]}: it must be 0, as γ is the mean")
         object.__setattr__(self, "coefficients", c)

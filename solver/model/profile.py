@@ -37,7 +37,6 @@ from adhesis.solver.checks import (
     finite_row,
     real,
     reals,
-    row,
     whole,
 )
 from adhesis.solver.values import ByValue
@@ -123,18 +122,10 @@ class Profile(ByValue):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "period", real("period", self.period, LENGTH))
-        a = row("coefficients", self.coefficients, entry="coefficient", imaginary=True).astype(
-            np.complex128
-        )
+        a = finite_row("coefficients", self.coefficients, entry="coefficient", imaginary=True)
         if a.size < 2:
             raise ValueError(
                 f"a profile has the coefficients a_0 … a_M, M ≥ 1; these have shape {a.shape}"
-            )
-        bad = np.flatnonzero(~np.isfinite(a))
-        if bad.size:
-            raise ValueError(
-                f"coefficients[{bad[0]}] is {a[bad[0]]}: every coefficient of a profile must be "
-                "finite"
             )
         if a[0] != 0:
             raise ValueError(f"a_0 is {a[0]}: a profile has zero mean, so a_0 must be 0")

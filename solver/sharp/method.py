@@ -246,7 +246,7 @@ class SharpMethod(Method):
             start = self.nucleation.insert(gaps, highest)
             first = 0.0 if control.is_load else touch
             if self.problem.work_of_adhesion == 0:
-                first, touch = self._first_carried(start, first, touch)
+                first, touch = self._first_carried(start, first)
             if target.direction == "unloading" or target.d > first:
                 apart = self.problem.detached_separation(state, target.prescribed)
                 history.states.append(self.detached(apart))
@@ -275,19 +275,15 @@ class SharpMethod(Method):
             history.states.append(self.detached(target.prescribed))
         return history
 
-    def _first_carried(self, seeds: Array, d: float, touch: float) -> tuple[float, float]:
-        """Return d and q0 s from which on seeds without adhesion hold; smaller ones are left out.
+    def _first_carried(self, seeds: Array, d: float) -> tuple[float, float]:
+        """Return d and q0 s from which on seeds without adhesion hold, at or beyond ``d``.
 
         They do at first touch, unless what holds the solid is so soft that it carries less there.
         """
-        if self.problem.control.is_fixed:
-            return d, touch
-        at_touch, further = (self.edges.solution(seeds, place) for place in (d, d - 1.0))
-        opening, other = (float(field.edge_opening.mean()) for field in (at_touch, further))
-        if opening <= 0:
-            return d, touch
-        share = opening / (opening - other)  # fields of given gaps are linear in d
-        return d - share, at_touch.separation + share * (further.separation - at_touch.separation)
+        near, further = (self.edges.solution(seeds, place) for place in (d, d - 1.0))
+        opening, other = (float(field.edge_opening.mean()) for field in (near, further))
+        share = max(opening, 0.0) / (opening - other)  # fields of given gaps are linear in d
+        return d - share, near.separation + share * (further.separation - near.separation)
 
     def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
         """Follow a path without adhesion, whose states are unique and do not jump.

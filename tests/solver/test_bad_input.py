@@ -333,7 +333,7 @@ make_method('auto', Problem(WAVE, SOLID, 0.004, work_of_adhesion_open=1.0), node
 stripes(3, 1.0) -> ValueError: amplitude is 1.0: it must be
 stripes(0, 0.5) -> ValueError: count is 0: it must be
 AdhesionPattern([0.1]) -> ValueError: it must be 0
-AdhesionPattern([0, np.nan]) -> ValueError: coefficients of a pattern hold
+AdhesionPattern([0, np.nan]) -> ValueError: pattern coefficients[1] is (nan+0j): every coefficient
 AdhesionPattern([0, 0.4, 0, 0.2]) -> ValueError: the work of adhesion to -0.2 of its mean
 Problem(WAVE, SOLID, 0.004, strength=1e7, pattern=stripes(2, 0.1)) ->
     ValueError: is given beside a strength of 1e+07 Pa: give one of them
