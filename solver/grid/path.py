@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver.grid.contact import Contact, Mask
+from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.patches import patch_ranges
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import state_of
@@ -233,9 +233,10 @@ class Steps:
         It can differ only if several edges ran, or surfaces touched.
         """
         if start.mask.any():
-            ran = patch_ranges(start.mask ^ after.mask)
-            touched = any(self._is_isolated(start.mask, *run) for run in zip(*ran, strict=True))
-            if np.count_nonzero(ran[1] > self.min_displacement) < 2 and not touched:
+            first, width = patch_ranges(start.mask ^ after.mask)
+            beside = np.array([first, first - 1, (first + width) % start.mask.size])
+            touched = not start.mask[beside].any(axis=0).all()  # what ran is beside no patch
+            if np.count_nonzero(width > self.min_displacement) < 2 and not touched:
                 return None
         other = self.relaxation.relax(
             start, lambda _, running: self._is_same_minimum(running, after), equal_speeds=True
@@ -245,12 +246,6 @@ class Steps:
     def _is_same_minimum(self, one: Contact, other: Contact) -> bool:
         """Return True if no edge is far from its position in the other contact set."""
         return bool(patch_ranges(one.mask ^ other.mask)[1].max(initial=0) <= self.min_displacement)
-
-    @staticmethod
-    def _is_isolated(mask: Mask, first: int, width: int) -> bool:
-        """Return True if a run of joined nodes is not adjacent to a patch of ``mask``."""
-        n = mask.size
-        return not (mask[first] or mask[first - 1] or mask[(first + width) % n])
 
     def _append(self, contact: Contact) -> ContactState:
         """Append the state of a relaxed contact, and return it."""

@@ -22,19 +22,13 @@
 namespace adhesis {
 
 using Vector = std::vector<double>;
-
-// Memory of numbers that are not set to zero.
-struct AsFound : std::allocator<double> {
-  template <class T>
-  struct rebind {
-    using other = AsFound;
-  };
-  void construct(double*) {}
-};
-using Unset = std::vector<double, AsFound>;  // computed before they are read
 using Integers = std::vector<int>;
 using Pair = std::array<Vector, 2>;
 using Flags = std::vector<char>;  // true or false; not bool, so that each has an address
+
+// Numbers that are computed before they are read: setting many to zero takes long.
+using Unset = std::unique_ptr<double[]>;
+inline Unset unset(int count) { return std::make_unique_for_overwrite<double[]>(count); }
 
 using std::numbers::pi;
 inline constexpr double infinity = std::numeric_limits<double>::infinity();

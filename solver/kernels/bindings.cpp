@@ -286,7 +286,7 @@ void bind_field(nb::module_& m) {
       .def(
           "block",
           [](const Field& f, int k) {
-            const auto first = f.equations.blocks.begin() + f.nodes.square[k];
+            const double* first = &f.equations.blocks[f.nodes.square[k]];
             const size_t n = f.nodes.size_of(k);
             return hand_over(Vector(first, first + n * n), {n, n});
           },

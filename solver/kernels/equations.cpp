@@ -80,7 +80,7 @@ bool Nodes::raise(int k, int order) {
 
 Equations allocate_equations(const Nodes& nodes) {
   const int n = nodes.size();
-  return {Unset(nodes.square.back()), Vector(n), Vector(n),
+  return {unset(nodes.square.back()), Vector(n), Vector(n),
           std::vector<EndTerms>(nodes.gap_count())};
 }
 

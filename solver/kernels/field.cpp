@@ -85,7 +85,7 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
   const int n = nodes.size();
-  Unset inverse(nodes.square.back());
+  const Unset inverse = unset(nodes.square.back());
   for (int k = 0; k < count; ++k) {
     fill_gap(k, 1, field.nodes, field.equations, model);
     const int at = nodes.square[k];

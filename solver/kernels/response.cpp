@@ -70,7 +70,7 @@ void load_gap(const LinearResponse& response, int k, const GaussRule& rule, Spac
 LinearResponse::LinearResponse(Nodes given, double digits)
     : nodes(std::move(given)), equations(allocate_equations(nodes)), tree(nodes, digits, ROOM) {
   const int count = nodes.gap_count(), n = nodes.size();
-  inverse.resize(nodes.square.back());
+  inverse = unset(nodes.square.back());
   charges.fill(Charges(tree.size()));
   about_pressure.resize(count);
   edges.resize(2 * count);

@@ -295,11 +295,11 @@ Tree::Tree(const Nodes& nodes, double digits, double room) : count(nodes.gap_cou
   }
   theta.resize(end.node);
   stretch.resize(end.node);
-  kernel.resize(end.kernel);
-  interpolation.resize(end.interpolation);
-  response.resize(end.response);
-  inverse.resize(end.inverse);
-  inner_potential.resize(end.interpolation);
+  kernel = unset(end.kernel);
+  interpolation = unset(end.interpolation);
+  response = unset(end.response);
+  inverse = unset(end.inverse);
+  inner_potential = unset(end.interpolation);
 }
 
 WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {
@@ -315,7 +315,7 @@ WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {
     theta[run.node + i] = place.theta;
     stretch[run.node + i] = place.stretch;
   }
-  double* out = interpolation.data() + run.interpolation;
+  double* out = &interpolation[run.interpolation];
   for (int half = 0; half < 2; ++half) {
     const Run& child = runs[run.half[half]];
     if (own || halves[half])
@@ -428,7 +428,7 @@ WIDE void Tree::pass_down(const Flags& wanted, std::span<const Charges> charges,
   for (int index = run_count() - 1; index >= count; --index) {
     if (!wanted[index]) continue;
     const Run& run = runs[index];
-    const double* inward = inner_potential.data() + run.interpolation;
+    const double* inward = &inner_potential[run.interpolation];
     for (int half : run.half) {
       const Run& child = runs[half];
       for (size_t load = 0; wanted[half] && load < charges.size(); ++load)

@@ -51,8 +51,8 @@ class AdhesionPattern(ByValue):
     coefficients: NDArray[np.complex128]
 
     def __post_init__(self) -> None:
-        name, entry = "pattern coefficients", "coefficient"
-        c = finite_row(name, self.coefficients, entry=entry, imaginary=True)
+        given = self.coefficients
+        c = finite_row("pattern coefficients", given, entry="coefficient", imaginary=True)
         if c.size and c[0] != 0:
             raise ValueError(f"c_0 of a pattern is {c[0]}: it must be 0, as γ is the mean")
         object.__setattr__(self, "coefficients", c)
