@@ -107,13 +107,15 @@ def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("hurst", "n0", "ratio", "gamma", "seed"),
-    [(0.5, 3, 20, 0.03, 11), (0.8, 2, 16, 0.01, 25), (0.8, 2, 16, 0.1, 2)],
-    ids=["a patch goes or stays", "contact is lost or stays on a crest", "a shallow minimum"],
+    ("profile", "gamma"),
+    [
+        (rough(3, 20, 11, hurst=0.5, period=1e-3), 0.03),  # a patch goes or stays
+        (rough(2, 16, 25, period=1e-3), 0.01),  # contact is lost or stays on a crest
+        (rough(2, 16, 2, period=1e-3), 0.1),  # a shallow minimum
+        *((rough(5, 8, s, period=2e-3 * np.pi), g) for s, g in ((1, 0.02), (2, 0.1))),
+    ],
 )
-def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ratio, gamma, seed):
-    profile = rough(n0, ratio, seed, hurst=hurst, period=1e-3)
-
+def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(profile, gamma):
     def loss_with(share: float) -> float:
         method = SharpMethod(Problem(profile, SOLID, gamma))
         method.edges.law.longest_step *= share
