@@ -44,18 +44,19 @@ def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     assert step[lead] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.2])
+@pytest.mark.parametrize("share", [1.0, 0.2, None], ids=["sharp", "shorter steps", "grid"])
 def test_a_race_ends_where_gradient_flow_does_and_is_flagged_with_what_is_at_stake(share):
     """Explicit gradient flow with short steps: contact 0.3202 after the snap-in.
 
     It gave a loss of 5.178224 with jumps located to 5e-5 h_max. The loss is that at accuracy 1e-6.
     """
-    method = SharpMethod(race())
-    method.edges.law.longest_step *= share
+    method = SharpMethod(race()) if share else GridMethod(race(), nodes_per_wave=32)
+    if share:
+        method.edges.law.longest_step *= share
     result = run_loop(method, max_penetration=0.8, load_steps=20)
     first = result.jumps[0]
-    assert first.contact_after == pytest.approx(0.3202, abs=1e-4)
-    assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
+    assert first.contact_after == pytest.approx(0.3202, abs=1e-4 if share else 2e-3)
+    assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5 if share else 5e-3)
     # equal speeds end elsewhere: the losses, 5.178 and 5.70, differ by about a tenth, and so do the
     # energies of one jump
     assert first.raced
@@ -179,14 +180,6 @@ def test_nothing_races_where_the_rules_agree(method, ratio):
     result = run_loop(method(Problem(profile, SOLID, 0.02)), max_penetration=0.9, load_steps=9)
     assert len(result.jumps) > 5
     assert (result.races, result.energy_at_stake) == (0, 0)
-
-
-def test_grid_runs_the_same_race():
-    result = run_loop(GridMethod(race(), nodes_per_wave=32), max_penetration=0.8, load_steps=20)
-    assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=2e-3)
-    assert result.loss_dimensionless == pytest.approx(5.178224, rel=5e-3)
-    assert result.jumps[0].raced
-    assert 0.01 * result.loss < result.jumps[0].at_stake < result.loss
 
 
 def equal_waves(n0: int, seed: int, g: float, shift: float = 0.0) -> Problem:
