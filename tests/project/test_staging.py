@@ -121,10 +121,6 @@ class Site:
             return False
         return True
 
-    def kept(self) -> list[str]:
-        copies = self.folder.glob("disk*/*/s.h5")
-        return [row for copy in copies for row in copy.read_text().split()]
-
 
 @contextmanager
 def site(folder: Path) -> Iterator[Site]:
@@ -217,8 +213,9 @@ def interleave(folder: Path, seed: int) -> None:
         while not here.is_quiet():  # runs outlive scripts that were killed
             assert time.monotonic() < end, f"seed {seed}"
             time.sleep(0.01)
-        written, at_work = here.lines("ledger"), f"seed {seed}"
-        assert set(written) <= {*here.lines("s.h5"), *here.kept()}, at_work
+        at_work, copies = f"seed {seed}", folder.glob("disk*/*/s.h5")
+        kept = {row for copy in copies for row in copy.read_text().split()}
+        assert {*here.lines("ledger")} <= {*here.lines("s.h5"), *kept}, at_work
         if disks == ["disk1"]:
             # A last job, alone, finds all that the others have left, and nothing was done twice.
             last = here.start(STAGING="disk1")
