@@ -146,7 +146,7 @@ def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: P
         except OSError:
             return False
 
-    wait_until(lambda: not is_alive())
+    wait_until(lambda: not is_alive(), 20)  # by itself it would end later
 
 
 def test_local_script_asks_for_a_campaign() -> None:
