@@ -307,13 +307,6 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data, drawn):
     assert BINS_PER_DECADE * np.log10(edges[1] / edges[0]) == pytest.approx(1)
 
 
-def states(*penetrations: float) -> Campaign:
-    """Return the campaign of ``file``, with fields at these Δ/h_max."""
-    listed = f"field_nodes = 256\nfield_penetrations = {list(penetrations)}"
-    text = text_of(**PLAN | {"realisations": 2}).replace("field_nodes = 256", listed)
-    return parse_campaign(text)
-
-
 def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
     tmp_path, undrawn, quick_figures
 ):
@@ -322,7 +315,9 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
         ((0.3, 0.4, 0.7, 0.9), 9 * 0.045, ("", "")),  # the nearest of 20 load steps
         ((0.36, 0.54, 0.9), 0.36, ("Δ/h_max = 0.36", "Δ/h_max = 0.54")),
     ):
-        path = write(tmp_path / f"{len(kept)}.h5", states(*kept))
+        listed = f"field_nodes = 256\nfield_penetrations = {list(kept)}"
+        text = text_of(**PLAN | {"realisations": 2}).replace("field_nodes = 256", listed)
+        path = write(tmp_path / f"{len(kept)}.h5", text)
         undrawn += ["fig3_shapes", "fig4_spectra_of_branches"]
         data = write_report(path, tmp_path / str(len(kept)), io.StringIO())
         page = (tmp_path / str(len(kept)) / "report.md").read_text(encoding="utf-8")

@@ -122,32 +122,22 @@ def test_a_second_set_up_waits_for_the_first(tmp_path: Path) -> None:
     assert "Python 3.11 or newer is needed" in errors
 
 
-def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
-    head = f"""
+def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: Path) -> None:
+    script = f"""
         set -eu
-        say() {{ printf 'setup: %s\\n' "$*" | tee -a '{tmp_path}/said'; }}
+        say() {{ printf 'setup: %s\\n' "$*"; }}
         log='{tmp_path}/log' TELL_EVERY=1
         . '{ROOT}/tools/parts.sh'
-    """
-    done = ran("bash", "-c", head + text, cwd=tmp_path)
-    assert done.stderr == ""
-    return done.returncode, done.stdout.splitlines()
-
-
-def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: Path) -> None:
-    code, lines = parts(
-        tmp_path,
-        """
         trap end_parts EXIT
-        long() { sleep 50 & echo $! >child; wait; }
-        fail() { until [ -s child ]; do sleep 0.05; done; return 3; }
+        long() {{ sleep 50 & echo $! >child; wait; }}
+        fail() {{ until [ -s child ]; do sleep 0.05; done; return 3; }}
         part long "what goes on" long
         part fails "what fails" fail
         finish fails || exit $?
-        """,
-    )
-    assert code == 3
-    assert re.fullmatch(r"setup: what fails: \d+ s, failed", lines[-1])
+    """
+    done = ran("bash", "-c", script, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (3, "")
+    assert re.fullmatch(r"setup: what fails: \d+ s, failed", done.stdout.splitlines()[-1])
     child = (tmp_path / "child").read_text().strip()
 
     def is_alive() -> bool:
@@ -156,7 +146,7 @@ def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: P
         except OSError:
             return False
 
-    wait_until(lambda: not is_alive())
+    wait_until(lambda: not is_alive(), 20)  # by itself it would end later
 
 
 def test_local_script_asks_for_a_campaign() -> None:

@@ -130,20 +130,16 @@ def wave() -> SharpMethod:
     return SharpMethod(Problem(single_wave(1e-6, 1e-3), HALF_SPACE, 0.02))
 
 
-def run(method: SharpMethod, gaps: list[list[float]], separation: float, most: int) -> Descent:
-    """Descend on a single wave of amplitude 1 µm, at a separation in amplitudes."""
-    edges, ends = method.edges, np.array(gaps, dtype=float)
+def run(method: SharpMethod, half_width: float, separation: float) -> Descent:
+    """Descend from one patch on the crest at θ = 0 of a wave, at a separation in amplitudes."""
+    edges, ends = method.edges, np.array([[half_width, 2 * np.pi - half_width]])
     prescribed = separation * 2 * np.pi * 1e-3
     near = edges.response_near(ends, prescribed)
-    return near.descend(ends, ends, prescribed, most, False, edges.law, edges.model)
-
-
-NARROW = [[0.2, 2 * np.pi - 0.2]]  # one narrow patch on the crest at θ = 0
-SLIVER = [[0.05, 2 * np.pi - 0.05]]
+    return near.descend(ends, ends, prescribed, 1000, False, edges.law, edges.model)
 
 
 def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
-    found = run(wave, NARROW, 0.5, 1000)
+    found = run(wave, 0.2, 0.5)
     assert found.event == DescentEvent.AT_REST
     point = wave.edges.equilibrium(found.gaps, 0.5 * 2 * np.pi * 1e-3, 0.05 * wave.edges.wave)
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
@@ -158,7 +154,7 @@ def test_later_steps_after_which_a_gap_needs_more_nodes_are_judged():
 
 
 def test_a_patch_vanishes_where_the_surfaces_are_far_apart(wave):
-    found = run(wave, SLIVER, 5.0, 1000)
+    found = run(wave, 0.05, 5.0)
     assert found.event == DescentEvent.VANISHED
     patch = found.gaps[0, 0] + 2 * np.pi - found.gaps[0, 1]
     assert 0 < patch < wave.edges.law.smallest

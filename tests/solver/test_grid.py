@@ -10,15 +10,7 @@ from adhesis.solver.references.single_wave import SingleWave
 from tests.support.scenes import HALF_SPACE, grid_of, loop_of, rough
 
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5
-
-
-def wave(alpha: float) -> SingleWave:
-    return SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, HALF_SPACE.modulus)
-
-
-def wave_method(alpha: float, **options) -> GridMethod:
-    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave(alpha).work_of_adhesion)
-    return grid_of(problem, **options)
+WAVE = SingleWave.with_alpha(0.2, AMPLITUDE, PERIOD, HALF_SPACE.modulus)
 
 
 def rough_profile() -> Profile:
@@ -96,8 +88,7 @@ def test_no_state_overlaps_not_even_before_a_touch_is_followed():
 
 def test_first_touch_is_a_jump_at_the_highest_crest():
     profile = single_wave(AMPLITUDE, PERIOD).shifted(0.43 * PERIOD / 512)
-    gamma = wave(0.2).work_of_adhesion
-    method = grid_of(Problem(profile, HALF_SPACE, gamma), nodes=512)
+    method = grid_of(Problem(profile, HALF_SPACE, WAVE.work_of_adhesion), nodes=512)
     path = method.follow(method.detached(2 * AMPLITUDE), 0.9 * AMPLITUDE)
     jump = path.jumps[0]
     assert (jump.kind, jump.patches_before, jump.patches_after) == ("snap-in", 0, 1)
@@ -119,7 +110,8 @@ def test_number_of_nodes():
 
 
 def test_a_state_of_another_method_is_refused():
-    method = wave_method(0.2, nodes=256)
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, WAVE.work_of_adhesion)
+    method = grid_of(problem, nodes=256)
     foreign = ContactState(0.5 * AMPLITUDE, np.array([[0.1, 0.2]]) * PERIOD, 0.0, 0.0, 0.0, 0.1)
     with pytest.raises(ValueError, match="not made by"):
         method.follow(foreign, 0.4 * AMPLITUDE)

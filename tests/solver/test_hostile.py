@@ -81,6 +81,10 @@ def to_depth(problem: Problem, depth: float, load_steps: int, *accuracies: float
             Problem(Profile(2e-3, SIX_PARTS), HALF_SPACE, 9.93808898912e-4),
             *(0.7399679303, 10, 1e-3, 1e-4),
         ),
+        *(  # edges that race make a path sensitive
+            to_depth(Problem(rough(5, 8, s, period=PERIOD), HALF_SPACE, g), 0.9, 20, 1e-3, 1e-5)
+            for s, g in ((1, 0.02), (2, 0.1))
+        ),
         # a step after which a gap needs more nodes passed a minimum: one jump less, 3e-3 off
         to_depth(
             Problem(UNEVEN, HALF_SPACE, 56.953749479986186, strength=7.224849617527944e7),

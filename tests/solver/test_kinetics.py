@@ -44,18 +44,19 @@ def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     assert step[lead] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.2])
+@pytest.mark.parametrize("share", [1.0, 0.2, None], ids=["sharp", "shorter steps", "grid"])
 def test_a_race_ends_where_gradient_flow_does_and_is_flagged_with_what_is_at_stake(share):
     """Explicit gradient flow with short steps: contact 0.3202 after the snap-in.
 
     It gave a loss of 5.178224 with jumps located to 5e-5 h_max. The loss is that at accuracy 1e-6.
     """
-    method = SharpMethod(race())
-    method.edges.law.longest_step *= share
+    method = SharpMethod(race()) if share else GridMethod(race(), nodes_per_wave=32)
+    if share:
+        method.edges.law.longest_step *= share
     result = run_loop(method, max_penetration=0.8, load_steps=20)
     first = result.jumps[0]
-    assert first.contact_after == pytest.approx(0.3202, abs=1e-4)
-    assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
+    assert first.contact_after == pytest.approx(0.3202, abs=1e-4 if share else 2e-3)
+    assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5 if share else 5e-3)
     # equal speeds end elsewhere: the losses, 5.178 and 5.70, differ by about a tenth, and so do the
     # energies of one jump
     assert first.raced
@@ -107,13 +108,15 @@ def test_under_a_load_no_other_order_of_events_is_followed(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("hurst", "n0", "ratio", "gamma", "seed"),
-    [(0.5, 3, 20, 0.03, 11), (0.8, 2, 16, 0.01, 25), (0.8, 2, 16, 0.1, 2)],
-    ids=["a patch goes or stays", "contact is lost or stays on a crest", "a shallow minimum"],
+    ("profile", "gamma"),
+    [
+        (rough(3, 20, 11, hurst=0.5, period=1e-3), 0.03),  # a patch goes or stays
+        (rough(2, 16, 25, period=1e-3), 0.01),  # contact is lost or stays on a crest
+        (rough(2, 16, 2, period=1e-3), 0.1),  # a shallow minimum
+        *((rough(5, 8, s, period=2e-3 * np.pi), g) for s, g in ((1, 0.02), (2, 0.1))),
+    ],
 )
-def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ratio, gamma, seed):
-    profile = rough(n0, ratio, seed, hurst=hurst, period=1e-3)
-
+def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(profile, gamma):
     def loss_with(share: float) -> float:
         method = SharpMethod(Problem(profile, SOLID, gamma))
         method.edges.law.longest_step *= share
@@ -177,14 +180,6 @@ def test_nothing_races_where_the_rules_agree(method, ratio):
     result = run_loop(method(Problem(profile, SOLID, 0.02)), max_penetration=0.9, load_steps=9)
     assert len(result.jumps) > 5
     assert (result.races, result.energy_at_stake) == (0, 0)
-
-
-def test_grid_runs_the_same_race():
-    result = run_loop(GridMethod(race(), nodes_per_wave=32), max_penetration=0.8, load_steps=20)
-    assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=2e-3)
-    assert result.loss_dimensionless == pytest.approx(5.178224, rel=5e-3)
-    assert result.jumps[0].raced
-    assert 0.01 * result.loss < result.jumps[0].at_stake < result.loss
 
 
 def equal_waves(n0: int, seed: int, g: float, shift: float = 0.0) -> Problem:

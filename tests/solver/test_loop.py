@@ -78,65 +78,50 @@ def test_callers_see_every_state_and_every_step():
     assert len(steps) == np.count_nonzero(result.load_step) - 1  # the turning point counts once
 
 
-class _Untrue(ExactWave):
-    """Claims energy drops 10 % too large."""
-
-    def follow(self, state: ContactState, separation: float) -> Path:
-        path = super().follow(state, separation)
-        return Path(
-            path.states, tuple(replace(j, energy_drop=1.1 * j.energy_drop) for j in path.jumps)
-        )
-
-
-class _Sticking(ExactWave):
-    """One patch that never comes off."""
-
-    def follow(self, state: ContactState, separation: float) -> Path:
-        patch = np.array([[0.0, 1e-4]])
-        return Path((ContactState(separation, patch, -1.0, 0.0, 0.0, 0.1),), ())
-
-
 def test_audit_catches_energy_drops_that_are_not_the_loss():
-    problem = exact(0.2).problem
-    result = run_loop(_Untrue(problem), max_penetration=0.8, load_steps=20)
+    """A method claims drops 10 % too large."""
+
+    class Untrue(ExactWave):
+        def follow(self, state: ContactState, separation: float) -> Path:
+            path = super().follow(state, separation)
+            jumps = (replace(jump, energy_drop=1.1 * jump.energy_drop) for jump in path.jumps)
+            return Path(path.states, tuple(jumps))
+
+    result = run_loop(Untrue(exact(0.2).problem), max_penetration=0.8, load_steps=20)
     assert result.audit_residual == pytest.approx(-0.1, abs=1e-3)
     assert result.loss_error > abs(result.loss - result.loss_from_drops)  # whichever is larger
 
 
-class _Upwards(ExactWave):
-    """Claims a second jump with each, to an energy higher by a tenth."""
-
-    def follow(self, state: ContactState, separation: float) -> Path:
-        path = super().follow(state, separation)
-        states, jumps = list(path.states), []
-        for jump in path.jumps:
-            after = next(k for k, s in enumerate(states) if s.separation == jump.separation) + 2
-            states[after:after] = states[after - 2 : after]
-            jumps += [replace(jump, energy_drop=share * jump.energy_drop) for share in (1.1, -0.1)]
-        return Path(tuple(states), tuple(jumps), 0.0)
-
-
-class _Falling(ExactWave):
-    """Loses its contact half-way up."""
-
-    def follow(self, state: ContactState, separation: float) -> Path:
-        path = super().follow(state, separation)
-        h_max = self.problem.profile.h_max
-        if separation > state.separation and separation > 0.7 * h_max:
-            return Path((self.detached(separation),), ())
-        return path
-
-
 def test_a_loop_without_contact_below_the_crests_has_no_loss():
     """There is no such state: the loop ends with an error, not with a number."""
+
+    class FallingHalfWayUp(ExactWave):
+        def follow(self, state: ContactState, separation: float) -> Path:
+            if separation > state.separation and separation > 0.7 * self.problem.profile.h_max:
+                return Path((self.detached(separation),), ())
+            return super().follow(state, separation)
+
     with pytest.raises(PathError, match=r"without contact at s = 0\.7"):
-        run_loop(_Falling(exact(0.2).problem), max_penetration=0.8, load_steps=10)
+        run_loop(FallingHalfWayUp(exact(0.2).problem), max_penetration=0.8, load_steps=10)
 
 
 def test_a_negative_drop_counts_in_the_error_and_is_said():
-    """It is neither hidden from the sum of drops, which closes here, nor taken for nothing."""
-    problem = exact(0.2).problem
-    result = run_loop(_Upwards(problem), max_penetration=0.8, load_steps=20)
+    """It is neither hidden from the sum of drops, which closes here, nor taken for nothing.
+
+    A method claims a second jump with each, to an energy higher by a tenth.
+    """
+
+    class Upwards(ExactWave):
+        def follow(self, state: ContactState, separation: float) -> Path:
+            path = super().follow(state, separation)
+            states, jumps = list(path.states), []
+            for jump in path.jumps:
+                after = next(k for k, s in enumerate(states) if s.separation == jump.separation) + 2
+                states[after:after] = states[after - 2 : after]
+                jumps += [replace(jump, energy_drop=f * jump.energy_drop) for f in (1.1, -0.1)]
+            return Path(tuple(states), tuple(jumps), 0.0)
+
+    result = run_loop(Upwards(exact(0.2).problem), max_penetration=0.8, load_steps=20)
     assert abs(result.audit_residual) < 1e-3
     assert min(jump.energy_drop for jump in result.jumps) < 0
     assert result.loss_error == pytest.approx(0.1 * result.loss, rel=0.02)
@@ -173,5 +158,10 @@ def test_a_drop_is_the_difference_of_the_energies_whatever_its_sign():
 
 
 def test_a_contact_that_never_detaches_is_reported():
+    class Sticking(ExactWave):
+        def follow(self, state: ContactState, separation: float) -> Path:
+            patch = np.array([[0.0, 1e-4]])
+            return Path((ContactState(separation, patch, -1.0, 0.0, 0.0, 0.1),), ())
+
     with pytest.raises(PathError, match="still in contact"):
-        run_loop(_Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)
+        run_loop(Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)

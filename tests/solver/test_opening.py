@@ -25,6 +25,7 @@ from tests.support.scenes import HALF_SPACE, loop_of, rough
 TROUGHS = Profile(1e-3, np.array([0.0, -0.15, -0.5]) * 1e-9)
 STIFF = HalfSpace(1e9, 0.5)
 GAMMA, STRENGTH = 1e-10, 4.0
+PROBLEM = Problem(TROUGHS, HALF_SPACE, GAMMA, strength=STRENGTH)
 
 
 @cache
@@ -33,12 +34,8 @@ def rough_loop(strength: float, ratio: int = 8) -> LoopResult:
     return loop_of(problem, max_penetration=0.9, load_steps=20)
 
 
-def troughs_problem() -> Problem:
-    return Problem(TROUGHS, HALF_SPACE, GAMMA, strength=STRENGTH)
-
-
 def test_the_largest_excess_opens_first_with_what_equals_it():
-    choose = make_method("sharp", troughs_problem()).follower.cracks.choose
+    choose = make_method("sharp", PROBLEM).follower.cracks.choose
     cracks = [Crack(float(i), value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
     assert [crack.position for crack in choose(cracks)] == [1.0, 3.0]
     assert choose(cracks[:1]) == []
@@ -116,7 +113,7 @@ def test_a_difference_of_the_fields_halves_no_later_step_of_the_branch():
 
 def test_patches_that_open_from_the_same_edges_again_end_the_path():
     """They would without end, unless a touch that did not hold meanwhile is not tried again."""
-    follower = make_method("sharp", troughs_problem()).follower
+    follower = make_method("sharp", PROBLEM).follower
     gaps = np.array([[1.0, 6.0]])
     points = [SimpleNamespace(d=0.5, gaps=gaps + by, field=None) for by in (0.0, 0.2, 1e-5, 2e-5)]
     follower.cracks = SimpleNamespace(
@@ -135,7 +132,7 @@ def test_patches_that_open_from_the_same_edges_again_end_the_path():
 
 def test_work_and_energy_agree_between_openings():
     """Between two folds the slopes at the ends of a step hide the error of its integral."""
-    loop = loop_of(troughs_problem(), max_penetration=0.99, load_steps=5)
+    loop = loop_of(PROBLEM, max_penetration=0.99, load_steps=5)
     assert loop.openings > 0
     assert abs(loop.audit_residual) < 1e-5
 
@@ -153,13 +150,12 @@ def test_no_crack_is_tried_beyond_the_length_at_which_the_release_rate_falls():
 
 
 def test_openings_at_a_range_and_tensions_that_are_not_small_make_a_loss_doubtful():
-    problem = troughs_problem()
     for strength, opens in ((4e6, True), (1e12, False)):
         found = " ".join(rough_loop(strength).range_warnings())
         assert ("patches open from inside: a real" in found) == opens
-    assert range_warnings(problem, GAMMA / (1.005 * STRENGTH), 1.0, [0.5]) == []
-    assert len(range_warnings(problem, GAMMA / (1.02 * STRENGTH), 1.0, [0.5])) == 1
-    (excess,) = range_warnings(problem, GAMMA / (2 * STRENGTH), 1.0, [0.5])
+    assert range_warnings(PROBLEM, GAMMA / (1.005 * STRENGTH), 1.0, [0.5]) == []
+    assert len(range_warnings(PROBLEM, GAMMA / (1.02 * STRENGTH), 1.0, [0.5])) == 1
+    (excess,) = range_warnings(PROBLEM, GAMMA / (2 * STRENGTH), 1.0, [0.5])
     assert "reaches 8 Pa, 2 times the strength (4 Pa)" in excess
     # excess, openings; the last has zero range, one an unknown strength
     wrong = beyond_limit(

@@ -12,6 +12,7 @@ from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.method import SharpMethod
 
 A, PERIOD, GAMMA, SOLID = 1e-6, 1e-4, 0.004, HalfSpace(1e6, 0.5)
+FLAT = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
 
 
 class TwoWorks:
@@ -32,8 +33,7 @@ class TwoWorks:
 @pytest.mark.parametrize("ratio", [1.0, 1.5, 4.0])
 def test_a_law_of_its_own_meets_its_closed_form(ratio: float) -> None:
     own = TwoWorks(ratio)
-    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
-    method = SharpMethod(problem, accuracy=1e-4, adhesion=own.law)
+    method = SharpMethod(FLAT, accuracy=1e-4, adhesion=own.law)
     loop = run_loop(method, max_penetration=0.5, load_steps=20)
     closes, opens = (SingleWave(A, PERIOD, SOLID.modulus, r * GAMMA) for r in (1.0, ratio))
     a_in, a_out = closes.half_width(A), opens.fold_half_width
@@ -48,15 +48,14 @@ def test_a_law_of_its_own_meets_its_closed_form(ratio: float) -> None:
 
 def test_a_method_with_a_law_of_its_own_is_pickled_with_it() -> None:
     own = TwoWorks(1.5)
-    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
-    method = SharpMethod(problem, adhesion=own.law)
+    method = SharpMethod(FLAT, adhesion=own.law)
     copy = pickle.loads(pickle.dumps(method))
     one, other = (run_loop(m, max_penetration=0.5, load_steps=5) for m in (method, copy))
     assert other.loss == one.loss
     assert copy.edges.adhesion.largest == 1.5
     law = PythonAdhesion(False, 1.0, 1.0, lambda a, r: (1.0, 0.0), lambda a, r: a)
     with pytest.raises((pickle.PicklingError, AttributeError), match="lambda"):
-        pickle.dumps(SharpMethod(problem, adhesion=law))
+        pickle.dumps(SharpMethod(FLAT, adhesion=law))
 
 
 def test_an_error_of_a_law_is_raised_where_the_path_is_followed() -> None:
@@ -87,8 +86,7 @@ def wavy_up_to(theta: float, recedes: bool) -> float:
 
 
 def test_a_law_that_keeps_its_contract_is_taken() -> None:
-    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
-    SharpMethod(problem, adhesion=PythonAdhesion(False, 0.5, 1.5, wavy, wavy_up_to))
+    SharpMethod(FLAT, adhesion=PythonAdhesion(False, 0.5, 1.5, wavy, wavy_up_to))
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.5])
@@ -132,9 +130,8 @@ def test_equal_parts_and_mirror_images_are_those_that_a_law_of_its_own_shares(ph
 def test_a_law_that_breaks_its_contract_is_refused(
     work: Any, up_to: Any, pins: bool, rule: str
 ) -> None:
-    problem = Problem(single_wave(A, PERIOD), SOLID, GAMMA, measure="flat")
     with pytest.raises(ValueError, match=f"law of adhesion.*{rule}"):
-        SharpMethod(problem, adhesion=PythonAdhesion(pins, 0.5, 2.0, work, up_to))
+        SharpMethod(FLAT, adhesion=PythonAdhesion(pins, 0.5, 2.0, work, up_to))
 
 
 def test_a_law_that_pins_does_not_act_over_a_range() -> None:

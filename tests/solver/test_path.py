@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import Problem, make_method, run_loop, run_loops, run_path
+from adhesis import Problem, make_method, run_loop, run_loops, run_path, single_wave
 from adhesis.solver.loading.path_record import Axis
-from tests.solver.test_control_loops import AMPLITUDE, HALF_SPACE, PERIOD, single_wave, wave_of
+from tests.solver.test_control_loops import AMPLITUDE, HALF_SPACE, PERIOD, ROUGH, wave_of
 from tests.support.exact_wave import ExactWave
-from tests.support.scenes import rough
 
-ROUGH = rough(3, 8, 4, period=PERIOD)
 PROBLEM = Problem(ROUGH, HALF_SPACE, 0.01)
 WAVE = wave_of(0.2)
 OF_WAVE = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, WAVE.work_of_adhesion)

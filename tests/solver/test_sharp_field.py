@@ -16,24 +16,10 @@ from tests.support.scenes import HALF_SPACE, grid_of
 PERIOD = 2e-3 * np.pi
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
 SMOOTH = scenes.rough(4, 5, 2, period=PERIOD)
+ROUGH = scenes.of_paper(1)  # with wave numbers 10 … 1000
+SOURCE, SEPARATION = StressSource(ROUGH), 0.5 * ROUGH.h_max * ROUGH.q0
 
 MOST_NODES = 21  # the order of the rule with the most nodes
-
-
-@pytest.fixture(scope="module")
-def rough():
-    """Paper's spectrum with wave numbers 10 … 1000."""
-    return scenes.of_paper(1)
-
-
-@pytest.fixture(scope="module")
-def source(rough):
-    return StressSource(rough)
-
-
-@pytest.fixture(scope="module")
-def separation(rough):
-    return 0.5 * rough.h_max * rough.q0
 
 
 def solved_field(source, gaps, prescribed, tolerance, device=FIXED_SEPARATION) -> GapField:
@@ -89,50 +75,50 @@ def test_field_equals_the_explicit_solution(patches):
         assert np.abs(inside - opening[k, 1:-1]).max() < 1e-10 * np.abs(opening).max()
 
 
-def test_a_narrow_gap_of_many_modes_opens_as_one_of_few(source, separation):
+def test_a_narrow_gap_of_many_modes_opens_as_one_of_few():
     """There are sine nodes for all modes; fewer were written beyond the end of their arrays."""
     gaps = np.array([[0.3, 0.302], [1.0, 2.0]])
     digits = -np.log(1e-8)
     openings = []
-    model = FieldModel(FIXED_SEPARATION, digits, source.panels)
+    model = FieldModel(FIXED_SEPARATION, digits, SOURCE.panels)
     for least in (0, MOST_NODES):
-        chosen = solve_field(gaps, separation, model).orders
-        solution = solve_field(gaps, separation, model, np.maximum(chosen, least))
-        field = GapField(source, gaps, separation, lambda of=solution: of)
+        chosen = solve_field(gaps, SEPARATION, model).orders
+        solution = solve_field(gaps, SEPARATION, model, np.maximum(chosen, least))
+        field = GapField(SOURCE, gaps, SEPARATION, lambda of=solution: of)
         shape = field.fine_opening(0)
         assert len(shape.theta) >= solution.offset[1]
         openings.append(np.interp(gaps[0].mean(), shape.theta, shape.opening))
     assert openings[1] == pytest.approx(openings[0], rel=1e-3)
 
 
-def test_field_converges_with_its_tolerance(source, separation):
+def test_field_converges_with_its_tolerance():
     """The error follows the tolerance over six decades, with patches down to 0.16 λ_min."""
     gaps = GAPS.copy()
     gaps[1, 0] = 0.801
-    exact = solved_field(source, gaps, separation, 1e-13).edge_opening
+    exact = solved_field(SOURCE, gaps, SEPARATION, 1e-13).edge_opening
     for tolerance in (1e-3, 1e-5, 1e-7, 1e-9):
-        opening = solved_field(source, gaps, separation, tolerance).edge_opening
+        opening = solved_field(SOURCE, gaps, SEPARATION, tolerance).edge_opening
         assert np.abs(opening - exact).max() < 20 * tolerance * np.abs(exact).max()
 
 
-def test_energy_by_separation_is_the_mean_stress(source, separation):
-    step = 1e-3 * separation
+def test_energy_by_separation_is_the_mean_stress():
+    step = 1e-3 * SEPARATION
     slope = (
-        energy(source, GAPS, separation + step)[0] - energy(source, GAPS, separation - step)[0]
+        energy(SOURCE, GAPS, SEPARATION + step)[0] - energy(SOURCE, GAPS, SEPARATION - step)[0]
     ) / (2 * step)
-    pressure = energy(source, GAPS, separation)[1].solution.pressure
+    pressure = energy(SOURCE, GAPS, SEPARATION)[1].solution.pressure
     assert abs(slope / (-2 * np.pi * pressure) - 1) < 1e-10
 
 
-def test_energy_by_edge_is_the_energy_release_rate(source, separation):
+def test_energy_by_edge_is_the_energy_release_rate():
     """∂U/∂θ_e = ∓π C²/8: Irwin's G = K²/(2E*) in these units."""
-    field = energy(source, GAPS, separation)[1]
+    field = energy(SOURCE, GAPS, SEPARATION)[1]
     scale = np.pi * np.max(field.edge_opening**2) / 8
     for k, side in np.ndindex(5, 2):
         up, down = GAPS.copy(), GAPS.copy()
         up[k, side] += 1e-5
         down[k, side] -= 1e-5
-        slope = (energy(source, up, separation)[0] - energy(source, down, separation)[0]) / 2e-5
+        slope = (energy(SOURCE, up, SEPARATION)[0] - energy(SOURCE, down, SEPARATION)[0]) / 2e-5
         release = np.pi * field.edge_opening[k, side] ** 2 / 8
         assert abs(slope - (-release if side else release)) < 2e-5 * scale
 
@@ -145,16 +131,16 @@ DEVICES = {
 
 
 @pytest.mark.parametrize("name", DEVICES)
-def test_field_and_derivatives_do_not_know_what_holds_them(source, separation, name):
+def test_field_and_derivatives_do_not_know_what_holds_them(name):
     """Held so that it is the one that the gaps have at the separation."""
-    fixed, device = solved_field(source, GAPS, separation, 1e-13), DEVICES[name]
-    prescribed = device.separation_weight * separation - device.compliance * fixed.solution.pressure
-    field = solved_field(source, GAPS, prescribed, 1e-13, device)
-    assert field.solution.separation == pytest.approx(separation, rel=1e-9)
+    fixed, device = solved_field(SOURCE, GAPS, SEPARATION, 1e-13), DEVICES[name]
+    prescribed = device.separation_weight * SEPARATION - device.compliance * fixed.solution.pressure
+    field = solved_field(SOURCE, GAPS, prescribed, 1e-13, device)
+    assert field.solution.separation == pytest.approx(SEPARATION, rel=1e-9)
     assert field.solution.pressure == pytest.approx(fixed.solution.pressure, rel=1e-11)
     assert np.allclose(field.edge_opening, fixed.edge_opening, rtol=1e-9)
-    way = 0.5 * separation
-    other = solved_field(source, GAPS, prescribed + way, 1e-13, device)
+    way = 0.5 * SEPARATION
+    other = solved_field(SOURCE, GAPS, prescribed + way, 1e-13, device)
     pressure, _, opening = field.solution.by_prescribed()
     change = other.solution.edge_opening - field.solution.edge_opening
     assert np.allclose(change, way * opening, rtol=1e-8)

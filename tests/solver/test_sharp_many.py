@@ -18,10 +18,7 @@ from adhesis.solver.sharp.method import SharpMethod
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
 from tests.support.scenes import HALF_SPACE, of_paper
 
-
-@pytest.fixture(scope="module")
-def profile():
-    return of_paper(1, ratio=10)
+PROFILE = of_paper(1, ratio=10)
 
 
 def random_gaps(count, contact, spread, seed=0):
@@ -32,19 +29,15 @@ def random_gaps(count, contact, spread, seed=0):
     return np.concatenate([[0.1], ends[:-1]]).reshape(-1, 2)
 
 
-def solved(source, gaps, separation, tolerance):
-    model = FieldModel(FIXED_SEPARATION, -np.log(tolerance), source.panels)
-    return solve_field(gaps, separation, model), model
-
-
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
 @pytest.mark.parametrize("gaps", [(5, 0.3, 0.5), (41, 0.3, 0.5), (24, 0.01, 0.5), (32, 0.2, 2.0)])
-def test_field_equals_the_dense_one(profile, gaps, tolerance):
+def test_field_equals_the_dense_one(gaps, tolerance):
     """From a few gaps to many, even and uneven, narrow patches and wide: to the tolerance."""
-    source = StressSource(profile, tolerance)
-    separation = 0.5 * profile.h_max * profile.q0
+    source = StressSource(PROFILE, tolerance)
+    separation = 0.5 * PROFILE.h_max * PROFILE.q0
     ends = random_gaps(*gaps)
-    tree, model = solved(source, ends, separation, tolerance)
+    model = FieldModel(FIXED_SEPARATION, -np.log(tolerance), source.panels)
+    tree = solve_field(ends, separation, model)
     dense = solve_densely(ends, separation, model)
     scale = np.abs(dense.edge_opening).max()
     assert np.abs(tree.edge_opening - dense.edge_opening).max() < 2 * tolerance * scale
@@ -52,9 +45,9 @@ def test_field_equals_the_dense_one(profile, gaps, tolerance):
     assert tree.unit_mean == pytest.approx(dense.unit_mean, rel=2 * tolerance)
 
 
-def test_work_grows_as_the_number_of_gaps(profile):
+def test_work_grows_as_the_number_of_gaps():
     """Charges, and the entries of all matrices of the tree, per gap, from 100 to 3,200 gaps."""
-    edges = mechanics(profile, 1.0, 1e-5)
+    edges = mechanics(1e-5)
     share = []
     for count in (100, 3200):
         response = set_up_response(random_gaps(count, 0.3, 0.7), 1e-3, edges.law, edges.model)
@@ -65,17 +58,17 @@ def test_work_grows_as_the_number_of_gaps(profile):
     assert share[1][1] < 1.25 * share[0][1]
 
 
-def mechanics(profile, toughness, tolerance=1e-6):
-    """Edges of a critical opening in units of that of a crack one shortest wave long."""
-    source = StressSource(profile, tolerance)
+def mechanics(tolerance):
+    """Edges with the critical opening of a crack one shortest wave long."""
+    source = StressSource(PROFILE, tolerance)
     scale = np.sqrt(source.m2 * 2 * np.pi / source.top)
-    return EdgeMechanics(source, toughness * scale, tolerance)
+    return EdgeMechanics(source, scale, tolerance)
 
 
-def test_newton_step_and_stability_equal_the_dense_ones(profile):
+def test_newton_step_and_stability_equal_the_dense_ones():
     """Steps of all edges to 1e-3, and the same verdict, on stable and unstable states."""
-    edges = mechanics(profile, 1.0, 1e-9)
-    separation = 3 * profile.h_max * profile.q0
+    edges = mechanics(1e-9)
+    separation = 3 * PROFILE.h_max * PROFILE.q0
     verdicts = set()
     for seed in range(12):
         gaps = random_gaps(6, 0.1 + 0.06 * seed, 0.1, seed)
@@ -94,12 +87,12 @@ def test_newton_step_and_stability_equal_the_dense_ones(profile):
 
 
 @pytest.mark.parametrize("device", [FIXED_SEPARATION, LoadingDevice(1.0, 0.7)])
-def test_the_tangent_of_some_edges_is_the_dense_one_of_all_condensed(profile, device):
+def test_the_tangent_of_some_edges_is_the_dense_one_of_all_condensed(device):
     """Some edges held, all others following: a Schur complement of the tangent of all edges."""
-    edges = mechanics(profile, 1.0, 1e-9)
+    edges = mechanics(1e-9)
     edges.model = FieldModel(device, edges.model.digits, edges.model.panels)
     gaps = random_gaps(9, 0.5, 0.3, 3)
-    separation = 3 * profile.h_max * profile.q0
+    separation = 3 * PROFILE.h_max * PROFILE.q0
     response = set_up_response(gaps, separation, edges.law, edges.model)
     whole = dense_tangent(gaps, separation, edges)
     for some in (np.array([3]), np.array([2, 3, 11]), np.arange(5, 9), np.arange(gaps.size)):
@@ -111,12 +104,12 @@ def test_the_tangent_of_some_edges_is_the_dense_one_of_all_condensed(profile, de
 
 
 @pytest.fixture(scope="module")
-def loaded(profile):
+def loaded():
     """Many patches in equilibrium, under weak adhesion: method and state."""
-    method = SharpMethod(Problem(profile, HALF_SPACE, 1e-3), accuracy=1e-4)
-    state = method.detached(profile.h_max)
+    method = SharpMethod(Problem(PROFILE, HALF_SPACE, 1e-3), accuracy=1e-4)
+    state = method.detached(PROFILE.h_max)
     for depth in (0.0, 0.3, 0.5):
-        state = method.follow(state, profile.h_max * (1 - depth)).states[-1]
+        state = method.follow(state, PROFILE.h_max * (1 - depth)).states[-1]
     return method, state
 
 
