@@ -28,10 +28,8 @@ sys.dont_write_bytecode = False
 gc.disable()
 
 # Tests send signals: what nohup or a shell's background ignores would be ignored by them, too.
-for number, handler in (
-    (signal.SIGHUP, signal.SIG_DFL),
-    (signal.SIGINT, signal.default_int_handler),
-):
+HANDLERS = {signal.SIGHUP: signal.SIG_DFL, signal.SIGINT: signal.default_int_handler}
+for number, handler in HANDLERS.items():
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
 

@@ -171,7 +171,8 @@ CASES = [
 ]
 
 
-def with_keys(changes: str) -> str:
+@pytest.mark.parametrize(("changes", "sentence"), CASES, ids=[changes for changes, _ in CASES])
+def test_keys_that_are_impossible_together_are_refused_by_name(changes, sentence, tmp_path):
     text = campaign_text()
     for change in changes.split(";"):
         key, _, value = (word.strip() for word in change.partition("="))
@@ -182,13 +183,8 @@ def with_keys(changes: str) -> str:
         text = text if f"[{table}]" in text else f"{text}\n[{table}]\n"
         if value:
             text = text.replace(f"[{table}]\n", f"[{table}]\n{key} = {value}\n")
-    return text
-
-
-@pytest.mark.parametrize(("changes", "sentence"), CASES, ids=[changes for changes, _ in CASES])
-def test_keys_that_are_impossible_together_are_refused_by_name(changes, sentence, tmp_path):
     path = tmp_path / "c.toml"
-    path.write_text(with_keys(changes))
+    path.write_text(text)
     with pytest.raises(InputError) as refusal:
         load_campaign(path)
     assert sentence in str(refusal.value)

@@ -303,10 +303,8 @@ def test_units_are_asked_for_on_every_way_in(tmp_path):
     assert adhesis.Campaign(with_unit).tables.sweep.work_of_adhesion == (0.04,)
 
 
-def _inside_itself():
-    values: list[Any] = [0.7]
-    values.append(values)
-    return values
+INSIDE_ITSELF: list[Any] = [0.7]
+INSIDE_ITSELF.append(INSIDE_ITSELF)
 
 
 def _nested(depth):
@@ -319,7 +317,7 @@ class _Printed(float):
 
 
 @pytest.mark.parametrize(
-    "values", [_inside_itself(), _nested(20), _nested(100_000), ["\ud800"], "\0", [b"a"], {"a": 1}]
+    "values", [INSIDE_ITSELF, _nested(20), _nested(100_000), ["\ud800"], "\0", [b"a"], {"a": 1}]
 )
 def test_a_value_that_no_key_has_is_refused_in_one_sentence(values):
     with pytest.raises(InputError) as error:

@@ -64,7 +64,7 @@ MADE: dict[str, Callable[[Path], None]] = {
     "link to nothing": lambda path: path.symlink_to("apart/new"),
     "link to itself": lambda path: path.symlink_to(path.name),
     "link of another user": lambda path: _shared(path, "apart/precious"),
-    "link to that of another user": lambda path: _chained(path),
+    "link to that of another user": _chained,
     "second name": lambda path: path.hardlink_to("apart/precious"),
 }
 NAMED = {

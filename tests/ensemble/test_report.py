@@ -443,8 +443,10 @@ def test_the_page_embeds_every_figure_that_exists(report):
         assert len({line.count("|") for line in table.splitlines()}) == 1
     assert "19.36" in page
     first = page[: page.index("](fig")].index("](table1_losses.pdf)")
-    told = f"The number in the name of its file, as in fig3 or table1, is that of {paper.REFERENCE}"
-    assert told in page[:first]
+    sentence = (
+        f"The number in the name of its file, as in fig3 or table1, is that of {paper.REFERENCE}"
+    )
+    assert sentence in page[:first]
     assert page.count("The number in the name") == 1
     assert "better than from two independent sets of profiles" in page
     assert "nan" not in page.replace("nano", "")
@@ -718,8 +720,8 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     assert warning.startswith("WARNING: 5 of 8 losses")
     assert [row["row"] for row in status["beyond_limit"]] == [4, 7, 5, 2, 6]
     ranges = "valid_range, edge_range, touch_range or turn_range"
-    told = f"5 losses are doubtful: {ranges} is below 1e-09 m"
-    assert told in as_text(status)
+    doubt = f"5 losses are doubtful: {ranges} is below 1e-09 m"
+    assert doubt in as_text(status)
     assert "touch_range 4e-10 m" in as_text(status)
     assert "row 6: H = 0.7, γ = 0.02 J/m², realisation 2" in as_text(status)
     assert "no finite range, loss 0.21 J/m²" in as_text(status)

@@ -318,7 +318,7 @@ def test_the_noted_version_is_not_written_anew_beside_rows_that_are_left(real: S
 
 
 def test_a_run_of_somebody_else_and_a_job_do_not_destroy_each_other(real: Site) -> None:
-    """The other run is not told of STAGING; it writes to the results file itself."""
+    """The other run has no STAGING; it writes to the results file itself."""
     by_hand = real.run_by_hand()
     results = real.folder / "s.h5"
     wait_until(lambda: done_rows(results) == 3)

@@ -91,7 +91,7 @@ def test_a_law_that_keeps_its_contract_is_taken() -> None:
 
 @pytest.mark.parametrize("phase", [0.0, 0.5])
 def test_equal_parts_and_mirror_images_are_those_that_a_law_of_its_own_shares(phase: float) -> None:
-    """Both crests were taken to be alike, and to touch at once, although adhesion tells them."""
+    """Both crests were taken to be alike, and to touch at once, although adhesion parts them."""
 
     def work(theta: float, recedes: bool) -> tuple[float, float]:
         return 1 + 0.3 * np.cos(theta + phase), -0.3 * np.sin(theta + phase)
