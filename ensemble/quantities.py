@@ -283,7 +283,6 @@ UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 _TURNING = ("turning_point", "turning_points", "start", "turn")
 _TWO_DIGITS = 2.95  # an error below has two significant digits
 _MOST_PLACES = 9
-_ROUNDED = 0.1  # largest share of a value that rounding to the digits of its error may change
 
 
 def units_under(is_load: bool) -> Mapping[str, str]:
@@ -408,7 +407,7 @@ def with_error(value: float, error: float, most: float = math.inf) -> str:
 
     The last digit is the first one of the error, or the second where the first is 1 or 2. Where the
     error reaches below 0 or above ``most``, the bounds of the quantity, the ends of the interval
-    are given instead: "0.995, from 0.975 to 1". A value far below its error keeps two digits.
+    are given instead: "0.995, from 0.975 to 1". What would be rounded to nought keeps two digits.
     """
     if not 0 < error < math.inf:
         return f"{value:.4g} ± {error:g}"
@@ -420,7 +419,7 @@ def with_error(value: float, error: float, most: float = math.inf) -> str:
     low, high = max(value - error, 0.0), min(value + error, most)
     if 0 <= value <= most and high - low < 2 * error * (1 - 1e-9):
         middle, *ends = (f"{round(part, places):.{shown}f}" for part in (value, low, high))
-        if abs(round(value, places) - value) > _ROUNDED * value:  # it may be far below its error
+        if round(value, places) == 0 < value:
             middle = f"{float(f'{value:.2g}'):g}"
         return f"{middle}, from {ends[0]} to {ends[1]}"
     value = round(value, places) + 0.0  # no sign of a nought

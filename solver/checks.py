@@ -385,7 +385,7 @@ def row(
         if None in found:
             index = found.index(None)
             raise TypeError(_sentence(f"{name}[{index}]", array[index], "a real number"))
-        return np.array(found, dtype=np.float64)
+        return np.array(found, dtype=np.complex128 if imaginary else np.float64)
     if array.dtype.kind not in ("fiuc" if imaginary else "fiu"):
         kinds = {"b": "booleans", "c": "complex numbers", "U": "texts", "S": "texts"}
         held = kinds.get(array.dtype.kind, str(array.dtype))

@@ -42,18 +42,26 @@ def _widths(opening: Opening, bins: Array) -> Array:
     far = np.sqrt(np.clip((opening.x[-1] - opening.x) / width, 0, 1))
     phi = 2 * np.where(near < far, np.arcsin(near), np.arccos(far))
     low, high = opening.gap[:-1], opening.gap[1:]
-    bottom, top, step = np.minimum(low, high), np.maximum(low, high), np.diff(phi)
-    start, way = np.where(high >= low, (phi[:-1], step), (phi[1:], -step))
-    whole = np.sin(start + way / 2) * np.sin(step / 2)
-
-    def below(bound: float) -> float:
-        """Compute the length on which the gap is at most this."""
-        cut = np.flatnonzero((bottom < bound) & (bound < top))
-        share = (bound - bottom[cut]) / (top - bottom)[cut] / 2
-        part = np.sin(start[cut] + way[cut] * share) * np.sin(step[cut] * share)
-        return float(width * (whole[top <= bound].sum() + part.sum()))
-
-    return np.diff([0.0, *map(below, bins[1:-1]), below(np.inf)])
+    inner = bins[1:-1]
+    first = np.searchsorted(inner, np.minimum(low, high), side="right")
+    last = np.searchsorted(inner, np.maximum(low, high), side="left")
+    # Each interval is cut into one piece per bin, where t crosses the bin's bounds.
+    pieces = np.maximum(last - first, 0) + 1  # one of a constant gap on a bound
+    interval = np.repeat(np.arange(low.size), pieces)
+    offset = np.arange(interval.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    number = np.repeat(first, pieces) + offset
+    bounds = np.concatenate([[-np.inf], inner, [np.inf]])
+    bottom, top = np.minimum(low, high)[interval], np.maximum(low, high)[interval]
+    rise = np.where(top > bottom, top - bottom, 1.0)
+    begin = (np.maximum(bounds[number], bottom) - bottom) / rise
+    end = (np.minimum(bounds[number + 1], top) - bottom) / rise
+    end = np.where(top > bottom, end, 1.0)
+    rising = (high >= low)[interval]
+    step = np.diff(phi)[interval]
+    one = phi[:-1][interval] + step * np.where(rising, begin, 1 - end)
+    two = phi[:-1][interval] + step * np.where(rising, end, 1 - begin)
+    length = width * np.sin((one + two) / 2) * np.sin((two - one) / 2)
+    return np.asarray(np.bincount(number, length, minlength=bins.size - 1), dtype=np.float64)
 
 
 def openings_between(

@@ -220,8 +220,8 @@ class ContactSolver:
             curvature = dot(direction, response)
             if curvature <= 0:
                 raise PathError(
-                    "method 'grid' has no free node left: full contact has no solution at a mean "
-                    "gap; more nodes, or a smaller turning point, leave one"
+                    "method 'grid' has no free node left: contact is full, or was on the way of a "
+                    "long step; more load steps or nodes, or a smaller turning point, leave one"
                 )
             step = rz / curvature
             largest = advance(stress, displacement, residual, direction, response, inside, step)

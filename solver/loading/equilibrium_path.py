@@ -296,7 +296,7 @@ class EquilibriumPath(ByValue, ResultViews):
 
     def range_warnings(self) -> list[str]:
         """Return sentences where the range of adhesion may matter more than the model knows."""
-        tension = max(0.0, float(-self.mean_stress.min()))
+        tension = 0.0 if self.patches[-1] else max(0.0, float(-self.mean_stress.min()))
         lost = self.lost - stored_at_pull_off(tension, self.problem.control.stiffness)
         given = self.problem, self.valid_range, lost, self.contact_fraction
         found = range_warnings(*given, *self.outer_ranges)

@@ -27,7 +27,6 @@ from adhesis.solver.method import (
     PathError,
 )
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import one_at_a_time
 from adhesis.solver.sharp.adhesion import adhesion_of, check_adhesion, symmetry_of
@@ -242,16 +241,19 @@ class SharpMethod(Method):
         point = self.follower.recall_point(state.internal)
         if not state.patches:
             touch, highest = self.jumps.first_touch()
-            gaps = np.empty((0, 2))
-            start = self.nucleation.insert(gaps, highest)
             first = 0.0 if control.is_load else touch
-            if self.problem.work_of_adhesion == 0:
-                first, touch = self._first_carried(start, first)
             if target.direction == "unloading" or target.d > first:
                 apart = self.problem.detached_separation(state, target.prescribed)
                 history.states.append(self.detached(apart))
                 return history
-            d = first
+            d, gaps = first, np.empty((0, 2))
+            start = self.nucleation.insert(gaps, highest)
+            may_leave = self.problem.work_of_adhesion == 0 and not control.is_fixed
+            if may_leave and not self.edges.solution(start, d).edge_opening.mean() <= 0:
+                raise PathError(
+                    "without adhesion the method 'sharp' finds no first patches under a load, or "
+                    "where a soft stiffness holds the solid; the method 'grid' does"
+                )
             event = Event(self.states.detached(touch), d, gaps, start)
             point = history.commit(self.jumps.compute(event, target.direction))
         else:
@@ -274,16 +276,6 @@ class SharpMethod(Method):
                 raise NoState("contact is lost where surfaces overlap", d)
             history.states.append(self.detached(target.prescribed))
         return history
-
-    def _first_carried(self, seeds: Array, d: float) -> tuple[float, float]:
-        """Return d and q0 s from which on seeds without adhesion hold, at or beyond ``d``.
-
-        They do at first touch, unless what holds the solid is so soft that it carries less there.
-        """
-        near, further = (self.edges.solution(seeds, place) for place in (d, d - 1.0))
-        opening, other = (float(field.edge_opening.mean()) for field in (near, further))
-        share = max(opening, 0.0) / (opening - other)  # fields of given gaps are linear in d
-        return d - share, near.separation + share * (further.separation - near.separation)
 
     def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
         """Follow a path without adhesion, whose states are unique and do not jump.

@@ -190,7 +190,12 @@ def test_kills_at_random_moments(tmp_path, victim):
     assert here(path, whole).done == 16
     killed = 0
     while killed < KILLS:
-        done = rows_done(out)
+        done = set[str]()  # tasks as the fake task's log has them
+        if out.exists():
+            with Results(out) as results:
+                rows = zip(results.tasks(), results.status(), strict=True)
+                found = (task for task, status in rows if status == DONE)
+                done = {f"{t.hurst}:{t.work_of_adhesion}:{t.realisation}" for t in found}
         log = tmp_path / f"log{killed}"
         log.touch()
         process = start("run", path, "--out", out, ranks=3, fake=f"step=0.06 log={log}")
@@ -210,18 +215,6 @@ def test_kills_at_random_moments(tmp_path, victim):
             out.unlink()
     assert adhesis("run", path, "--out", out, ranks=3, fake="").returncode == 0
     assert differences(out, whole) == []
-
-
-def rows_done(path) -> set[str]:
-    """Return the done tasks of a results file as the fake task's log has them."""
-    if not path.exists():
-        return set()
-    with Results(path) as results:
-        return {
-            f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}"
-            for task, status in zip(results.tasks(), results.status(), strict=True)
-            if status == DONE
-        }
 
 
 def test_an_error_that_is_not_a_tasks_ends_the_job(tmp_path):

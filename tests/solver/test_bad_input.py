@@ -469,6 +469,7 @@ def test_equal_values_are_equal_and_have_equal_hashes() -> None:
     other = Problem(single_wave(AMPLITUDE, PERIOD), HalfSpace(1e6, 0.5), 0.04)
     pairs: list[tuple[Any, Any]] = [
         (WAVE, single_wave(AMPLITUDE, PERIOD)),
+        (WAVE, Profile(PERIOD, [Fraction(0), Fraction(AMPLITUDE) / 2])),
         (SOLID, HalfSpace(1e6, 0.5)),
         (PROBLEM, other),
         (one_loop(), run_loop(ExactWave(other), max_penetration=0.5, load_steps=4)),

@@ -10,6 +10,7 @@ from adhesis import (
     Control,
     HalfSpace,
     LoopResult,
+    PathError,
     Problem,
     Profile,
     make_method,
@@ -114,15 +115,16 @@ def test_the_two_methods_agree_under_every_control(relative):
     assert grid.pull_off_stress == pytest.approx(sharp.pull_off_stress, rel=0.01)
 
 
-@pytest.mark.parametrize("method", ["grid", "sharp"])
 @pytest.mark.parametrize("stiffness", [0.0, 1e6])
-def test_a_wave_without_adhesion_carries_a_weight_as_westergaard_has_it(method, stiffness):
+def test_a_wave_without_adhesion_carries_a_weight_as_westergaard_has_it(stiffness):
     """What holds the solid is so soft that first touch carries next to nothing."""
     pressed = 300.0
     control = Control(stiffness)
     turn = {"preload": pressed} if stiffness else {"max_stress": pressed}
     problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, 0.0, control)
-    loop = run_loop(make_method(method, problem), **turn, load_steps=5)
+    with pytest.raises(PathError, match="without adhesion the method 'sharp' finds no first"):
+        run_loop(make_method("sharp", problem), **turn, load_steps=5)
+    loop = run_loop(make_method("grid", problem), **turn, load_steps=5)
     share = pressed / (np.pi * 1e6 * AMPLITUDE / PERIOD)
     turning = int(np.argmax(loop.mean_stress))
     assert loop.turning_stress == pytest.approx(pressed)

@@ -140,6 +140,8 @@ def test_a_loss_of_a_soft_machine_is_not_taken_for_that_of_closed_valleys(stiffn
     assert loop.loss > 20 * 1e-3 * loop.largest_contact_fraction
     assert loop.pull_off_stress**2 / (2 * stiffness) == pytest.approx(loop.loss, rel=0.3)
     assert loop.range_warnings() == []
+    (doubt,) = replace(loop, patches=np.ones_like(loop.patches)).range_warnings()
+    assert "valleys" in doubt  # what stays in contact has lost none of it
 
 
 def test_where_and_when_are_those_of_a_state_also_of_a_path_and_of_one_loading_branch():
