@@ -106,7 +106,7 @@ def main() -> None:
     started = process_time()
     loop = _loop(run)
     measured = Measurement(
-        *(process_time() - started, peak_bytes() / _MB, before / _MB),
+        *(process_time() - started, max(before, peak_bytes()) / _MB, before / _MB),
         *(loop.loss, loop.loss_dimensionless, loop.audit_residual),
         solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
         jumps=len(loop.jumps),
