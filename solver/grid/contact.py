@@ -17,14 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver._kernels import (
-    advance,
-    dot,
-    residual_inside,
-    restrict,
-    total,
-    update_direction,
-)
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
@@ -157,8 +149,8 @@ class ContactSolver:
             target = self.height - contact.separation
             displacement = contact.displacement
         # The elastic energy is the maximum over σ of ∫σ(h - s) - ½∫σv: errors enter quadratically.
-        contact.elastic_energy = self.elastic.dx * (
-            dot(stress, target) - 0.5 * dot(stress, displacement)
+        contact.elastic_energy = self.elastic.dx * float(
+            (stress * target).sum() - 0.5 * (stress * displacement).sum()
         )
 
     def _adjust_separation(
@@ -170,8 +162,7 @@ class ContactSolver:
         response.displacement, residual, _ = self._solve(
             inside, response.stress, response.displacement, unit, most / scale, np.inf
         )
-        n = self.elastic.n
-        mean, per_separation = total(contact.stress) / n, total(response.stress) / n
+        mean, per_separation = float(contact.stress.mean()), float(response.stress.mean())
         control = self.control
         if control.is_load:
             if per_separation == 0:
@@ -201,30 +192,34 @@ class ContactSolver:
         the largest residual in m, and the energy gained by the last iteration in J/m.
         """
         elastic = self.elastic
-        if not restrict(stress, inside):
+        if stress[inside == 0].any():
+            stress *= inside
             displacement = elastic.displacement(stress)
         displacement = displacement.copy()
-        residual = np.empty_like(stress)
-        largest = residual_inside(target, displacement, inside, residual)
+        residual = (target - displacement) * inside
         direction = np.zeros_like(residual)
-        rz_before = 0.0
+        rz_before = np.inf
         gain = np.inf
         for _ in range(_MAX_ITERATIONS):
+            largest = float(np.abs(residual).max())
             if (largest <= most and gain <= energy_tolerance) or largest <= _NEGLIGIBLE * most:
                 break
             correction = elastic.precondition(residual)
-            rz = dot(residual, correction)
-            factor = rz / rz_before if rz_before else 0.0
-            update_direction(direction, inside, correction, factor)
+            rz = float((residual * correction).sum())
+            direction *= rz / rz_before
+            direction += inside * correction
             response = elastic.displacement(direction)
-            curvature = dot(direction, response)
+            curvature = float((direction * response).sum())
             if curvature <= 0:
                 raise PathError(
                     "method 'grid' has no free node left: contact is full, or was on the way of a "
                     "long step; more load steps or nodes, or a smaller turning point, leave one"
                 )
             step = rz / curvature
-            largest = advance(stress, displacement, residual, direction, response, inside, step)
+            stress += step * direction
+            response *= step
+            displacement += response
+            residual -= inside * response
             # Twice the energy gained by one iteration bounds the sum of all later gains, which
             # fall faster than by two thirds each. The residual alone is a poor measure near full
             # contact, where V is nearly singular for a uniform one.

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver._kernels import dot, total
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.elasticity import ElasticGrid
@@ -75,13 +74,13 @@ class Lattice:
         """
         if contact.response is None or not contact.mask.any():
             return 0.0, np.zeros(nodes.size)
-        k, per_separation = self.control.stiffness, total(contact.response.stress) / self.n
+        k, per_separation = self.control.stiffness, float(contact.response.stress.mean())
         gap_rate = 1 - contact.response.displacement[nodes]
         return self.dx / (self.elastic.period * (k + per_separation)), gap_rate
 
     def conjugate(self, contact: Contact) -> float:
         """Compute Y of ``control``: p̄ in Pa, under a load s - h_max in m."""
-        mean_stress = total(contact.stress) / self.n
+        mean_stress = float(contact.stress.mean())
         return self.control.conjugate(contact.separation, mean_stress, self.h_max)
 
     def gap(self, contact: Contact, nodes: NDArray[np.intp] | slice = slice(None)) -> Array:
@@ -90,7 +89,7 @@ class Lattice:
 
     def adhesion_energy(self, contact: Contact) -> float:
         """Compute the energy of adhesion of the contact nodes, in J/m."""
-        return float(-self.dx * dot(self.adhesion, contact.mask.astype(np.float64)))
+        return -self.dx * float(self.adhesion[contact.mask].sum())
 
     def energy(self, contact: Contact) -> float:
         """Compute W of ``control`` in J/m, per period: U at fixed separation.
@@ -100,7 +99,7 @@ class Lattice:
         energy = contact.elastic_energy + self.adhesion_energy(contact)
         if self.control.is_load and contact.prescribed > 0 and not contact.mask.any():
             return -np.inf
-        mean_stress = total(contact.stress) / self.n
+        mean_stress = float(contact.stress.mean())
         return self.control.potential(
             energy, contact.separation, mean_stress, self.h_max, self.elastic.period
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver._kernels import total
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.patches import patch_ranges
@@ -32,7 +31,7 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
     period = lattice.elastic.period
     left, right = left + wrapped * period, right + wrapped * period
     order = np.argsort(left, kind="stable")
-    mean_stress = total(contact.stress) / lattice.n
+    mean_stress = float(contact.stress.mean())
     hold = lattice.control.potential(0.0, contact.separation, mean_stress, lattice.h_max, period)
     area = float(width.sum()) - 2 * EDGE_OFFSET * first.size
     return ContactState(

@@ -15,7 +15,6 @@
 #include "clearance.hpp"
 #include "descent.hpp"
 #include "edge_model.hpp"
-#include "grid.hpp"
 #include "predictor.hpp"
 
 namespace nb = nanobind;
@@ -76,20 +75,6 @@ struct ArrayCaster {
   static handle from_cpp(const Vector& values, rv_policy, cleanup_list* cleanup) noexcept {
     auto out = adhesis::hand_over(std::vector<Number>(values.begin(), values.end()));
     return make_caster<decltype(out)>::from_cpp(out, rv_policy::automatic, cleanup);
-  }
-};
-
-// Numbers that are read, or changed in place, where they are.
-template <class Number>
-struct type_caster<std::span<Number>> {
-  NB_TYPE_CASTER(std::span<Number>, const_name("numpy.typing.NDArray[numpy.float64]"))
-  make_caster<ndarray<Number, c_contig, device::cpu>> array;
-
-  bool from_python(handle from, uint32_t flags, cleanup_list* cleanup) noexcept {
-    if (!std::is_const_v<Number>) flags &= ~uint32_t(cast_flags::convert);
-    if (!array.from_python(from, flags, cleanup)) return false;
-    value = {array.value.data(), array.value.size()};
-    return true;
   }
 };
 
@@ -480,19 +465,6 @@ void bind_predictor(nb::module_& m) {
       .def("across", &Predictor::across, "distance"_a, "resolution"_a);
 }
 
-void bind_grid(nb::module_& m) {
-  m.def(
-      "dot", [](Numbers a, Numbers b) { return dot(a.data(), b.data(), int(a.size())); }, "a"_a,
-      "b"_a);
-  m.def("total", &total, "values"_a);
-  m.def("restrict", &restrict_inside, "values"_a, "inside"_a);
-  m.def("residual_inside", &residual_inside, "target"_a, "displacement"_a, "inside"_a, "out"_a);
-  m.def("update_direction", &update_direction, "direction"_a, "inside"_a, "correction"_a,
-        "factor"_a);
-  m.def("advance", &advance, "stress"_a, "displacement"_a, "residual"_a, "direction"_a,
-        "response"_a, "inside"_a, "step"_a);
-}
-
 // Single parts, for their tests.
 void bind_parts(nb::module_& m) {
   m.def(
@@ -527,7 +499,7 @@ void bind_parts(nb::module_& m) {
 
 NB_MODULE(_kernels, m) {
   nb::set_leak_warnings(false);  // objects of a module live until the process ends
-  m.doc() = "Kernels of the methods sharp and grid.";
+  m.doc() = "Kernels of the method sharp.";
   m.attr("COMPILER") = ADHESIS_COMPILER;
   m.attr("CLOSING_SHARE") = adhesis::CLOSING_SHARE;
   m.attr("ELSEWHERE") = adhesis::ELSEWHERE;
@@ -539,6 +511,5 @@ NB_MODULE(_kernels, m) {
   adhesis::bind_response(m);
   adhesis::bind_nucleation(m);
   adhesis::bind_predictor(m);
-  adhesis::bind_grid(m);
   adhesis::bind_parts(m);
 }
