@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from operator import itemgetter
 from typing import Any, Self, overload
 
 import numpy as np
@@ -39,7 +38,7 @@ def task_seed(campaign_seed: int, realisation: int) -> int:
     return int(sequence.generate_state(1, np.uint64)[0] >> 11)
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True)
 class Task:
     """One loop to compute."""
 
@@ -114,7 +113,7 @@ class Tasks(Sequence[Task]):
         """Return the first task of each cell, ascending, and the places of all its tasks."""
         changes = np.flatnonzero(np.diff(self.cell_of())) + 1
         places = np.split(np.arange(len(self)), changes)
-        return sorted(((self[int(of_cell[0])], of_cell) for of_cell in places), key=itemgetter(0))
+        return list(zip(self.of_cells(), places, strict=True))
 
     def of_cells(self) -> Tasks:
         """Return the first task of each cell."""
