@@ -318,8 +318,8 @@ class Campaign:
     """A checked campaign. Built by :mod:`adhesis.ensemble.campaign.file`.
 
     Equal if they mean the same; ``text`` is the TOML as it was written. Where a key of the profile,
-    material or cycle is a list, its table holds the smallest value, ``lists`` all of them as given
-    (table, name, values), and :meth:`at` gives the campaign with the values of a task.
+    material or cycle is a list, its table holds the smallest value, ``lists`` all of them as given,
+    by key, and :meth:`at` gives the campaign with the values of a task.
     """
 
     profile: ProfileTable
@@ -329,7 +329,7 @@ class Campaign:
     solver: SolverTable
     output: OutputTable
     stop: StopTable = StopTable()
-    lists: tuple[tuple[Table, str, tuple[Value, ...]], ...] = ()
+    lists: dict[str, tuple[Value, ...]] = field(default_factory=dict)
     text: str = field(default="", compare=False, repr=False)
     _at: dict[tuple[tuple[str, Value], ...], Campaign] = field(
         default_factory=dict, init=False, compare=False, repr=False
@@ -337,8 +337,7 @@ class Campaign:
 
     @cached_property
     def _groups(self) -> list[list[Axis]]:
-        given = {f"{table}.{name}": values for table, name, values in self.lists}
-        given |= {key: self.value(key) for key in _SWEPT}
+        given = self.lists | {key: self.value(key) for key in _SWEPT}
         axes = []
         for key in _AXES:
             if key in given:
@@ -394,17 +393,11 @@ class Campaign:
         if not task.others:
             return self
         if task.others not in self._at:
-            tables: dict[str, Any] = {}
+            tables: dict[str, Any] = {"sweep": replace(self.sweep, zip=())}
             for axis, (name, value) in zip(self.axes[2:], task.others, strict=True):
                 table = tables.get(axis.table, getattr(self, axis.table))
                 tables[axis.table] = replace(table, **{name: value})
-            sweep = replace(self.sweep, zip=())
-            if self.has_axis("max_penetration"):  # the stored curves have one number of steps
-                cycle: CycleTable = tables["cycle"]
-                last = self.cycle.load_steps + 1 - self.unloading_penetration.size
-                until = cycle.turning_point * last / cycle.load_steps
-                tables["cycle"] = replace(cycle, unloading_until=until)
-            self._at[task.others] = replace(self, sweep=sweep, lists=(), **tables)
+            self._at[task.others] = replace(self, lists={}, **tables)
         return self._at[task.others]
 
     @cached_property

@@ -74,13 +74,11 @@ NOT_NUMBERS = ("true", '"wide"', "{}", "1979-05-27", "[[1]]")
 def wrong_values(entry: dataclasses.Field) -> Iterator[str]:
     """Values of a key that break its rule, as a file has them: by kind, bounds, unit and list."""
     rule, is_list = entry.metadata["rule"], "tuple" in str(entry.type)
-    wrong = list(NOT_NUMBERS)
+    wrong = [*NOT_NUMBERS, '"1 furlong"', '"1"']
     if rule.bounds is not None:
         wrong += [repr(number).lower() for number in outside(rule.bounds)]
         if rule.bounds.whole:
             wrong += ["1.0", "9" * 400]
-    if rule.quantity is not None:
-        wrong += ['"1 furlong"', '"1"']
     yield from (f"[{value}]" for value in wrong) if is_list else wrong
     if is_list:
         yield from ("0.5", "[0.5, 0.5]", "[0.0, -0.0]")
