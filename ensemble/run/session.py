@@ -14,6 +14,7 @@ from typing import Any, TextIO
 import h5py
 import numpy as np
 
+from adhesis.ensemble.aggregate.cells import precisions, read_cells
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import WriteError, parameter
@@ -195,11 +196,13 @@ class _Session:
         What a run has finished is read once more: another program may have written to the file
         (InputError, WriteError), or have copied an older one over rows that the run wrote.
         """
-        summary, batches = self._counts, self.plan.batches
-        if self.plan.rows:
+        summary = self._counts
+        if self.plan.rows or self.plan.batches is not None:
             with Results(path) as results:
                 finished = int(np.isin(results.status(), (DONE, FAILED)).sum())
                 checksums = results.column(CHECKSUM.name)
+                if self.plan.batches is not None:
+                    summary.precisions = precisions(read_cells(results))
             other = sum(checksums[row] != known for row, known in self._written.items())
             count = summary.done + summary.failed
             if (held := min(finished, count - other)) < count:
@@ -209,7 +212,6 @@ class _Session:
                 )
         summary.seconds = time.monotonic() - self._started
         summary.stopped = stopped if summary.pending else None
-        summary.precisions = () if batches is None else tuple(batches.precisions)
         return summary
 
     def _write(self, outcome: Outcome) -> Outcome:
