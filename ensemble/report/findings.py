@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops, precisions
-from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
