@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Self, overload
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ class Task:
 
 
 @dataclass(frozen=True, eq=False)
-class Tasks(Sequence[Task]):
+class Tasks:
     """Tasks of a campaign by number; each is made when it is asked for.
 
     So a campaign of millions of tasks can be refused, or priced, before they take memory.
@@ -78,13 +78,10 @@ class Tasks(Sequence[Task]):
     def __len__(self) -> int:
         return len(self.rows)
 
-    @overload
-    def __getitem__(self, place: int) -> Task: ...
-    @overload
-    def __getitem__(self, place: slice) -> Tasks: ...
-    def __getitem__(self, place: int | slice) -> Task | Tasks:
-        if isinstance(place, slice):
-            return self.chosen(self.rows[place])
+    def __iter__(self) -> Iterator[Task]:
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, place: int) -> Task:
         cell, realisation = divmod(int(self.rows[place]), self.realisations)
         hurst, gamma, *others = self.cells[cell]
         seed = task_seed(self.seed, realisation)

@@ -6,13 +6,13 @@ is complete, whatever the number of ranks and of restarts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import count
 
 from adhesis.ensemble.campaign.precision import enough, looks
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.tasks import Tasks
 
 
 @dataclass
@@ -35,9 +35,7 @@ class Batches:
     of those that failed.
     """
 
-    def __init__(
-        self, campaign: Campaign, tasks: Sequence[Task], values: Mapping[int, float]
-    ) -> None:
+    def __init__(self, campaign: Campaign, tasks: Tasks, values: Mapping[int, float]) -> None:
         assert campaign.stop.relative_error is not None
         self._wanted = campaign.stop.relative_error
         self._looks = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -16,7 +16,7 @@ import numpy as np
 
 from adhesis.ensemble.aggregate.cells import precisions, read_cells
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.tasks import Task, Tasks
 from adhesis.ensemble.errors import WriteError, parameter
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.read import Results
@@ -112,7 +112,7 @@ def run_campaign(
 
 
 def _compute(
-    loop: ComputeLoop, campaign: Campaign, tasks: Sequence[Task], row: int, check: StopCheck
+    loop: ComputeLoop, campaign: Campaign, tasks: Tasks, row: int, check: StopCheck
 ) -> Row:
     """Compute a task of a campaign as the hand-out asks for it."""
     return loop(campaign, tasks[row], lambda *_: check())
