@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
+from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import field_plan
@@ -334,6 +335,14 @@ def test_every_list_is_an_axis():
     assert len({t.seed for t in tasks}) == 2  # the same phases along every axis
     one = parse_campaign(campaign_text(ratio="[4]"))
     assert one == parse_campaign(campaign_text(ratio="4"))
+
+
+def test_cells_of_a_part_ascend_though_their_first_realisations_differ():
+    campaign = parse_campaign(campaign_text(hurst="[0.7]", ratio="[4, 8]", realisations="3"))
+    tasks = campaign.tasks(Part(2, 2))
+    firsts = [(task.work_of_adhesion, task.others) for task, _ in tasks.by_cell()]
+    assert firsts == sorted(firsts)
+    assert [task.realisation for task, _ in tasks.by_cell()][:2] == [1, 0]
 
 
 def test_lists_vary_together_where_that_is_asked_for():
