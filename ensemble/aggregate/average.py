@@ -33,8 +33,7 @@ from adhesis.ensemble.aggregate.companions import (
     difference,
     read_companion,
 )
-from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tables import Axis, Campaign
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
 from adhesis.ensemble.task.dataset import KEPT

@@ -138,6 +138,12 @@ class Cell:
         return precision(values, stop.relative_error, stop.quantity, finished=not self.pending)
 
 
+def precisions(cells: Iterable[Cell]) -> list[tuple[str, Precision]]:
+    """Return name and precision of every cell; none without ``[stop]``."""
+    known = ((cell.name, cell.precision) for cell in cells)
+    return [(name, precision) for name, precision in known if precision is not None]
+
+
 def doubtful_loops(cells: Iterable[Cell]) -> list[tuple[Cell, int]]:
     """Return the loops with a doubtful loss, as cell and place in it, the worst first."""
     return _sorted((-cell.doubt, cell.doubtful, cell) for cell in cells)

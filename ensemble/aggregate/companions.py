@@ -14,10 +14,9 @@ from typing import Any, Literal
 import numpy as np
 
 from adhesis.ensemble.aggregate.cells import Cell, finished_cells
-from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.compare import differing
 from adhesis.ensemble.campaign.rules import shown
-from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tables import Axis, Campaign
 from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 

@@ -90,12 +90,12 @@ def _campaign_of(document: dict[str, Any], text: str) -> Campaign:
         if name not in TABLES:
             known = ", ".join(f"[{t}]" for t in TABLES)
             raise InputError(f"{shown(name)} is unknown; the tables are {known}")
-    lists: list[tuple[Table, str, tuple[float, ...]]] = []
+    lists: dict[str, tuple[float, ...]] = {}
     tables = {name: _read_table(name, document.get(name, {}), lists) for name in TABLES}
     _check_zip(tables["sweep"], lists)
     if "stop" in document and tables["stop"].relative_error is None:
         raise InputError("[stop] relative_error is missing: it must be a number between 0 and 1")
-    campaign = Campaign(text=text, lists=tuple(lists), **tables)
+    campaign = Campaign(text=text, lists=lists, **tables)
     _check_together(campaign)
     return campaign
 
@@ -145,9 +145,7 @@ def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
         )
 
 
-def _read_table(
-    name: Table, entries: object, lists: list[tuple[Table, str, tuple[float, ...]]]
-) -> Any:
+def _read_table(name: Table, entries: object, lists: dict[str, tuple[float, ...]]) -> Any:
     """Check a table; of an axis it gets the smallest value, and ``lists`` gets all of them."""
     kind = TABLES[name]
     if not isinstance(entries, dict):
@@ -164,7 +162,7 @@ def _read_table(
             several = list_of(metadata["rule"])(where, value)
             values[key] = min(several)
             if len(several) > 1:
-                lists.append((name, key, several))
+                lists[f"{name}.{key}"] = several
         else:
             values[key] = metadata["rule"](where, value)
     for key, entry in known.items():
@@ -194,9 +192,9 @@ def _check_lists(campaign: Campaign, document: dict[str, Any]) -> None:
             )
 
 
-def _check_zip(sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...]]]) -> None:
+def _check_zip(sweep: SweepTable, lists: dict[str, tuple[float, ...]]) -> None:
     """Check that the keys which are to vary together are axes of one length."""
-    length = {name: len(values) for _, name, values in lists}
+    length = {key.partition(".")[2]: len(values) for key, values in lists.items()}
     length |= {"hurst": len(sweep.hurst), "work_of_adhesion": len(sweep.work_of_adhesion)}
     for group in sweep.zip:
         for name in group:

@@ -19,8 +19,6 @@ class Rule:
     text: str  # the rule in words, after "it must be"
     # Returns the value as it will be used; ValueError if it breaks the rule
     read: Callable[[object], Any]
-    # Of the number, or of each one of a list, if it may have a unit
-    quantity: Quantity | None = None
     bounds: Bounds | None = None  # of the number, or of each one of a list
 
     def __call__(self, where: str, value: object) -> Any:
@@ -60,7 +58,7 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
         return number
 
     example = "" if quantity is None else f', or a {quantity.name} as "{quantity.example}"'
-    return Rule(bounds.text + example, read, quantity, bounds)
+    return Rule(bounds.text + example, read, bounds)
 
 
 def whole_number(least: int, most: int = 2**63 - 1) -> Rule:
@@ -90,8 +88,7 @@ def list_of(rule: Rule, *, may_be_empty: bool = False) -> Rule:
             raise ValueError
         return values
 
-    text = f"a list of different values, each {rule.text}"
-    return Rule(text, read, rule.quantity, rule.bounds)
+    return Rule(f"a list of different values, each {rule.text}", read, rule.bounds)
 
 
 def list_of_names() -> Rule:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cached_property
+from itertools import chain, product
 from operator import attrgetter
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.axes import Axis, Value, aligned, points
 from adhesis.ensemble.campaign.rules import (
     Rule,
     choice,
@@ -311,6 +311,26 @@ KEYS: dict[str, Field[Any]] = {
 """Every key ("cycle.load_steps") with its rule, meaning and default."""
 # Those that may have several values, in the order of the axes; H and γ always are axes.
 _AXES = (*_SWEPT, *(key for key, entry in KEYS.items() if entry.metadata["axis"]))
+Value = float
+"""A value on an axis: a float, or an int where the key is a whole number."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One key of a campaign that has several values (H and γ always are axes)."""
+
+    # table, name: where the key stands: "profile", "ratio"
+    table: str
+    name: str
+    # As they are combined: ascending, or, where keys vary together, in the order of the first
+    values: tuple[Value, ...]
+    unit: str
+    meaning: str
+
+    @property
+    def key(self) -> str:
+        """As "profile.ratio"."""
+        return f"{self.table}.{self.name}"
 
 
 @dataclass(frozen=True)
@@ -318,8 +338,8 @@ class Campaign:
     """A checked campaign. Built by :mod:`adhesis.ensemble.campaign.file`.
 
     Equal if they mean the same; ``text`` is the TOML as it was written. Where a key of the profile,
-    material or cycle is a list, its table holds the smallest value, ``lists`` all of them as given
-    (table, name, values), and :meth:`at` gives the campaign with the values of a task.
+    material or cycle is a list, its table holds the smallest value, ``lists`` all of them as given,
+    by key, and :meth:`at` gives the campaign with the values of a task.
     """
 
     profile: ProfileTable
@@ -329,24 +349,30 @@ class Campaign:
     solver: SolverTable
     output: OutputTable
     stop: StopTable = StopTable()
-    lists: tuple[tuple[Table, str, tuple[Value, ...]], ...] = ()
+    lists: dict[str, tuple[Value, ...]] = field(default_factory=dict)
     text: str = field(default="", compare=False, repr=False)
-    _at: dict[tuple[tuple[str, Value], ...], Campaign] = field(
-        default_factory=dict, init=False, compare=False, repr=False
-    )
 
     @cached_property
     def _groups(self) -> list[list[Axis]]:
-        given = {f"{table}.{name}": values for table, name, values in self.lists}
-        given |= {key: self.value(key) for key in _SWEPT}
-        axes = []
+        """The axes in groups that vary together, in the order of the axes, values sorted.
+
+        The order of the values in a file does not matter, except that those of keys which vary
+        together belong to one another.
+        """
+        given = self.lists | {key: self.value(key) for key in _SWEPT}
+        member = {name: names for names in self.sweep.zip for name in names}
+        groups: dict[tuple[str, ...], list[Axis]] = {}
         for key in _AXES:
             if key in given:
                 (table, name), about = key.split("."), KEYS[key].metadata
                 bounds = about["rule"].bounds
                 unit = _UDUNITS.get(bounds.unit, "1") if bounds else "1"
-                axes.append(Axis(table, name, given[key], unit, about["meaning"]))
-        return aligned(axes, self.sweep.zip)
+                axis = Axis(table, name, given[key], unit, about["meaning"])
+                groups.setdefault(member.get(name, (name,)), []).append(axis)
+        for group in groups.values():
+            columns = zip(*sorted(zip(*(axis.values for axis in group), strict=True)), strict=True)
+            group[:] = [replace(a, values=v) for a, v in zip(group, columns, strict=True)]
+        return list(groups.values())
 
     @cached_property
     def axes(self) -> tuple[Axis, ...]:
@@ -356,8 +382,15 @@ class Campaign:
 
     @cached_property
     def cells(self) -> list[tuple[Value, ...]]:
-        """Values on the axes of every cell, in the order of the rows of a results file."""
-        return points(self.axes, self._groups)
+        """Values on the axes of every cell, in the order of the rows of a results file.
+
+        They are all combinations of the groups, the last one varying fastest.
+        """
+        rows = [list(zip(*(axis.values for axis in group), strict=True)) for group in self._groups]
+        keys = [axis.key for group in self._groups for axis in group]
+        place = [keys.index(axis.key) for axis in self.axes]
+        flat = (list(chain.from_iterable(parts)) for parts in product(*rows))
+        return [tuple(values[i] for i in place) for values in flat]
 
     @property
     def finest_harmonic(self) -> int:
@@ -393,19 +426,11 @@ class Campaign:
         """Return the campaign with the values of a task in its tables, and without other axes."""
         if not task.others:
             return self
-        if task.others not in self._at:
-            tables: dict[str, Any] = {}
-            for axis, (name, value) in zip(self.axes[2:], task.others, strict=True):
-                table = tables.get(axis.table, getattr(self, axis.table))
-                tables[axis.table] = replace(table, **{name: value})
-            sweep = replace(self.sweep, zip=())
-            if self.has_axis("max_penetration"):  # the stored curves have one number of steps
-                cycle: CycleTable = tables["cycle"]
-                last = self.cycle.load_steps + 1 - self.unloading_penetration.size
-                until = cycle.turning_point * last / cycle.load_steps
-                tables["cycle"] = replace(cycle, unloading_until=until)
-            self._at[task.others] = replace(self, sweep=sweep, lists=(), **tables)
-        return self._at[task.others]
+        tables: dict[str, Any] = {"sweep": replace(self.sweep, zip=())}
+        for axis, (name, value) in zip(self.axes[2:], task.others, strict=True):
+            table = tables.get(axis.table, getattr(self, axis.table))
+            tables[axis.table] = replace(table, **{name: value})
+        return replace(self, lists={}, **tables)
 
     @cached_property
     def _turning(self) -> Axis | None:

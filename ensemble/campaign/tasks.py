@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from operator import itemgetter
-from typing import Any, Self, overload
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +38,7 @@ def task_seed(campaign_seed: int, realisation: int) -> int:
     return int(sequence.generate_state(1, np.uint64)[0] >> 11)
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True)
 class Task:
     """One loop to compute."""
 
@@ -64,7 +63,7 @@ class Task:
 
 
 @dataclass(frozen=True, eq=False)
-class Tasks(Sequence[Task]):
+class Tasks:
     """Tasks of a campaign by number; each is made when it is asked for.
 
     So a campaign of millions of tasks can be refused, or priced, before they take memory.
@@ -79,13 +78,10 @@ class Tasks(Sequence[Task]):
     def __len__(self) -> int:
         return len(self.rows)
 
-    @overload
-    def __getitem__(self, place: int) -> Task: ...
-    @overload
-    def __getitem__(self, place: slice) -> Tasks: ...
-    def __getitem__(self, place: int | slice) -> Task | Tasks:
-        if isinstance(place, slice):
-            return self.chosen(self.rows[place])
+    def __iter__(self) -> Iterator[Task]:
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, place: int) -> Task:
         cell, realisation = divmod(int(self.rows[place]), self.realisations)
         hurst, gamma, *others = self.cells[cell]
         seed = task_seed(self.seed, realisation)
@@ -114,7 +110,7 @@ class Tasks(Sequence[Task]):
         """Return the first task of each cell, ascending, and the places of all its tasks."""
         changes = np.flatnonzero(np.diff(self.cell_of())) + 1
         places = np.split(np.arange(len(self)), changes)
-        return sorted(((self[int(of_cell[0])], of_cell) for of_cell in places), key=itemgetter(0))
+        return list(zip(self.of_cells(), places, strict=True))
 
     def of_cells(self) -> Tasks:
         """Return the first task of each cell."""

@@ -221,8 +221,7 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     heights = read_heights(
         args.heights, unit=args.unit, delimiter=args.delimiter, decimal=args.decimal
     )
-    known = bool(np.all(np.isfinite(heights)))
-    warning = heights_warning(heights, f"{args.heights}") if known else None
+    warning = heights_warning(heights, f"{args.heights}")
     return profile_from_heights(heights, args.period), [warning] if warning else []
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
-from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops, precisions
+from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
@@ -151,8 +151,7 @@ def _numerical(data: Aggregate) -> str:
 
 def precision(data: Aggregate) -> Iterator[str]:
     """Report the cells that have met the precision of ``[stop]``; none without ``[stop]``."""
-    known = [(cell.name, cell.precision) for cell in data.cells]
-    found = [(name, precision) for name, precision in known if precision is not None]
+    found = precisions(data.cells)
     if not found:
         return
     wanted = found[0][1]

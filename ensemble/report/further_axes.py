@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
-from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.quantities import common_unit, gamma_text
 

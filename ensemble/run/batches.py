@@ -6,13 +6,13 @@ is complete, whatever the number of ranks and of restarts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import count
 
-from adhesis.ensemble.campaign.precision import Precision, enough, looks, precision
+from adhesis.ensemble.campaign.precision import enough, looks
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.tasks import Tasks
 
 
 @dataclass
@@ -35,12 +35,9 @@ class Batches:
     of those that failed.
     """
 
-    def __init__(
-        self, campaign: Campaign, tasks: Sequence[Task], values: Mapping[int, float]
-    ) -> None:
+    def __init__(self, campaign: Campaign, tasks: Tasks, values: Mapping[int, float]) -> None:
         assert campaign.stop.relative_error is not None
         self._wanted = campaign.stop.relative_error
-        self._quantity = campaign.stop.quantity
         self._looks = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
         self._tasks = tasks
         self._cells: dict[tuple[float, ...], _Cell] = {}
@@ -62,32 +59,14 @@ class Batches:
         cells = (cell for cell in self._cells.values() if cell.full)
         return [row for cell in cells for row in cell.missing(0, len(cell.rows))]
 
-    @property
-    def precisions(self) -> list[tuple[str, Precision]]:
-        """Name of every cell, and how well the mean of its quantity is known."""
-        return [
-            (
-                self._tasks[cell.rows[0]].cell_name,
-                precision(
-                    [cell.values[r] for r in sorted(cell.values)],
-                    self._wanted,
-                    self._quantity,
-                    finished=cell.full,
-                ),
-            )
-            for cell in self._cells.values()
-        ]
-
     def finished(self, row: int, value: float) -> tuple[list[int], list[int]]:
         """Take in a row's value of the quantity, NaN if it failed.
 
         Returns the rows of the cell's next batch, if this row has completed one, and those that
         need not be computed, if the cell now has enough.
         """
-        cell = self._keep(row, value)
+        cell = self._keep(row, value)  # of a batch that was not complete: the cell is not full
         before = cell.asked
-        if cell.full:
-            return [], []
         self._advance(cell)
         further = cell.missing(before, cell.asked)
         return further, cell.missing(0, len(cell.rows)) if cell.full else []

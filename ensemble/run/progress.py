@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TextIO
 
@@ -33,7 +33,7 @@ class Summary:
     seconds: float = 0.0
     stopped: str | None = None  # why it stopped before the last task
     # With ``[stop]``: name of every cell, and how well the mean of its quantity is known
-    precisions: tuple[tuple[str, Precision], ...] = ()
+    precisions: Sequence[tuple[str, Precision]] = ()
 
     @property
     def pending(self) -> int:

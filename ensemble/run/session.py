@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,8 +14,9 @@ from typing import Any, TextIO
 import h5py
 import numpy as np
 
+from adhesis.ensemble.aggregate.cells import precisions, read_cells
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.tasks import Task, Tasks
 from adhesis.ensemble.errors import WriteError, parameter
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.read import Results
@@ -111,7 +112,7 @@ def run_campaign(
 
 
 def _compute(
-    loop: ComputeLoop, campaign: Campaign, tasks: Sequence[Task], row: int, check: StopCheck
+    loop: ComputeLoop, campaign: Campaign, tasks: Tasks, row: int, check: StopCheck
 ) -> Row:
     """Compute a task of a campaign as the hand-out asks for it."""
     return loop(campaign, tasks[row], lambda *_: check())
@@ -195,11 +196,13 @@ class _Session:
         What a run has finished is read once more: another program may have written to the file
         (InputError, WriteError), or have copied an older one over rows that the run wrote.
         """
-        summary, batches = self._counts, self.plan.batches
-        if self.plan.rows:
+        summary = self._counts
+        if self.plan.rows or self.plan.batches is not None:
             with Results(path) as results:
                 finished = int(np.isin(results.status(), (DONE, FAILED)).sum())
                 checksums = results.column(CHECKSUM.name)
+                if self.plan.batches is not None:
+                    summary.precisions = precisions(read_cells(results))
             other = sum(checksums[row] != known for row, known in self._written.items())
             count = summary.done + summary.failed
             if (held := min(finished, count - other)) < count:
@@ -209,7 +212,6 @@ class _Session:
                 )
         summary.seconds = time.monotonic() - self._started
         summary.stopped = stopped if summary.pending else None
-        summary.precisions = () if batches is None else tuple(batches.precisions)
         return summary
 
     def _write(self, outcome: Outcome) -> Outcome:

@@ -180,10 +180,9 @@ def table_of_runs(answer: Answer) -> Any:
 
 def _value(quantity: Uncertain, by: float, unit: str, most: float = math.inf) -> str:
     """Return a quantity that is not negative, with its interval."""
-    unit = f" {unit}" if unit else ""
     known = with_error(by * quantity.value, by * quantity.uncertainty, most)
     share = f" (± {rounded_percent(quantity.relative, 0)})" if "±" in known else ""
-    return f"{known}{unit}{share}"
+    return f"{known} {unit}{share}"
 
 
 def page_text(answer: Answer, captions: Mapping[str, str]) -> str:

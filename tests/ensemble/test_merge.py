@@ -180,7 +180,7 @@ def test_a_part_is_what_it_is(tmp_path, capsys):
     run(path, out, "2/3")
     with Results(out) as results:
         assert results.part == Part(2, 3)
-        assert list(results.tasks()) == list(results.campaign.tasks()[1::3])
+        assert list(results.tasks()) == list(results.campaign.tasks())[1::3]
         assert results.column("task").tolist() == [1, 4, 7]
     more = tmp_path / "more.toml"
     more.write_text(campaign_text(realisations="3"))

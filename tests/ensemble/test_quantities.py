@@ -90,7 +90,7 @@ def test_keys_of_a_campaign_take_quantities_with_units() -> None:
     units = parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"', young='"1 MPa"'))
     assert units == parse_campaign(campaign_text(period="1e-3", h_rms="1e-6", young="1e6"))
     several = parse_campaign(campaign_text(h_rms='["1 µm", 2e-6]'))
-    assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
+    assert several.lists == {"profile.h_rms": (1e-6, 2e-6)}
     # without its unit it is asked about (test_campaign.py)
     text = campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
     assert parse_campaign(text).sweep.work_of_adhesion == (40.0,)

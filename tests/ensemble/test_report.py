@@ -835,7 +835,7 @@ def test_campaigns_that_come_along_are_comparable_with_the_paper_campaign():
         assert other.sweep.seed == base.sweep.seed
         assert set(other.sweep.work_of_adhesion) <= set(base.sweep.work_of_adhesion)
         if name in ("ratio-200", "equal-c0"):
-            for task in other.tasks()[:: other.sweep.realisations]:
+            for task in list(other.tasks())[:: other.sweep.realisations]:
                 quoted = paper.m2(task.hurst)
                 assert make_problem(other, task).profile.m2 == pytest.approx(quoted, rel=0.05)
 

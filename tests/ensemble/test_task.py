@@ -335,7 +335,7 @@ def test_positions_have_units_of_a_period_that_has_several_values_and_bins_are_o
         scales = field_scales(field_plan(campaign_with(period=period)))
         assert {s.unit for s in scales if s.name in ("wave_number", "field_position")} == units
     campaign = campaign_with(ratio="[4, 40]")
-    low, high = (field_plan(campaign, task) for task in campaign.tasks().of_cells()[:2])
+    low, high = (field_plan(campaign, task) for task in list(campaign.tasks().of_cells())[:2])
     assert np.sum(low.filled) < np.sum(high.filled)
     np.testing.assert_array_equal(low.harmonic_edges, high.harmonic_edges)
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.campaign.tables import TURNING_POINTS
+from adhesis.ensemble.campaign.tables import TURNING_POINTS, Axis
 from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.figures.loss_figures import errorbar, hollow_handle, loss_label

@@ -8,8 +8,7 @@ from functools import partial
 from typing import Any
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.campaign.tables import TURNING_POINTS
+from adhesis.ensemble.campaign.tables import TURNING_POINTS, Axis
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loss_figures
 from adhesis.ensemble.report.figures import shapes_and_spectra as fields

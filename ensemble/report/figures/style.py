@@ -277,12 +277,11 @@ def label_panel(axes: Axes, text: str) -> None:
     axes.set_title(text, loc="left", pad=3)
 
 
-def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
+def save(figure: Figure, stem: Path) -> None:
     """Save a figure as PNG (300 dpi) and PDF; the same figure gives the same bytes.
 
     The layout is found once, on the canvas of the PNG, which keeps the sizes of texts.
     """
-    png, pdf = stem.with_suffix(".png"), stem.with_suffix(".pdf")
     # What no layout engine means: savefig, too, sets it again.
     with style(), mpl.rc_context({"figure.constrained_layout.use": False}):
         FigureCanvasAgg(figure)
@@ -291,9 +290,9 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
         if engine is not None:
             engine.execute(figure)
             figure.set_layout_engine(None)
-        write(figure, png, metadata={"Software": None})
-        write(figure, pdf, metadata={"CreationDate": None, "Producer": None, "Creator": None})
-    return png, pdf
+        write(figure, stem.with_suffix(".png"), metadata={"Software": None})
+        created = {"CreationDate": None, "Producer": None, "Creator": None}
+        write(figure, stem.with_suffix(".pdf"), metadata=created)
 
 
 def write(figure: Figure, path: Path, **options: Any) -> None:

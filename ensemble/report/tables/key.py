@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.quantities import UNITS, common_unit
 from adhesis.ensemble.report.tables.table import Format, TableColumn, number
 
