@@ -224,6 +224,13 @@ def test_a_period_is_not_warned_of(kind: str) -> None:
         assert warning is None
 
 
+@pytest.mark.parametrize("kind", ["self-affine", "sine", "a wave between its nodes", "white noise"])
+def test_an_end_that_repeats_the_beginning_is_warned_of(kind: str) -> None:
+    sentence = heights_warning(np.append(PERIODIC[kind], PERIODIC[kind][0]), "it.csv")
+    assert sentence is not None
+    assert sentence.startswith("the last height of it.csv is its first one, as if the end")
+
+
 @pytest.mark.parametrize("kind", CUT)
 def test_ends_that_do_not_meet_are_warned_of(kind: str) -> None:
     sentence = heights_warning(CUT[kind], "it.csv")
