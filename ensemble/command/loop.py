@@ -214,15 +214,14 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
         return _given_heights(args)
     prepared = prepared_of(args, trace_of(args, args.trace))
     print(what_was_read(prepared))
-    return prepared.profile(), []
+    return prepared.profile(), list(prepared.warnings)
 
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     heights = read_heights(
         args.heights, unit=args.unit, delimiter=args.delimiter, decimal=args.decimal
     )
-    known = bool(np.all(np.isfinite(heights)))
-    warning = heights_warning(heights, f"{args.heights}") if known else None
+    warning = heights_warning(heights, f"{args.heights}")
     return profile_from_heights(heights, args.period), [warning] if warning else []
 
 

@@ -525,17 +525,17 @@ def test_known_losses_lie_within_their_intervals(tmp_path: Path) -> None:
     assert row.keys() >= set(answers.QUANTITIES)
 
 
-def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    heights = PROFILE.at(X) + 1e-3 * X
+def test_loop_takes_a_trace_with_its_warnings(tmp_path, capsys):
+    heights = PROFILE.at(X) + 1e-3 * X + 9e-6 * np.exp(-(((X - 0.6e-3) / 8e-6) ** 2))
     path = tmp_path / "t.txt"
     np.savetxt(path, 1e6 * np.column_stack([X, heights]))
     words = ["loop", "--trace", str(path), *CONTACT, "--unit", "um", "--cut-off", "100um"]
-    words = [*words, "--quiet"]
     cheap = ["--load-steps", "5", "--max-penetration", "0.3", "--json", str(tmp_path / "l.json")]
-    assert main([*words, *cheap]) == 0
+    assert main([*words, *cheap, "--quiet", "--strict"]) == 1
     assert "400 points" in capsys.readouterr().out
     loop = json.loads((tmp_path / "l.json").read_text())
     assert loop["period"] == pytest.approx(0.95 * LENGTH)
+    assert loop["warnings"][0].startswith("a single crest at 597.5 µm")
 
 
 @pytest.mark.parametrize("gamma", [0.04, 0.001])
