@@ -478,11 +478,17 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {},
         "line 2 .* write all numbers with one decimal sign",
     ),
-    "a unit that was lost": (
-        ["x (?m);z (?m)", *(f"{1e-5 * k:.5f};{1e-5 * float(z):.9f}" for k, z in enumerate(ZS))],
-        {},
-        r"no unit that is clear, with '\(\?m\)' in its header",
-    ),
+    **{
+        f"no metres: {head}": (
+            [head, *(f"{1e-5 * k:.5f};{1e-5 * float(z):.9f}" for k, z in enumerate(ZS))],
+            {},
+            rf"no unit that is clear, with '{re.escape(shown)}' in its header",
+        )
+        for head, shown in {
+            "x (?m);z (?m)": "(?m)", "X (1e-3 m);Z (1e-3 m)": "X (1e-3 m)", "X in;Z in": "X in",
+            **{line: line for line in ("Units: feet", "All data in mm")},
+        }.items()
+    },
     "rows that go on": (
         [" ".join(ZS[k : k + 10]) for k in range(0, N, 10)],
         Z_UM,

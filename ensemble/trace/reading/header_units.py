@@ -68,7 +68,8 @@ _COLUMN = re.compile(
     re.IGNORECASE,
 )
 _IN_TEXT = re.compile(
-    rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_])|{_OPEN}(?:{_ANY}){_CLOSE}", re.IGNORECASE
+    rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_])|{_OPEN}(?:[^)\]>}}]*\s)?(?:{_ANY}){_CLOSE}|[\s_]in$",
+    re.IGNORECASE,
 )
 # Units of other quantities, in brackets or alone: what has one holds no lengths.
 _OTHER = re.compile(
@@ -231,8 +232,15 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
     units = [next(iter(names)) if len(names) == 1 else None for names in known]
     alone = bool(fields) and len(fields[0]) == 1
     possible = _POSSIBLE_UNIT.search(" ".join(text for row in fields for text in row))
-    unclear = possible[0] if possible and not any(known[alone:]) else ""
+    unclear = possible[0] if possible else next(filter(_mentions_unit, header), "")
+    unclear = "" if any(known[alone:]) else unclear
     return HeaderUnits((units[1] if alone else units[0], units[1]), unclear=unclear)
+
+
+def _mentions_unit(line: str) -> bool:
+    """Return whether a line without numbers has a unit of length, or a word for one."""
+    found = Column(line).has_length or not _UNITS.isdisjoint(_words(line))
+    return found and not any(map(str.isdigit, line))
 
 
 def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> HeaderUnits | None:
