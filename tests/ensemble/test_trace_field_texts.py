@@ -662,6 +662,19 @@ def test_a_count_does_not_become_positions_by_the_unit_of_the_heights(name, tmp_
     assert read_trace(path, unit="um", step=STEP).step == STEP
 
 
+def test_another_step_than_that_in_use_is_noted(tmp_path: Path) -> None:
+    other = "the header has a step or pitch of 500 nm, against a step of 1 µm"
+    for text in (
+        ["dx = 0.5 um", "z (um)", *ZS],
+        ["Pitch: 0.5 um", "n;z (um)", *(f"{k};{z}" for k, z in enumerate(ZS))],
+    ):
+        assert other in read_trace(put(tmp_path / "t.txt", text), step=1e-6).notes
+    trace = read_trace(put(tmp_path / "t.txt", [UM, *TWO]), columns=[2], step=1e-6)
+    assert "column 1 (x (um)) has steps of 0.5, as positions or a count do: it is not used" in (
+        trace.notes
+    )
+
+
 def test_a_depth_is_noted_and_an_angstrom_read(tmp_path: Path) -> None:
     two = [f"{x};{z}" for x, z in PAIRS]
     notes = read_trace(put(tmp_path / "t.txt", ["x (um);Depth (um)", *two])).notes

@@ -268,7 +268,19 @@ def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> Head
 def step_of_header(
     name: str, header: Sequence[str], decimal: str, counts: bool = False
 ) -> float | None:
-    """Find the distance of two points in a header, in m, or None; InputError for several.
+    """Find the distance of two points in a header, in m, or None; InputError for several."""
+    steps = stated_steps(header, decimal, counts)
+    if len(steps) > 1:
+        stated = " and ".join(length_text(step, 6) for step in steps)
+        raise InputError(
+            f"the header of {name} states the steps {stated}: give {parameter('step')}, the "
+            "distance of two points"
+        )
+    return steps[0] if steps else None
+
+
+def stated_steps(header: Sequence[str], decimal: str, counts: bool) -> list[float]:
+    """Return the different distances of two points that a header states, in m.
 
     A "pitch" without another word is one only beside a column that ``counts`` the points.
     """
@@ -281,13 +293,7 @@ def step_of_header(
         for step in filter(None, parts if any(parts) else [whole]):
             if all(abs(step / known - 1) > 1e-9 for known in steps):
                 steps.append(step)
-    if len(steps) > 1:
-        stated = " and ".join(length_text(step, 6) for step in steps)
-        raise InputError(
-            f"the header of {name} states the steps {stated}: give {parameter('step')}, the "
-            "distance of two points"
-        )
-    return steps[0] if steps else None
+    return steps
 
 
 def _step(text: str, decimal: str, counts: bool) -> float | None:

@@ -96,7 +96,8 @@ def invalid_rows(
 ) -> tuple[Array, list[str]]:
     """Return which rows a column named "valid" marks with nought, and descriptions.
 
-    Other columns beside the chosen ones that hold two numbers alone are described.
+    Other columns beside the chosen ones that hold two numbers alone are described, and beside a
+    lone one those that rise or fall throughout.
     """
     marked = np.zeros(columns.shape[1], dtype=bool)
     notes = []
@@ -104,11 +105,18 @@ def invalid_rows(
         numbers = np.unique(column[np.isfinite(column)])
         held = [f"{number:g}" for number in numbers[:3]]
         held += ["empty fields"] * bool(len(held) == 1 and np.isnan(column).any())
-        if k in chosen or len(held) != 2:
+        steps = np.diff(column)
+        replaces_step = len(chosen) == 1 and (np.all(steps > 0) or np.all(steps < 0))
+        if k in chosen or (len(held) != 2 and not replaces_step):
             continue
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
-        if any(map(VALID.match, names)) and numbers[0] <= 0 < numbers[-1]:
+        if replaces_step:
+            step = abs(np.median(steps))
+            notes.append(
+                f"{name} has steps of {step:g}, as positions or a count do: it is not used"
+            )
+        elif any(map(VALID.match, names)) and numbers[0] <= 0 < numbers[-1]:
             marked |= column <= 0
             count = counted(int((column <= 0).sum()), "height")
             notes.append(f"{count} marked {held[0]} in {name} taken as drop-outs")
