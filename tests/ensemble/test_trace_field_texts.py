@@ -81,6 +81,7 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         {"step": STEP},
     ),
     "names and units in Cyrillic": (["Расстояние, мкм;Высота, мкм", *RU], {}),
+    "a count of points above": (["Points: 400", "x y", *TWO], {"unit": "um"}),
     "a count without a name": (
         [",z (um)", *(f"{k:.1f},{z}" for k, z in enumerate(ZS))],
         {"unit": "um", "step": STEP},

@@ -23,6 +23,7 @@ from adhesis.ensemble.trace.reading.header_units import (
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
 from adhesis.ensemble.trace.reading.missing_heights import VALID, invalid_rows, without_codes
+from adhesis.ensemble.trace.reading.printed_numbers import looks_like_numbers
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
 from adhesis.solver import checks
@@ -415,7 +416,8 @@ def _from_table(
     columns[-1], gaps = without_codes(columns[-1])
     found = units_of_header(table.header, names)
     if len(columns) == 2 and found.units[0] is None:
-        first = [row[0] for row in names]
+        # a label beside a number ("Points", "400") names no column
+        first = ["=" if looks_like_numbers(row[-1]) else row[0] for row in names]
         given = _step_beside_count(name, table, first, columns[0], unit, step)
         if given is not None:
             step = given
