@@ -238,9 +238,11 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
 
 
 def _mentions_unit(line: str) -> bool:
-    """Return whether a line without numbers has a unit of length, or a word for one."""
-    found = Column(line).has_length or not _UNITS.isdisjoint(_words(line))
-    return found and not any(map(str.isdigit, line))
+    """Return whether a line without numbers has a unit of length but m, or a word for one."""
+    column = Column(line)
+    if column.unit == "m" or any(map(str.isdigit, line)):
+        return False
+    return column.has_length or not _UNITS.isdisjoint(_words(line))
 
 
 def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> HeaderUnits | None:
