@@ -158,6 +158,7 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
     "overflow": ([*METRES[:5], "-1e400", *METRES[5:]], {}, "has no finite height on line 6"),
     "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "on line 6: .* in a file$"),
     "nan at the beginning": (["1", "nan", *METRES], {}, "has no finite height on line 2"),
+    **{f"{gap} at the end": ([*METRES, gap], {}, "height on line 17") for gap in ("nan", '""')},
     "a code": (
         [*NM[:5], "-9999", *NM[5:]],
         {"unit": "nm"},
