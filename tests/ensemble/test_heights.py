@@ -227,9 +227,8 @@ def test_a_period_is_not_warned_of(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["self-affine", "sine", "a wave between its nodes", "white noise"])
 def test_an_end_that_repeats_the_beginning_is_warned_of(kind: str) -> None:
-    sentence = heights_warning(np.append(PERIODIC[kind], PERIODIC[kind][0]), "it.csv")
-    assert sentence is not None
-    assert sentence.startswith("the last height of it.csv is its first one, as if the end")
+    heights = np.append(PERIODIC[kind], PERIODIC[kind][0])
+    assert "the last height of it is its first one, as" in str(heights_warning(heights, "it"))
 
 
 @pytest.mark.parametrize("kind", CUT)

@@ -124,11 +124,7 @@ def test_the_document_says_what_was_read_done_and_found(document: dict[str, Any]
     assert document["degree"] == 2
     noisy = [r["name"] for r in document["runs"] if r["group"] == "noise"]
     assert noisy == ["noise 1", "noise 2"]
-    tables = {
-        r["name"]: r
-        for r in document["runs"]
-        if r["group"] in ("work of adhesion", "turning point")
-    }
+    tables = {r["name"]: r for r in document["runs"] if r["group"] in TABLES}
     assert set(tables) == {"γ 0.02", "γ 0.08", "Δ 0.3", "Δ 0.6"}
     assert tables["γ 0.02"]["loss"] < document["loss"]["value"] < tables["γ 0.08"]["loss"]
     assert tables["Δ 0.3"]["contact_fraction"] < document["contact_fraction"]["value"]
@@ -137,8 +133,7 @@ def test_the_document_says_what_was_read_done_and_found(document: dict[str, Any]
 
 
 def test_the_range_is_the_least_of_the_answer_and_its_variants(document: dict[str, Any]) -> None:
-    tables = ("work of adhesion", "turning point")
-    alike = [run for run in document["runs"] if run["group"] not in tables]
+    alike = [run for run in document["runs"] if run["group"] not in TABLES]
     ranges = [run["valid_range"] for run in alike if run["valid_range"] is not None]
     assert document["valid_range"] == min(ranges) > 1e-9
     assert document["largest_interior_tension"] == max(

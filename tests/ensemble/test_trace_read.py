@@ -97,17 +97,6 @@ def test_names_of_positions_and_heights_have_units_in_many_languages(names, tmp_
         assert_right(read(tmp_path, [head, *rows("\t", decimal, 1e3, 1e6, ".7f")]))
 
 
-def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path) -> None:
-    heights = [f"{z * 1e6:.6f}" for z in Z]
-    assert_right(read(tmp_path, ["Height (µm)", *heights], step=STEP))
-    assert_right(read(tmp_path, ["# dx = 0.5 um", "# z (um)", *heights]))
-    assert_right(read(tmp_path, ["Spacing 0.0005 mm", "Z [µm]", *heights]))
-    commas = [z.replace(".", ",") for z in heights]
-    assert_right(read(tmp_path, ["Schrittweite: 0,5 µm", "Höhe (µm)", *commas]))
-    with pytest.raises(InputError, match="give step"):
-        read(tmp_path, ["Height (µm)", *heights])
-
-
 def npy(array: np.ndarray) -> io.BytesIO:
     stream = io.BytesIO()
     np.save(stream, array)
