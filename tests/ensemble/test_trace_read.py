@@ -222,18 +222,10 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
     "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),
     "a unit that is none": (BOTH, {"unit": 5}, TypeError, "unit is 5: it must be a text"),
-    "an array of xarray": (
-        xr.DataArray(Z),
-        {"step": STEP},
-        TypeError,
-        "it must be a path, .* list",
-    ),
-    "a dataset": (
-        xr.Dataset({"z": ("x", Z)}),
-        {"step": STEP},
-        TypeError,
-        "it must be a path, .* an",
-    ),
+    **{
+        f"{type(found).__name__} of xarray": (found, {"step": STEP}, TypeError, "a path, .* list")
+        for found in (xr.DataArray(Z), xr.Dataset({"z": ("x", Z)}))
+    },
     "one column number": (BOTH, {"columns": 1}, TypeError, r"columns is 1: it must be a list"),
     "a text for a path": ("1,2\n3,4\n", {}, InputError, r"cannot read 1,2\\n3,4\\n: there is no"),
 }

@@ -41,9 +41,8 @@ MAX_POINTS = 5_000_000
 _LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES = 0.02, 2e-5
 # Beyond these limits (m, m, median slope) the unit is wrong.
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
-# Numbers that differ by less than this share of them are one, but for the last bits; steps that do,
-# but for rounding.
-_SAME, _SAME_STEP = 1e-9, 1e-2
+# Numbers that differ by less than this share of them are one, but for the last bits.
+_SAME = 1e-9
 # So many heights of a row or column of a map do not rise or fall throughout by chance.
 _NO_CHANCE = 6
 _KINDS = ("positions", "heights")
@@ -458,7 +457,7 @@ def _from_table(
             )
         notes.append(f"step {length_text(step, 6)} (header)")
     for other in stated_steps(table.header, table.decimal, counts=True):
-        if abs(other / step - 1) > _SAME_STEP:
+        if not np.isclose(other, step, rtol=0.01, atol=0):  # both may be rounded
             stated, used = length_text(other, 5), length_text(step, 5)
             notes.append(f"the header has a step or pitch of {stated}, against a step of {used}")
     if len(columns) == 1 and form.startswith("text"):
