@@ -161,12 +161,13 @@ LENGTH = Quantity(
         name: unit
         for unit, names in {
             "m": "meter meters metre metres метр",
-            "mm": "millimeter millimeters millimetre millimetres мм 毫米",
+            "cm": "centimeter centimeters centimetre centimetres zentimeter",
+            "mm": "millimeter millimeters millimetre millimetres millimètre millimètres мм 毫米",
             "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer мкм "
             "微米",
             "nm": "nanometer nanometers nanometre nanometres нм 纳米",
             "Å": "a angstrom angstroms ångström angström angstroem",
-            "inch": "in inches",
+            "inch": "in inches zoll pouce pouces дюйм 英寸",
             "mil": "mils thou",
             "µin": "uin uinch µinch microinch microinches",
         }.items()

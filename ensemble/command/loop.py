@@ -214,7 +214,7 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
         return _given_heights(args)
     prepared = prepared_of(args, trace_of(args, args.trace))
     print(what_was_read(prepared))
-    return prepared.profile(), []
+    return prepared.profile(), list(prepared.warnings)
 
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:

@@ -24,6 +24,9 @@ _CLOSURE_FACTOR, _MIN_POINTS = 3.0, 8
 # Steps that differ by less than this share of the largest one are a straight line, which is taken
 # as a saw of one tooth.
 _STRAIGHT = 1e-3
+# Heights that differ by less than this share of their range are equal; where more than so many
+# neighbours are, as in steps, it is by chance that first and last one are.
+_SAME, _FEW = 1e-9, 2
 
 
 def read_heights(
@@ -87,6 +90,11 @@ def heights_warning(heights: Array, name: str) -> str | None:
             f"{name} holds {heights.size} heights only: fewer than {_MIN_POINTS} make a profile of "
             "a few waves, so check the file"
         )
+    if _repeats_its_beginning(heights):
+        return (
+            f"the last height of {name} is its first one, as if the end of the period were written "
+            "twice: leave it out if so, as the next period begins with it"
+        )
     # A median of three keeps edges and removes single spikes, which would hide the jump.
     smoothed = np.median([np.roll(heights, k) for k in (1, 0, -1)], axis=0)
     largest = float(np.abs(np.diff(smoothed)).max())
@@ -101,3 +109,16 @@ def heights_warning(heights: Array, name: str) -> str | None:
         "period of a profile and the jump counts as roughness; adhesis trace makes a period of a "
         "measured trace"
     )
+
+
+def _repeats_its_beginning(heights: Array) -> bool:
+    """Return whether the last height is the first one again, and not its mirror image."""
+    same = _SAME * np.ptp(heights)
+    if abs(heights[-1] - heights[0]) > same or np.sum(np.diff(heights) == 0) > _FEW:
+        return False
+    if abs(heights[-2] - heights[1]) > same:
+        return True
+    # Where both sides are alike the period closes more smoothly without a height too many.
+    ends = heights[-3:], heights[-4:-1]
+    bends = [np.abs(np.diff([*end, *heights[:3]], 3)).sum() for end in ends]
+    return bool(bends[1] < bends[0])

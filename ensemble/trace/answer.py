@@ -538,11 +538,9 @@ def _cut_offs(answer: Answer) -> dict[float, tuple[str, Result]]:
 
 def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     """Return what is doubtful: what changes the answer most first, loops that failed last."""
-    adhesive = answer.main["work_of_adhesion"] > 0  # else the loss is nought, but for rounding
     preload = answer.main["preload_warnings"]
-    found = [*preload, *_one_patch(answer)]
-    found += _not_converged(answer) if adhesive else []
-    if adhesive and loss.relative > 0.5:
+    found = [*preload, *_one_patch(answer), *_not_converged(answer)]
+    if loss.relative > 0.5:
         largest = max(loss.doubts, key=lambda name: loss.doubts[name])
         words = DOUBTS | OF_MODEL | {"numerics": "error of the loop itself"}
         found.append(

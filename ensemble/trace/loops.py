@@ -139,6 +139,7 @@ def compute(run: Run, progress: Progress | None = None) -> Result:
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
     drops = loop.loss_from_drops - loop.closing_drop
     return loop.numbers() | {
+        "loss": loop.loss if run.work_of_adhesion > 0 else 0.0,  # but for rounding
         "preload_warnings": loop.preload_warnings,
         "warnings": list(loop.warnings),
         "loss_note": loop.loss_note,

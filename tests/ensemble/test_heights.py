@@ -158,6 +158,7 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
     "overflow": ([*METRES[:5], "-1e400", *METRES[5:]], {}, "has no finite height on line 6"),
     "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "on line 6: .* in a file$"),
     "nan at the beginning": (["1", "nan", *METRES], {}, "has no finite height on line 2"),
+    **{f"{gap} at the end": ([*METRES, gap], {}, "height on line 17") for gap in ("nan", '""')},
     "a code": (
         [*NM[:5], "-9999", *NM[5:]],
         {"unit": "nm"},
@@ -222,6 +223,12 @@ def test_a_period_is_not_warned_of(kind: str) -> None:
         assert "heights only" in warning
     else:
         assert warning is None
+
+
+@pytest.mark.parametrize("kind", ["self-affine", "sine", "a wave between its nodes", "white noise"])
+def test_an_end_that_repeats_the_beginning_is_warned_of(kind: str) -> None:
+    heights = np.append(PERIODIC[kind], PERIODIC[kind][0])
+    assert "the last height of it is its first one, as" in str(heights_warning(heights, "it"))
 
 
 @pytest.mark.parametrize("kind", CUT)

@@ -13,7 +13,6 @@ import pytest
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.heights import read_heights
 from adhesis.ensemble.trace.prepare import prepare_trace
-from adhesis.ensemble.trace.reading import instrument
 from adhesis.ensemble.trace.reading.header_units import step_of_header
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 
@@ -81,6 +80,7 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         {"step": STEP},
     ),
     "names and units in Cyrillic": (["Расстояние, мкм;Высота, мкм", *RU], {}),
+    "a count of points above": (["Points: 400", "x y", *TWO], {"unit": "um"}),
     "a count without a name": (
         [",z (um)", *(f"{k:.1f},{z}" for k, z in enumerate(ZS))],
         {"unit": "um", "step": STEP},
@@ -114,6 +114,10 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         f"step: {words}": ([f"{words} 0.5 µm", "Z [µm]", *ZS], {})
         for words in ("Messschrittweite", "Pas d'échantillonnage :", "測定ピッチ,", "측정 간격:")
     },
+    "a step with a decimal comma": (
+        ["Schrittweite: 0,5 µm", "Höhe (µm)", *(z.replace(".", ",") for z in ZS)],
+        {},
+    ),
     "ruled comments": (["####", "# x", "####", UM, *TWO], {}),
     "blank lines before": ([*(5000 * [""]), UM, *TWO], {}),
     "a delimiter before": (["\tx (um)\tz (um)", *(f"\t{x}\t{z}" for x, z in PAIRS)], {}),
@@ -181,6 +185,7 @@ def test_delimiters_of_whole_numbers_are_no_decimal_signs(tmp_path: Path) -> Non
         ({50: "-9.99", 200: "9.99"}, 2),
         ({50: "-3.2768", 51: "-3.2768", 200: "-3.2768"}, 3),
         ({50: "5.0", 51: "5.0", 52: "5.0", 200: "-5.0", 201: "-5.0", 202: "-5.0"}, 6),
+        ({k: ("-99.9999", "-99.9998")[k % 2] for k in range(50, 66)}, 16),
         (dict.fromkeys(range(50, 56), "-1.2"), 0),  # the floor of a groove
         ({50: "0.800", 51: "0.800", 52: "0.800"}, 0),  # the flat top of a grain
         ({50: "9.1", 51: "9.2", 52: "9.2", 53: "9.2", 54: "9.3"}, 0),  # one that is high
@@ -478,11 +483,17 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {},
         "line 2 .* write all numbers with one decimal sign",
     ),
-    "a unit that was lost": (
-        ["x (?m);z (?m)", *(f"{1e-5 * k:.5f};{1e-5 * float(z):.9f}" for k, z in enumerate(ZS))],
-        {},
-        r"no unit that is clear, with '\(\?m\)' in its header",
-    ),
+    **{
+        f"no metres: {head}": (
+            [head, *(f"{1e-5 * k:.5f};{1e-5 * float(z):.9f}" for k, z in enumerate(ZS))],
+            {},
+            rf"no unit that is clear, with '{re.escape(shown)}' in its header",
+        )
+        for head, shown in {
+            "x (?m);z (?m)": "(?m)", "X (1e-3 m);Z (1e-3 m)": "X (1e-3 m)", "X in;Z in": "X in",
+            **{line: line for line in ("Units: feet", "All data in mm")},
+        }.items()
+    },
     "rows that go on": (
         [" ".join(ZS[k : k + 10]) for k in range(0, N, 10)],
         Z_UM,
@@ -656,6 +667,16 @@ def test_a_count_does_not_become_positions_by_the_unit_of_the_heights(name, tmp_
     assert read_trace(path, unit="um", step=STEP).step == STEP
 
 
+def test_another_step_than_that_in_use_is_noted(tmp_path: Path) -> None:
+    counted = ["Pitch: 0.5 um", "n;z (um)", *(f"{k};{z}" for k, z in enumerate(ZS))]
+    for text, options, note in (
+        (counted, {}, "the header has a step or pitch of 500 nm, against a step of 1 µm"),
+        ([UM, *TWO], {"columns": [2]}, "column 1 (x (um)) has steps of 0.5, as positions or a c"),
+    ):
+        notes = read_trace(put(tmp_path / "t.txt", text), step=1e-6, **options).notes
+        assert any(found.startswith(note) for found in notes)
+
+
 def test_a_depth_is_noted_and_an_angstrom_read(tmp_path: Path) -> None:
     two = [f"{x};{z}" for x, z in PAIRS]
     notes = read_trace(put(tmp_path / "t.txt", ["x (um);Depth (um)", *two])).notes
@@ -690,7 +711,7 @@ NAMED = [
     "Sampling interval=0.5um", "Delta X: 0.5 um", "X Step: 500 nm", "Step size: 0.5 µm/pt",
     "StepSize=0.5um", "Pitch X;0.5;[um]", "dx_um = 0.5", "Step in um: 0.5",
     "Sample spacing: 5e-7 m", "points: 400; step: 0.5 um", "Punktabstand [µm]: 0.5",
-    "Pixel size: 0.5 um", "Step: .5 um",
+    "Pixel size: 0.5 um", "Step: .5 um", "Spacing 0.0005 mm",
 ]  # fmt: skip
 OTHERS = [
     "Traverse length: 5.6 mm", "Groove spacing: 3 um", "Mean spacing of profile elements: 21 um",
@@ -708,44 +729,3 @@ OTHERS = [
 def test_only_the_distance_of_two_points_is_a_step(line: str) -> None:
     found = step_of_header("t.txt", ["Profile", line], ".")
     assert found == (pytest.approx(STEP, rel=1e-12) if line in NAMED else None)
-
-
-# ---------------------------------------------------------------------- instruments
-
-
-def wsxm(path: Path, comments: int) -> Path:
-    """A map of WSxM, 64 × 48 heights in nm: a header in words, and numbers of eight bytes."""
-    heights = np.add.outer(np.arange(48.0), 10 * np.sin(np.arange(64) / 5))
-    words = [
-        "WSxM file copyright Nanotec Electronica", "SxM Image file", "Image header size: 0", "",
-        "[Control]", "", "    X Amplitude: 3 um", "    Y Amplitude: 2 um", "", "[General Info]", "",
-        "    Image Data Type: double", "    Number of columns: 64", "    Number of rows: 48",
-        f"    Z Amplitude: {np.ptp(heights)} nm", "", "[Miscellaneous]", "",
-        *(f"    Comments {k:02d}: a sample on a stage" for k in range(comments)),
-        f"    Maximum: {heights.max()}", f"    Minimum: {heights.min()}", "", "[Header end]", "",
-    ]  # fmt: skip
-    path.write_bytes("\r\n".join(words).encode() + heights.astype("<f8").tobytes())
-    return path
-
-
-@pytest.mark.skipif(not instrument.available(), reason="SurfaceTopography is not installed")
-@pytest.mark.parametrize("name", ["a.stp", "a.dat", "a.txt", "a.csv", "a.001", "a"])
-@pytest.mark.parametrize("comments", [1, 400])
-def test_a_file_of_an_instrument_is_known_by_its_content(name, comments, tmp_path):
-    trace = read_trace(wsxm(tmp_path / name, comments), row=3)
-    assert trace.points == 64
-    assert trace.step == pytest.approx(3e-6 / 64)
-    reference = read_trace(wsxm(tmp_path / "b.stp", 1), row=3)
-    np.testing.assert_array_equal(trace.heights, reference.heights)
-
-
-@pytest.mark.skipif(not instrument.available(), reason="SurfaceTopography is not installed")
-def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> None:
-    import h5py
-
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["surface"] = np.outer(Z, Z)
-    with pytest.raises(
-        InputError, match=r"a\.h5 states no lengths or no unit .* give step and unit"
-    ):
-        read_trace(tmp_path / "a.h5")

@@ -104,3 +104,39 @@ def test_reading_starts_no_mpi(tmp_path: Path) -> None:
     )
     done = run_python("-c", code)
     assert done.returncode == 0, done.stderr
+
+
+def wsxm(path: Path, comments: int) -> Path:
+    """A map of WSxM, 64 × 48 heights in nm: a header in words, and numbers of eight bytes."""
+    heights = np.add.outer(np.arange(48.0), 10 * np.sin(np.arange(64) / 5))
+    words = [
+        "WSxM file copyright Nanotec Electronica", "SxM Image file", "Image header size: 0", "",
+        "[Control]", "", "    X Amplitude: 3 um", "    Y Amplitude: 2 um", "", "[General Info]", "",
+        "    Image Data Type: double", "    Number of columns: 64", "    Number of rows: 48",
+        f"    Z Amplitude: {np.ptp(heights)} nm", "", "[Miscellaneous]", "",
+        *(f"    Comments {k:02d}: a sample on a stage" for k in range(comments)),
+        f"    Maximum: {heights.max()}", f"    Minimum: {heights.min()}", "", "[Header end]", "",
+    ]  # fmt: skip
+    path.write_bytes("\r\n".join(words).encode() + heights.astype("<f8").tobytes())
+    return path
+
+
+@pytest.mark.parametrize("name", ["a.stp", "a.dat", "a.txt", "a.csv", "a.001", "a"])
+@pytest.mark.parametrize("comments", [1, 400])
+def test_a_file_of_an_instrument_is_known_by_its_content(name, comments, tmp_path):
+    trace = read_trace(wsxm(tmp_path / name, comments), row=3)
+    assert trace.points == 64
+    assert trace.step == pytest.approx(3e-6 / 64)
+    reference = read_trace(wsxm(tmp_path / "b.stp", 1), row=3)
+    np.testing.assert_array_equal(trace.heights, reference.heights)
+
+
+def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["surface"] = np.outer(Z, Z)
+    with pytest.raises(
+        InputError, match=r"a\.h5 states no lengths or no unit .* give step and unit"
+    ):
+        read_trace(tmp_path / "a.h5")

@@ -97,17 +97,6 @@ def test_names_of_positions_and_heights_have_units_in_many_languages(names, tmp_
         assert_right(read(tmp_path, [head, *rows("\t", decimal, 1e3, 1e6, ".7f")]))
 
 
-def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path) -> None:
-    heights = [f"{z * 1e6:.6f}" for z in Z]
-    assert_right(read(tmp_path, ["Height (µm)", *heights], step=STEP))
-    assert_right(read(tmp_path, ["# dx = 0.5 um", "# z (um)", *heights]))
-    assert_right(read(tmp_path, ["Spacing 0.0005 mm", "Z [µm]", *heights]))
-    commas = [z.replace(".", ",") for z in heights]
-    assert_right(read(tmp_path, ["Schrittweite: 0,5 µm", "Höhe (µm)", *commas]))
-    with pytest.raises(InputError, match="give step"):
-        read(tmp_path, ["Height (µm)", *heights])
-
-
 def npy(array: np.ndarray) -> io.BytesIO:
     stream = io.BytesIO()
     np.save(stream, array)
@@ -233,18 +222,10 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "no rows": (np.zeros((0, 2)), {"unit": "um"}, InputError, "array holds 0 rows of numbers"),
     "ragged": ([[1.0, 2.0], [3.0]], {}, InputError, "array is no table of numbers: "),
     "a unit that is none": (BOTH, {"unit": 5}, TypeError, "unit is 5: it must be a text"),
-    "an array of xarray": (
-        xr.DataArray(Z),
-        {"step": STEP},
-        TypeError,
-        "it must be a path, .* list",
-    ),
-    "a dataset": (
-        xr.Dataset({"z": ("x", Z)}),
-        {"step": STEP},
-        TypeError,
-        "it must be a path, .* an",
-    ),
+    **{
+        f"{type(found).__name__} of xarray": (found, {"step": STEP}, TypeError, "a path, .* list")
+        for found in (xr.DataArray(Z), xr.Dataset({"z": ("x", Z)}))
+    },
     "one column number": (BOTH, {"columns": 1}, TypeError, r"columns is 1: it must be a list"),
     "a text for a path": ("1,2\n3,4\n", {}, InputError, r"cannot read 1,2\\n3,4\\n: there is no"),
 }

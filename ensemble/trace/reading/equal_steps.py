@@ -152,9 +152,7 @@ def _printed_digit(x: Array) -> float | None:
 
 def _roundest(low: float, high: float) -> float:
     """Return the number between two that has the fewest decimals."""
-    for decimals in _DIGITS:
-        whole = np.rint((low + high) / 2 * 10.0**decimals)
-        for number in (whole, np.ceil(low * 10.0**decimals)):
-            if low * 10.0**decimals <= number <= high * 10.0**decimals:
-                return float(f"{number * 10.0**-decimals:.15g}")
-    return (low + high) / 2
+    middle = (low + high) / 2
+    # Of numbers with so many decimals the nearest one to the middle lies between, if any does.
+    numbers = (round(middle, decimals) for decimals in _DIGITS)
+    return next((number for number in numbers if low <= number <= high), middle)

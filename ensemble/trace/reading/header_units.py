@@ -68,7 +68,8 @@ _COLUMN = re.compile(
     re.IGNORECASE,
 )
 _IN_TEXT = re.compile(
-    rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_])|{_OPEN}(?:{_ANY}){_CLOSE}", re.IGNORECASE
+    rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_])|{_OPEN}(?:[^)\]>}}]*\s)?(?:{_ANY}){_CLOSE}|[\s_]in$",
+    re.IGNORECASE,
 )
 # Units of other quantities, in brackets or alone: what has one holds no lengths.
 _OTHER = re.compile(
@@ -231,8 +232,17 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
     units = [next(iter(names)) if len(names) == 1 else None for names in known]
     alone = bool(fields) and len(fields[0]) == 1
     possible = _POSSIBLE_UNIT.search(" ".join(text for row in fields for text in row))
-    unclear = possible[0] if possible and not any(known[alone:]) else ""
+    unclear = possible[0] if possible else next(filter(_mentions_unit, header), "")
+    unclear = "" if any(known[alone:]) else unclear
     return HeaderUnits((units[1] if alone else units[0], units[1]), unclear=unclear)
+
+
+def _mentions_unit(line: str) -> bool:
+    """Return whether a line without numbers has a unit of length but m, or a word for one."""
+    column = Column(line)
+    if column.unit == "m" or any(map(str.isdigit, line)):
+        return False
+    return column.has_length or not _UNITS.isdisjoint(_words(line))
 
 
 def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> HeaderUnits | None:
@@ -260,7 +270,19 @@ def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> Head
 def step_of_header(
     name: str, header: Sequence[str], decimal: str, counts: bool = False
 ) -> float | None:
-    """Find the distance of two points in a header, in m, or None; InputError for several.
+    """Find the distance of two points in a header, in m, or None; InputError for several."""
+    steps = stated_steps(header, decimal, counts)
+    if len(steps) > 1:
+        stated = " and ".join(length_text(step, 6) for step in steps)
+        raise InputError(
+            f"the header of {name} states the steps {stated}: give {parameter('step')}, the "
+            "distance of two points"
+        )
+    return steps[0] if steps else None
+
+
+def stated_steps(header: Sequence[str], decimal: str, counts: bool) -> list[float]:
+    """Return the different distances of two points that a header states, in m.
 
     A "pitch" without another word is one only beside a column that ``counts`` the points.
     """
@@ -273,13 +295,7 @@ def step_of_header(
         for step in filter(None, parts if any(parts) else [whole]):
             if all(abs(step / known - 1) > 1e-9 for known in steps):
                 steps.append(step)
-    if len(steps) > 1:
-        stated = " and ".join(length_text(step, 6) for step in steps)
-        raise InputError(
-            f"the header of {name} states the steps {stated}: give {parameter('step')}, the "
-            "distance of two points"
-        )
-    return steps[0] if steps else None
+    return steps
 
 
 def _step(text: str, decimal: str, counts: bool) -> float | None:

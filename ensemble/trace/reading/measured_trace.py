@@ -17,11 +17,13 @@ from adhesis.ensemble.trace.reading.header_units import (
     Column,
     HeaderUnits,
     parse_units,
+    stated_steps,
     step_of_header,
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
 from adhesis.ensemble.trace.reading.missing_heights import VALID, invalid_rows, without_codes
+from adhesis.ensemble.trace.reading.printed_numbers import looks_like_numbers
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
 from adhesis.solver import checks
@@ -413,7 +415,8 @@ def _from_table(
     columns[-1], gaps = without_codes(columns[-1])
     found = units_of_header(table.header, names)
     if len(columns) == 2 and found.units[0] is None:
-        first = [row[0] for row in names]
+        # a label beside a number ("Points", "400") names no column
+        first = ["=" if looks_like_numbers(row[-1]) else row[0] for row in names]
         given = _step_beside_count(name, table, first, columns[0], unit, step)
         if given is not None:
             step = given
@@ -453,6 +456,10 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
+    for other in stated_steps(table.header, table.decimal, counts=True):
+        if not np.isclose(other, step, rtol=0.01, atol=0):  # both may be rounded
+            stated, used = length_text(other, 5), length_text(step, 5)
+            notes.append(f"the header has a step or pitch of {stated}, against a step of {used}")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
     trace = Trace(heights, float(step), name, tuple(notes))

@@ -15,6 +15,7 @@ from adhesis.solver.model.profile import Array
 # enough.
 _BEYOND, _BEYOND_KNOWN = 5.0, 0.2
 _REPEATED = 3
+_ALIKE = 2e-3  # codes beside each other differ by less than this share of them: -99.9999, -99.9998
 _MOST_CODES = 4  # of one instrument; more different numbers are heights, as of a sine
 _CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 _ENORMOUS = 1e20
@@ -51,13 +52,15 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
         return heights, ""
     low, high = _usual(values[~likely])
     away = np.maximum(low - values, values - high)
-    apart = np.minimum(np.diff(values, prepend=-np.inf), np.diff(values, append=np.inf))
+    are_single = float(np.median(times)) == 1.0
+    gaps = np.diff(values)
+    gaps[are_single & (gaps < _ALIKE * np.abs(values[1:]))] = np.inf
+    apart = np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf))
     far = (away > _BEYOND * (high - low)) & (apart > _BEYOND_KNOWN * (high - low))
     far &= repeated | nines | on_both_sides
     # Where hardly a height occurs twice, a number that does stands for no height if all others lie
     # within a smaller range than it is apart from them; so do noughts and nines, more often than
     # all others, even within the range.
-    are_single = float(np.median(times)) == 1.0
     ends, rest = np.flatnonzero(~likely)[[0, -1]], values[~likely]
     far[ends] |= are_single & repeated[ends] & (apart[ends] > abs(rest[-2] - rest[1]))
     far &= far.sum() <= _MOST_CODES
@@ -96,7 +99,8 @@ def invalid_rows(
 ) -> tuple[Array, list[str]]:
     """Return which rows a column named "valid" marks with nought, and descriptions.
 
-    Other columns beside the chosen ones that hold two numbers alone are described.
+    Other columns beside the chosen ones that hold two numbers alone are described, and beside a
+    lone one those that rise or fall throughout.
     """
     marked = np.zeros(columns.shape[1], dtype=bool)
     notes = []
@@ -104,11 +108,18 @@ def invalid_rows(
         numbers = np.unique(column[np.isfinite(column)])
         held = [f"{number:g}" for number in numbers[:3]]
         held += ["empty fields"] * bool(len(held) == 1 and np.isnan(column).any())
-        if k in chosen or len(held) != 2:
+        steps = np.diff(column)
+        replaces_step = len(chosen) == 1 and (np.all(steps > 0) or np.all(steps < 0))
+        if k in chosen or (len(held) != 2 and not replaces_step):
             continue
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
-        if any(map(VALID.match, names)) and numbers[0] <= 0 < numbers[-1]:
+        if replaces_step:
+            step = abs(np.median(steps))
+            notes.append(
+                f"{name} has steps of {step:g}, as positions or a count do: it is not used"
+            )
+        elif any(map(VALID.match, names)) and numbers[0] <= 0 < numbers[-1]:
             marked |= column <= 0
             count = counted(int((column <= 0).sum()), "height")
             notes.append(f"{count} marked {held[0]} in {name} taken as drop-outs")

@@ -313,8 +313,8 @@ def _block(reader: _Reader, start: int) -> list[int]:
             )
         if reader.holds_row(place):
             places.append(place)
-    while reader.rows[places[-1]].is_empty:
-        places.pop()
+    while (end := "".join(reader.rows[places[-1]].fields)) and not any(map(str.isalnum, end)):
+        places.pop()  # a rule of dashes below the rows
     return places
 
 
