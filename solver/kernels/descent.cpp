@@ -178,7 +178,7 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
 // what is allowed.
 //
 // `residual` is C - C_c of the field there. On the way the errors are taken to grow as the square
-// of its length, and far from balance more is allowed.
+// of its length, and far from balance more is allowed. An error that is no number is infinite.
 double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
                    const Vector& ends, const EdgeLaw& law) {
   double worst = 0;
@@ -190,8 +190,8 @@ double model_error(const ModelFlow& flow, const Vector& residual, const Integers
       const double error = share * share * at_end;
       const double unbalance = std::max(std::abs(flow.residuals[i][e]) - error, 0.0);
       const double allowed = MODEL_ERROR * law.critical + MODEL_SHARE * unbalance;
-      // not written as > : an error that is no number is too large
-      if (!(error <= worst * allowed)) worst = error / allowed;
+      if (std::isnan(error / allowed)) return infinity;
+      if (error > worst * allowed) worst = error / allowed;
     }
   }
   return worst;

@@ -270,9 +270,9 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     }
     const double size = largest(step);
     const bool stalled = size <= law.field_error && size > NEWTON_SHRINKS * last;
-    // not written as > : a size that is no number is a failure, too
     const double longest = std::max(NEWTON_SHRINKS * last, law.rest_step);
     const bool within = size <= std::min(reach, longest);
+    // not written as <= : the length beside an edge that is no number is none
     if (!(within && largest(travelled) <= reach && shortest_length(moved) > 0)) break;
     ends = moved;
     const bool at_rest = stalled || (!strict && size <= rest_within(ends, law));

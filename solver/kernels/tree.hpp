@@ -92,7 +92,7 @@ struct Tree {
 // Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.
 //
 // By pivots of two rows, one of each half: where h r is small they are far from singular. `nearest`
-// is the least of their determinants, without sign: about the least of those of 1 - h r.
+// is the least of their determinants, without sign: about the least eigenvalue of 1 - h r.
 NegativeCount count_negative(double* h, double* r, int n);
 
 }  // namespace adhesis
