@@ -68,6 +68,9 @@ struct Tree {
   int size() const { return int(theta.size()); }
   int run_count() const { return int(runs.size()); }
 
+  // Put gap k, whose nodes are filled in, into the tree.
+  void place_gap(const Nodes& nodes, int k);
+
   // Place the charges of a run, and compute its interpolation and kernel; the charges of which
   // halves have moved, if its own have not.
   void place_charges(int run, bool own = true, std::array<bool, 2> halves = {true, true});
