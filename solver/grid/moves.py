@@ -17,8 +17,8 @@ _TIE = 1e-6
 # Least released energy of a move, as a share of γ' dx: smaller ones are within the error of S.
 _MARGIN = 1e-4
 
-Key = tuple[int, int, int]
-"""Identifies a move of a contact set."""
+Key = tuple[int, ...]
+"""Identifies a move: side of the first edge, the nodes of one or two edges, direction."""
 
 
 class Motion(NamedTuple):
