@@ -489,7 +489,7 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     real("largest height", float(np.abs(h).max()), _HEIGHT_OR_NONE)
     a = np.fft.rfft(h - h.mean()) / h.size
     # Rounding noise is set to 0, so that a flat or band-limited input remains so.
-    a[np.abs(a) < 1e-15 * max(float(np.max(np.abs(h))), 1e-300)] = 0
+    a[np.abs(a) < 1e-15 * np.abs(h).max()] = 0
     a[0] = 0
     if h.size % 2 == 0:
         a[-1] = a[-1].real / 2

@@ -292,10 +292,8 @@ class SharpMethod(Method):
         lighter = [s for s in self._loaded if prescribed_in(s) >= target.prescribed]
         start = prescribed_in(state)
         back = [s for s in self._loaded if start < prescribed_in(s) < target.prescribed]
-        h_max = self.problem.profile.h_max
-        first = self.detached(
-            h_max if self.problem.control.is_load else max(target.prescribed, h_max)
-        )
+        apart = self.problem.detached_separation(state, target.prescribed)
+        first = self.detached(max(apart, self.problem.profile.h_max))
         last = min(lighter, key=prescribed_in, default=first)
         if prescribed_in(last) > target.prescribed:
             last = self._history(last, replace(target, direction="loading")).states[-1]
