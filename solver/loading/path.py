@@ -67,7 +67,7 @@ class MinorLoop(NotebookDisplay):
         A/A0 at its end less that at its start.
     closes : bool
         True if it ends in its initial state: stress and contact agree to a millionth of their
-        ranges on the loop.
+        ranges on the loop, or contact to 1e-9 of the largest one.
 
     References
     ----------
