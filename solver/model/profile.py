@@ -297,10 +297,11 @@ class Profile(ByValue):
     @cached_property
     def mirror_axes(self) -> Array:
         """Places x in m, from 0 to λ/2, about which the profile is nearly its own mirror image."""
-        harmonics, allowed = self._harmonics, MIRRORED * self.h_max
-        first = int(harmonics[0])
-        angle = (np.pi * np.arange(first) - np.angle(self.coefficients[first])) / first
-        for m in harmonics[1:]:
+        allowed = MIRRORED * self.h_max
+        # those of the largest wave: of a small one the phase may be noise
+        largest = int(np.abs(self.coefficients).argmax())
+        angle = (np.pi * np.arange(largest) - np.angle(self.coefficients[largest])) / largest
+        for m in self._harmonics:
             if not len(angle):
                 break
             odd = np.imag(self.coefficients[m] * np.exp(1j * m * angle))
