@@ -121,7 +121,7 @@ class StressSource:
             length_x=piece_x,
             length_w=piece_w,
             length_before=np.concatenate([[0.0], np.cumsum(whole * width)]),
-            top=top,
+            highest_harmonic=top,
         )
 
 
