@@ -235,12 +235,12 @@ class SharpMethod(Method):
 
     def _history(self, state: ContactState, target: Target) -> History:
         history = History()
+        touch, highest = self.jumps.first_touch()  # kept: the first path must not depend on it
         self.edges.forget()
         control = self.problem.control
         d = self.states.prescribed_of(state)
         point = self.follower.recall_point(state.internal)
         if not state.patches:
-            touch, highest = self.jumps.first_touch()
             first = 0.0 if control.is_load else touch
             if target.direction == "unloading" or target.d > first:
                 apart = self.problem.detached_separation(state, target.prescribed)
