@@ -61,7 +61,8 @@ EQUAL_CRESTS = 1e-9
 below it make no two parts of a period differ."""
 
 MIRRORED = 1e-6
-"""Of h_max: waves may be so far from their mirror image. Jumps are hardly located more finely."""
+"""Of h_max, of a pattern of γ: waves may be so far from their mirror image. Jumps are hardly
+located more finely."""
 
 # Of the shortest wave: places in equal parts of the period that differ by less are copies.
 _SAME_PLACE = 1e-3
