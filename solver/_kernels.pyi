@@ -79,9 +79,6 @@ class EdgeLaw:
     def __init__(self, arg: EdgeLaw, /) -> None: ...
 
     @property
-    def critical(self) -> float: ...
-
-    @property
     def rest_step(self) -> float: ...
 
     @property

@@ -241,7 +241,6 @@ void bind_model(nb::module_& m) {
            nb::kw_only(), "adhesion"_a, "critical"_a, "newton_tolerance"_a, "field_error"_a,
            "rest_step"_a, "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a)
       .def(nb::init<const EdgeLaw&>())
-      .def_ro("critical", &EdgeLaw::critical)
       .def_ro("rest_step", &EdgeLaw::rest_step)
       .def_rw("longest_step", &EdgeLaw::longest_step)
       .def_rw("smallest", &EdgeLaw::smallest)
