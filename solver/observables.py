@@ -38,8 +38,8 @@ def _widths(opening: Opening, bins: Array) -> Array:
     """Compute the length in m on which one opening lies in each bin."""
     left, width = opening.x[0], opening.x[-1] - opening.x[0]
     # φ is computed from the nearer end, to avoid cancellation.
-    near = np.sqrt(np.clip((opening.x - left) / width, 0, 1))
-    far = np.sqrt(np.clip((opening.x[-1] - opening.x) / width, 0, 1))
+    near = np.sqrt((opening.x - left) / width)
+    far = np.sqrt((opening.x[-1] - opening.x) / width)
     phi = 2 * np.where(near < far, np.arcsin(near), np.arccos(far))
     low, high = opening.gap[:-1], opening.gap[1:]
     inner = bins[1:-1]
@@ -107,7 +107,7 @@ def _opening(
         x[i] + (x[i + 1] - x[i]) * share if beside[i] else x[i : i + 1] for i in range(intervals)
     ]
     points = np.concatenate([*fine, [right]])
-    root = np.sqrt(np.maximum(points - left, 0) * np.maximum(right - points, 0) / width)
+    root = np.sqrt((points - left) * (right - points) / width)
     return Opening(points, smooth(points) * root)
 
 

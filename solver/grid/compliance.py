@@ -8,7 +8,9 @@ removing the contact node i with stress σ_i releases ½ dx σ_i² S, both exact
 Ω the contact set without the node. S depends on the geometry alone: 1.7286 dx/E* at the edge of a
 long isolated patch, more for short patches, less beside narrow gaps. Here the nodes of the patch
 and of its two neighbours are lumped into blocks of uniform stress that grow away from their ends;
-as S is stationary with respect to the stress, the relative error of lumping is about 1e-4.
+as S is stationary with respect to the stress, the relative error of lumping is below 1e-4. Rounded
+lengths add up to 4e-4, and the patches beyond both neighbours, which are added to these, more: of
+random sets of five patches S is off by 8e-4 in the median, at most by 6e-3.
 """
 
 from __future__ import annotations

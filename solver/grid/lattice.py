@@ -37,8 +37,8 @@ class Lattice:
     adhesion: Array
     control: Control
     h_max: float
-    origin: int = 0
-    equal_parts: int = 1
+    origin: int
+    equal_parts: int
 
     @classmethod
     def of(cls, problem: Problem, n: int) -> Lattice:

@@ -140,7 +140,7 @@ class GridMethod(Method):
             name=self.name,
             chosen=self.chosen,
             nodes=self.nodes,
-            nodes_per_wave=self.nodes / max(self.problem.highest_harmonic, 1),
+            nodes_per_wave=self.nodes / self.problem.highest_harmonic,
             accuracy=self.accuracy,
             longest_step=self.relaxation.longest_step,
             sweeps=self.relaxation.sweeps,

@@ -14,11 +14,12 @@ from adhesis.solver.grid.pairs import pairs
 # Moves whose energies differ by less than this share of the largest tie: mirror images must move
 # together, and rounding must not choose between them.
 _TIE = 1e-6
-# Least released energy of a move, as a share of γ' dx: smaller ones are within the error of S.
+# Least released energy of a move, as a share of γ' dx: smaller ones are within the error of S by
+# lumping.
 _MARGIN = 1e-4
 
-Key = tuple[int, int, int]
-"""Identifies a move of a contact set."""
+Key = tuple[int, ...]
+"""Identifies a move: side of the first edge, the nodes of one or two edges, direction."""
 
 
 class Motion(NamedTuple):

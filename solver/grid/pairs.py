@@ -30,10 +30,10 @@ class Pair:
     direction: int
     release: float
 
-    def key(self, edges: Edges) -> tuple[int, int, int]:
-        """Return the identifier of this move."""
+    def key(self, edges: Edges) -> tuple[int, ...]:
+        """Return the identifier of this move: side of its first edge, both nodes, direction."""
         one, two = self.edges
-        return int(edges.inner[one]), int(edges.inner[two]), self.direction
+        return int(edges.side[one]), int(edges.inner[one]), int(edges.inner[two]), self.direction
 
 
 def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:

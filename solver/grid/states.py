@@ -40,7 +40,7 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
         mean_stress=mean_stress,
         elastic_energy=contact.elastic_energy,
         adhesion_energy=lattice.adhesion_energy(contact),
-        contact_fraction=max(0.0, area / lattice.n),
+        contact_fraction=area / lattice.n,
         hold_energy=hold,
         internal=np.column_stack((first, width)),
     )

@@ -116,11 +116,6 @@ auto each(const std::vector<Object>& objects, Member Object::* member) {
   return out;
 }
 
-// Gaps as they were when they were last searched for touches.
-struct Searched {
-  SearchedGaps gaps;
-};
-
 // θ and T at rising θ, the weight of ∫ T g dθ divided by T, and b_n.
 std::tuple<Vector, Vector, Vector, Vector> rising(FineOpening fine) {
   const double spacing = pi / double(fine.theta.size() + 1);
@@ -177,7 +172,8 @@ void bind_model(nb::module_& m) {
                     Integers, Vector, Vector, int, Vector, Vector, Vector, int>(),
            nb::kw_only(), "width"_a, "finest_count"_a, "x"_a, "w"_a, "stress"_a, "slope"_a,
            "tilt"_a, "pattern"_a, "half_plane"_a, "weights"_a, "level_start"_a, "end_x"_a,
-           "end_w"_a, "short_count"_a, "length_x"_a, "length_w"_a, "length_before"_a, "top"_a)
+           "end_w"_a, "short_count"_a, "length_x"_a, "length_w"_a, "length_before"_a,
+           "highest_harmonic"_a)
       .def(
           "stress",
           [](const Panels& p, const Vector& theta) {
@@ -230,7 +226,6 @@ void bind_model(nb::module_& m) {
            nb::kw_only(), "adhesion"_a, "critical"_a, "newton_tolerance"_a, "field_error"_a,
            "rest_step"_a, "longest_step"_a, "smallest"_a, "rough_rate"_a, "force_error"_a)
       .def(nb::init<const EdgeLaw&>())
-      .def_ro("critical", &EdgeLaw::critical)
       .def_ro("rest_step", &EdgeLaw::rest_step)
       .def_rw("longest_step", &EdgeLaw::longest_step)
       .def_rw("smallest", &EdgeLaw::smallest)
@@ -296,8 +291,7 @@ void bind_field(nb::module_& m) {
       .def(
           "fine_opening",
           [](const Field& f, int k, double per_wave) {
-            const int count = count_sine_nodes(f.nodes.gaps[k], f.nodes.size_of(k),
-                                               f.model.panels->top, per_wave);
+            const int count = count_sine_nodes(f, k, per_wave);
             return rising(open_gap(f, k, Circle(count + 1)));
           },
           "k"_a, "per_wave"_a, Unlocked(),
@@ -416,15 +410,15 @@ void bind_nucleation(nb::module_& m) {
           },
           "opening"_a, "curvature"_a,
           "Compute the clearances of minima that lie far from all edges.");
-  nb::class_<Searched>(m, "SearchedGaps",
-                       "Gaps as they were when they were last searched; a copy has none.")
+  nb::class_<SearchedGaps>(m, "SearchedGaps",
+                           "Gaps as they were when they were last searched; a copy has none.")
       .def(nb::init<>())
-      .def("__getstate__", [](const Searched&) { return 0; })
-      .def("__setstate__", [](Searched& s, int) { new (&s) Searched(); });
+      .def("__getstate__", [](const SearchedGaps&) { return 0; })
+      .def("__setstate__", [](SearchedGaps& s, int) { new (&s) SearchedGaps(); });
   m.def(
       "search",
-      [](const Field& field, const Searched& searched, const SearchLengths& lengths) {
-        Search found = search(field, searched.gaps, lengths);
+      [](const Field& field, const SearchedGaps& searched, const SearchLengths& lengths) {
+        Search found = search(field, searched, lengths);
         Vector width, clearance;
         for (const Minimum& one : found.minima) {
           width.push_back(seed_width(one.curvature, lengths));
@@ -434,7 +428,7 @@ void bind_nucleation(nb::module_& m) {
             found.least, found.count,
             std::tuple(each(found.minima, &Minimum::theta), each(found.minima, &Minimum::opening),
                        std::move(width), each(found.minima, &Minimum::rim), std::move(clearance)),
-            Searched{std::move(found.searched)});
+            std::move(found.searched));
       },
       "field"_a, "searched"_a, "lengths"_a, Unlocked(),
       "Find the minima of the gaps of a field that may have closed.\n\n"

@@ -14,30 +14,29 @@ void scale(double factor, double* x, int count) {
 
 }  // namespace
 
-WIDE bool factor_rows(double* a, int n, int stride) {
+WIDE bool factor_rows(double* a, int n) {
   for (int k = n - 1; k >= 0; --k) {
-    double* row = a + k * stride;
-    for (int i = k + 1; i < n; ++i) subtract(a[i * stride + k], a + i * stride, row, k + 1);
+    double* row = a + k * n;
+    for (int i = k + 1; i < n; ++i) subtract(a[i * n + k], a + i * n, row, k + 1);
     if (!(row[k] > 0)) return false;
     scale(1 / std::sqrt(row[k]), row, k + 1);
   }
   return true;
 }
 
-WIDE void solve_column(const double* factor, int n, int stride, double* x) {
+WIDE void solve_column(const double* factor, int n, double* x) {
   for (int i = n - 1; i >= 0; --i) {
-    x[i] /= factor[i * stride + i];
-    subtract(x[i], factor + i * stride, x, i);
+    x[i] /= factor[i * n + i];
+    subtract(x[i], factor + i * n, x, i);
   }
-  for (int i = 0; i < n; ++i)
-    x[i] = (x[i] - dot(factor + i * stride, x, i)) / factor[i * stride + i];
+  for (int i = 0; i < n; ++i) x[i] = (x[i] - dot(factor + i * n, x, i)) / factor[i * n + i];
 }
 
 WIDE bool invert_definite(const double* matrix, int n, double* inverse) {
   thread_local Vector factor, unit;
   factor.assign(matrix, matrix + n * n);
   unit.assign(n * n, 0.0);
-  if (!factor_rows(factor.data(), n, n)) return false;
+  if (!factor_rows(factor.data(), n)) return false;
   for (int i = 0; i < n; ++i) unit[i * n + i] = 1;
   // Lᵀ Y = 1, then L X = Y, for all columns at once
   for (int k = n - 1; k >= 0; --k) {

@@ -8,12 +8,11 @@
 
 namespace adhesis {
 
-// Factor the n×n matrix in the first columns of `a`, rows of `stride`, in place of its lower
-// triangle. False if a pivot is not positive.
-bool factor_rows(double* a, int n, int stride);
+// Factor an n×n matrix in place of its lower triangle. False if a pivot is not positive.
+bool factor_rows(double* a, int n);
 
 // Solve for one right-hand side, in place, with a factor.
-void solve_column(const double* factor, int n, int stride, double* x);
+void solve_column(const double* factor, int n, double* x);
 
 // Invert an n×n matrix; returns whether it is positive definite.
 bool invert_definite(const double* matrix, int n, double* inverse);

@@ -86,8 +86,7 @@ Vector HeldEdges::residual() const {
     const int k = e / 2, first = response_.nodes.offset[k];
     change.assign(response_.nodes.size_of(k), 0);
     for (int i = 0; i < int(change.size()); ++i)
-      change[i] = response_.potential[0][first + i] +
-                  now_.pressure * response_.potential[1][first + i] - response_.about[first + i];
+      change[i] = response_.potential_at(first + i, now_.pressure) - response_.about[first + i];
     const Edge& edge = response_.edges[e];
     out.push_back(edge.residual + opening_change(response_, e, now_.motion, change.data()) -
                   edge.closing_by_pressure * (now_.pressure - response_.about_pressure[k]));

@@ -160,7 +160,7 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
     model.advance(step);
     Vector residual(count);
     for (int e = 0; e < count; ++e) {
-      residual[e] = model.edges[e].opening - model.edges[e].critical;
+      residual[e] = model.edges[e].opening - model.edges[e].critical.value;
       length = std::max(length, std::abs(model.edges[e].motion));
     }
     out.residuals.push_back(residual);
@@ -178,7 +178,7 @@ ModelFlow flow_through(EdgeModel& model, const Vector& limit, bool equal_speeds,
 // what is allowed.
 //
 // `residual` is C - C_c of the field there. On the way the errors are taken to grow as the square
-// of its length, and far from balance more is allowed.
+// of its length, and far from balance more is allowed. An error that is no number is infinite.
 double model_error(const ModelFlow& flow, const Vector& residual, const Integers& edges,
                    const Vector& ends, const EdgeLaw& law) {
   double worst = 0;
@@ -190,8 +190,8 @@ double model_error(const ModelFlow& flow, const Vector& residual, const Integers
       const double error = share * share * at_end;
       const double unbalance = std::max(std::abs(flow.residuals[i][e]) - error, 0.0);
       const double allowed = MODEL_ERROR * law.critical + MODEL_SHARE * unbalance;
-      // not written as > : an error that is no number is too large
-      if (!(error <= worst * allowed)) worst = error / allowed;
+      if (std::isnan(error / allowed)) return infinity;
+      if (error > worst * allowed) worst = error / allowed;
     }
   }
   return worst;
@@ -263,9 +263,9 @@ bool may_race(const Integers& edges, const Matrix& tangent, const Vector& start,
 
 double distance_to_minimum(const Matrix& hessian, const Vector& force) {
   Matrix factor = hessian;
-  if (!factor_rows(factor.values.data(), factor.n, factor.n)) return infinity;
+  if (!factor_rows(factor.values.data(), factor.n)) return infinity;
   Vector step = force;
-  solve_column(factor.values.data(), factor.n, factor.n, step.data());
+  solve_column(factor.values.data(), factor.n, step.data());
   return largest(step);
 }
 
@@ -280,12 +280,12 @@ Vector implicit_step(const Matrix& hessian, const Vector& force, double longest,
       double own = equal_speeds ? std::max(std::abs(force[e]), SLOWEST * strongest) : strongest;
       factor(e, e) += growth * own;
     }
-    if (!factor_rows(factor.values.data(), n, n)) {
+    if (!factor_rows(factor.values.data(), n)) {
       growth /= STEP_REDUCTION;
       continue;
     }
     step = force;
-    solve_column(factor.values.data(), n, n, step.data());
+    solve_column(factor.values.data(), n, step.data());
     const double size = largest(step);
     if (size <= longest) break;
     for (double& motion : step) motion *= longest / size;

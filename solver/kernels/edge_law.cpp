@@ -4,8 +4,8 @@ namespace adhesis {
 
 double contact_work(const Vector& ends, bool recedes, const Adhesion& adhesion) {
   double total = adhesion.work_up_to(2 * pi, recedes);
-  for (size_t e = 0; e < ends.size(); ++e)
-    total += (e % 2 == 0 ? 1 : -1) * adhesion.work_up_to(ends[e], recedes);
+  for (int e = 0; e < int(ends.size()); ++e)
+    total += outwards(e) * adhesion.work_up_to(ends[e], recedes);
   return total;
 }
 

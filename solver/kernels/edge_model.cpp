@@ -16,7 +16,7 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
     edge.own = tangent(i, i) + outwards(edge.edge) * (drift - edge.half_plane.slope);
     const int following = (i + 1) % count;
     edge.after = numbers[following] == (numbers[i] + 1) % int(ends.size()) ? following : -1;
-    evaluate(edge);
+    edge.critical = critical_of(edge.edge, edge.theta, edge.opening, law);
   }
   // of tangent(e, f) over C_f and its transpose, which are equal, that with the larger opening
   for (int e = 0; e < count; ++e) {
@@ -30,14 +30,6 @@ EdgeModel::EdgeModel(const Integers& numbers, const Vector& ends, const Vector& 
       coupling_(e, f) = coupling_(f, e) = value;
     }
   }
-}
-
-void EdgeModel::evaluate(MovingEdge& edge) const {
-  auto [critical, drift, pinned] = critical_of(edge.edge, edge.theta, edge.opening, law_);
-  edge.pinned = pinned;
-  edge.rate = edge.own + outwards(edge.edge) * edge.half_plane.slope;
-  edge.critical = critical;
-  edge.critical_rate = outwards(edge.edge) * drift;
 }
 
 void EdgeModel::advance(const Vector& step) {
@@ -55,7 +47,8 @@ void EdgeModel::advance(const Vector& step) {
     edge.motion += step[e];
   }
   follow_lengths(step);
-  for (MovingEdge& edge : edges) evaluate(edge);
+  for (MovingEdge& edge : edges)
+    edge.critical = critical_of(edge.edge, edge.theta, edge.opening, law_);
 }
 
 void EdgeModel::follow_lengths(const Vector& step) {
@@ -80,10 +73,10 @@ void EdgeModel::follow_lengths(const Vector& step) {
 }
 
 Vector EdgeModel::forces() const {
-  Vector force(edges.size());
-  for (size_t e = 0; e < edges.size(); ++e)
-    force[e] =
-        edges[e].critical * edges[e].critical - edges[e].opening * std::abs(edges[e].opening);
+  Vector force;
+  for (const MovingEdge& edge : edges)
+    force.push_back(edge.critical.value * edge.critical.value -
+                    edge.opening * std::abs(edge.opening));
   return force;
 }
 
@@ -94,10 +87,13 @@ Matrix EdgeModel::hessian() const {
     const double twice = 2 * std::max(edge.opening, 0.0);
     for (int f = 0; f < out.n; ++f)
       out(e, f) = twice * std::max(edges[f].opening, 0.0) * coupling_(e, f);
-    out(e, e) = 2 * (std::abs(edge.opening) * edge.rate - edge.critical * edge.critical_rate);
+    const double sign = outwards(edge.edge);
+    const double rate = edge.own + sign * edge.half_plane.slope;  // ∂C/∂n
+    out(e, e) =
+        2 * (std::abs(edge.opening) * rate - edge.critical.value * (sign * edge.critical.slope));
   }
   for (int e = 0; e < out.n; ++e) {
-    if (!edges[e].pinned) continue;
+    if (!edges[e].critical.pinned) continue;
     for (int f = 0; f < out.n; ++f) out(e, f) = out(f, e) = e == f ? 1 : 0;
   }
   return out;

@@ -25,11 +25,10 @@ struct MovingEdge {
   int edge;   // its number
   int after;  // index of the edge after it, -1 if that is none of the moving ones
   double theta, motion = 0;
-  double opening, rate;            // C, and ∂C/∂n
-  ValueAndSlope half_plane;        // R, and its derivative by θ
-  double critical, critical_rate;  // C_c, and its derivative by n
-  bool pinned;                     // whether C lies between both critical openings
-  double own;                      // ∂C/∂n, less that of a half-plane crack
+  double opening;            // C
+  ValueAndSlope half_plane;  // R, and its derivative by θ
+  CriticalOpening critical;  // C_c
+  double own;                // ∂C/∂n, less that of a half-plane crack
 };
 
 class EdgeModel {
@@ -54,9 +53,6 @@ class EdgeModel {
   const EdgeLaw& law_;
   const Panels& panels_;
   Matrix coupling_;  // ∂C_e/∂n_f over C_f; zero on the diagonal
-
-  // Evaluate R, C_c and the rates at the present edges.
-  void evaluate(MovingEdge& edge) const;
 
   // Move the edges by half the steps; coupling and rates of neighbours follow the lengths between.
   void follow_lengths(const Vector& step);

@@ -10,17 +10,9 @@ namespace {
 // Put a gap, filled in already, into the tree; returns whether it has a field.
 bool place_gap(LinearResponse& response, int k) {
   const Nodes& nodes = response.nodes;
-  Tree& tree = response.tree;
-  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
-  for (int i = 0; i < rule.count; ++i) {
-    const int node = nodes.offset[k] + i;
-    tree.theta[node] = nodes.theta[node];
-    tree.stretch[node] = nodes.weight[node] / rule.weights[i];
-  }
-  tree.runs[k].interval = nodes.gaps[k];
-  tree.runs[k].rank = rule.count;
-  const int square = nodes.square[k];
-  return invert_definite(&response.equations.blocks[square], rule.count, &response.inverse[square]);
+  const int square = nodes.square[k], m = nodes.size_of(k);
+  response.tree.place_gap(nodes, k);
+  return invert_definite(&response.equations.blocks[square], m, &response.inverse[square]);
 }
 
 // Move the reference of a gap, placed already, with the potential there; `old` is where it was,
@@ -31,8 +23,7 @@ void renew_gap(LinearResponse& response, int k, const Gap& old, const GaussRule&
   const int first = nodes.offset[k];
   response.about_pressure[k] = pressure;
   Vector known(old_rule.count);
-  for (int i = 0; i < old_rule.count; ++i)
-    known[i] = response.potential[0][first + i] + pressure * response.potential[1][first + i];
+  for (int i = 0; i < old_rule.count; ++i) known[i] = response.potential_at(first + i, pressure);
   for (int node = first; node < first + nodes.size_of(k); ++node)
     response.about[node] = response.tree.stretch[node] *
                            interpolate_potential(old, old_rule, known.data(), nodes.theta[node]);
@@ -270,9 +261,9 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     }
     const double size = largest(step);
     const bool stalled = size <= law.field_error && size > NEWTON_SHRINKS * last;
-    // not written as > : a size that is no number is a failure, too
     const double longest = std::max(NEWTON_SHRINKS * last, law.rest_step);
     const bool within = size <= std::min(reach, longest);
+    // not written as <= : the length beside an edge that is no number is none
     if (!(within && largest(travelled) <= reach && shortest_length(moved) > 0)) break;
     ends = moved;
     const bool at_rest = stalled || (!strict && size <= rest_within(ends, law));
@@ -283,7 +274,7 @@ Equilibrium find_equilibrium(LinearResponse& response, Vector ends, double presc
     if (out.corrections >= MOST_CORRECTIONS) break;
     last = size;
   }
-  out.potential = response.potential_at(pressure);
+  out.potential = response.potentials_at(pressure);
   response.is_lost = !out.found;
   out.references = response.nodes.gaps;
   out.orders = response.nodes.orders;

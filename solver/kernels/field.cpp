@@ -16,14 +16,7 @@ void weigh_inverse(const double* inverse, const GaussRule& rule, double* respons
 
 Tree build_tree(const Nodes& nodes, double digits) {
   Tree tree(nodes, digits);
-  for (int k = 0; k < nodes.gap_count(); ++k) {
-    const Vector& w = gauss_rules()[nodes.orders[k]].weights;
-    for (int i = 0; i < nodes.size_of(k); ++i) {
-      const int node = nodes.offset[k] + i;
-      tree.theta[node] = nodes.theta[node];
-      tree.stretch[node] = nodes.weight[node] / w[i];
-    }
-  }
+  for (int k = 0; k < nodes.gap_count(); ++k) tree.place_gap(nodes, k);
   for (int run = tree.count; run < tree.run_count(); ++run) tree.place_charges(run);
   return tree;
 }
@@ -72,15 +65,11 @@ Vector edge_openings(const Vector& f, const Nodes& nodes, const Equations& equat
 Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
                   const FieldModel& model) {
   const std::vector<GaussRule>& rules = gauss_rules();
-  std::vector<Gap> gaps = map_gaps(ends);
+  const std::vector<Gap> gaps = map_gaps(ends);
   const int count = int(gaps.size());
-  bool solvable = in_order(gaps);
-  if (!solvable) {  // any edges with a field, whose pressure is then NaN
-    Vector any(2 * count);
-    for (int e = 0; e < 2 * count; ++e) any[e] = e * pi / count;
-    gaps = map_gaps(any);
-  }
   Field field(model);
+  field.edge_opening.assign(ends.size(), not_a_number);
+  if (!in_order(gaps)) return field;
   field.nodes = Nodes(gaps, orders);
   field.equations = allocate_equations(field.nodes);
   const Nodes& nodes = field.nodes;
@@ -89,7 +78,7 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
   for (int k = 0; k < count; ++k) {
     fill_gap(k, 1, field.nodes, field.equations, model);
     const int at = nodes.square[k];
-    solvable &= invert_definite(&field.equations.blocks[at], nodes.size_of(k), &inverse[at]);
+    if (!invert_definite(&field.equations.blocks[at], nodes.size_of(k), &inverse[at])) return field;
   }
   Tree tree = build_tree(nodes, model.digits);
   Vector weights(n);
@@ -109,7 +98,6 @@ Field solve_field(const Vector& ends, double prescribed, const Integers& orders,
   field.separation = prescribed;
   if (compliance != 0)
     field.separation = -(load_mean + field.pressure * field.unit_mean) / (2 * pi);
-  if (!solvable) field.pressure = not_a_number;
   field.scaled_opening.resize(n);
   for (int i = 0; i < n; ++i)
     field.scaled_opening[i] = -field.solved[0][i] - field.pressure * field.solved[1][i];
@@ -133,14 +121,14 @@ Field solve_separately(const Vector& ends, const std::vector<Gap>& known, const 
     const int m = rule.count, first = nodes.offset[k];
     const double* block = &field.equations.blocks[nodes.square[k]];
     Vector factor(block, block + m * m);
-    if (!factor_rows(factor.data(), m, m)) pressure = not_a_number;
+    if (!factor_rows(factor.data(), m)) pressure = not_a_number;
     std::copy_n(&nodes.weight[first], m, &by_pressure[first]);
-    solve_column(factor.data(), m, m, &by_pressure[first]);
+    solve_column(factor.data(), m, &by_pressure[first]);
     for (int i = first; i < first + m; ++i) {
       double there = interpolate_potential(known[k], rule, &potential[first], nodes.theta[i]);
       f[i] = -(field.equations.load[i] + pressure * nodes.weight[i]) - nodes.weight[i] * there;
     }
-    solve_column(factor.data(), m, m, &f[first]);
+    solve_column(factor.data(), m, &f[first]);
   }
   const double mean = dot(nodes.weight.data(), f.data(), n);  // mean opening times 2π
   const double unit_mean = dot(nodes.weight.data(), by_pressure.data(), n);  // its fall by p

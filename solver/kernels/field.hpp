@@ -15,7 +15,7 @@ struct Field {
   Pair solved;                       // (B + G)⁻¹ of S~ and of X; empty if the potential was known
   double unit_mean = not_a_number;   // Xᵀ (B + G)⁻¹ X
   double resistance = not_a_number;  // -2π/resistance is ∂p/∂d at fixed edges
-  double pressure = not_a_number;    // p; NaN if there is no field
+  double pressure = not_a_number;    // p; NaN, as are all C, if there is no field
   double separation = not_a_number;  // q0 s
   Vector scaled_opening;             // f: the openings over sqrt(1-η²)
   Vector edge_opening;               // C at each edge

@@ -33,7 +33,7 @@ struct Panels {
   Vector end_x, end_w;               // Gauss-Legendre rule on (0, 1) of an end piece
   ShortRule short_rule;              // of a short gap, unless it needs more nodes
   LengthRule length;
-  int top;  // highest harmonic of the profile
+  int highest_harmonic;  // of the profile
 
   int nodes() const { return int(x.size()); }
 };

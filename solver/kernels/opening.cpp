@@ -82,14 +82,16 @@ std::vector<Candidate> local_minima(const Vector& x, const Vector& y) {
   return out;
 }
 
-int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave) {
+int count_sine_nodes(const Field& field, int k, double per_wave) {
+  const Gap& gap = field.nodes.gaps[k];
+  const int top = field.model.panels->highest_harmonic;
   double widest = 0;
   const auto circle = circle_of(24);
   for (int i = 1; i < circle->count; ++i)
     widest = std::max(widest, theta_at(gap, circle->cosine[i]).stretch * circle->sine[i]);
   const int waves = int(std::ceil(0.5 * per_wave * widest * top));
   const int ends = int(FEWEST_SINE_NODES * std::max(1.0, per_wave / SHAPE_NODES));
-  return fast_size(std::max(waves + ends, modes));
+  return fast_size(std::max(waves + ends, field.nodes.size_of(k)));
 }
 
 FineOpening open_gap(const Field& field, int k, const Circle& circle) {
@@ -128,22 +130,20 @@ double work_of_gaps(const Field& field) {
   const Nodes& nodes = field.nodes;
   double total = 0;
   for (int k = 0; k < nodes.gap_count(); ++k) {
-    const int m = nodes.size_of(k);
     constexpr double per_wave = 2.5;  // two for the modes of the shortest wave, the rest decay
-    const int count = count_sine_nodes(nodes.gaps[k], m, panels.top, per_wave);
+    const int count = count_sine_nodes(field, k, per_wave);
     const FineOpening fine = fine_moments(nodes.gaps[k], *circle_of(count + 1), panels);
-    for (int n = m; n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);
+    for (int n = nodes.size_of(k); n < count; ++n) total += fine.modes[n] * fine.modes[n] / (n + 1);
   }
   return -pi / 2 * total +
          dot(field.equations.load.data(), field.scaled_opening.data(), nodes.size());
 }
 
 std::vector<Minimum> find_minima(const Field& field, const Integers& gaps, double range) {
-  const int top = field.model.panels->top;
   std::vector<Minimum> out;
   for (int k : gaps) {
     const Gap& gap = field.nodes.gaps[k];
-    const int count = count_sine_nodes(gap, field.nodes.size_of(k), top, SHAPE_NODES);
+    const int count = count_sine_nodes(field, k, SHAPE_NODES);
     const FineOpening fine = open_gap(field, k, *circle_of(count + 1));
     const auto begin = fine.opening.begin(), end = fine.opening.end();
     for (Candidate minimum : local_minima(fine.theta, fine.opening)) {

@@ -14,9 +14,9 @@ struct FineOpening {
   Vector opening, modes;     // T and b_n
 };
 
-// Count the sine nodes of a gap at `per_wave` nodes per shortest wave, of `top` waves a period;
-// there are no fewer than `modes`, those of its field.
-int count_sine_nodes(const Gap& gap, int modes, int top, double per_wave);
+// Count the sine nodes of gap k at `per_wave` nodes per shortest wave of the profile; there are no
+// fewer than modes of the field.
+int count_sine_nodes(const Field& field, int k, double per_wave);
 
 // Evaluate the opening of gap k at the nodes of a circle.
 FineOpening open_gap(const Field& field, int k, const Circle& circle);

@@ -254,7 +254,7 @@ ResponseSolution LinearResponse::solve(double prescribed, const EdgeLaw& law,
   for (int k : std::exchange(displaced, {})) {
     about_pressure[k] = out.pressure;
     for (int i = nodes.offset[k]; i < nodes.offset[k + 1]; ++i)
-      about[i] = potential[0][i] + out.pressure * potential[1][i];
+      about[i] = potential_at(i, out.pressure);
     linearise(k, law);
   }
   return out;
@@ -292,11 +292,11 @@ double LinearResponse::pressure_at(double prescribed, const LoadingDevice& devic
   return (2 * pi * prescribed - by_separation) / prescribed_by_pressure(device);
 }
 
-Vector LinearResponse::potential_at(double pressure) const {
+Vector LinearResponse::potentials_at(double pressure) const {
   Vector out;
   for (int k = 0; k < gap_count(); ++k)
     for (int i = nodes.offset[k], end = i + nodes.size_of(k); i < end; ++i)
-      out.push_back(potential[0][i] + pressure * potential[1][i]);
+      out.push_back(potential_at(i, pressure));
   return out;
 }
 

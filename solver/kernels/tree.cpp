@@ -273,8 +273,6 @@ Tree::Tree(const Nodes& nodes, double digits, double room) : count(nodes.gap_cou
     int one = 0, two = 0;
     if (i < count) {
       run.range = {i, i};
-      run.interval = nodes.gaps[i];
-      run.rank = nodes.size_of(i);
       run.room = nodes.offset[i + 1] - nodes.offset[i];
     } else {
       const Run &left = runs[run.half[0]], &right = runs[run.half[1]];
@@ -300,6 +298,17 @@ Tree::Tree(const Nodes& nodes, double digits, double room) : count(nodes.gap_cou
   response = unset(end.response);
   inverse = unset(end.inverse);
   inner_potential = unset(end.interpolation);
+}
+
+void Tree::place_gap(const Nodes& nodes, int k) {
+  const GaussRule& rule = gauss_rules()[nodes.orders[k]];
+  for (int i = 0; i < rule.count; ++i) {
+    const int node = nodes.offset[k] + i;
+    theta[node] = nodes.theta[node];
+    stretch[node] = nodes.weight[node] / rule.weights[i];
+  }
+  runs[k].interval = nodes.gaps[k];
+  runs[k].rank = rule.count;
 }
 
 WIDE void Tree::place_charges(int index, bool own, std::array<bool, 2> halves) {

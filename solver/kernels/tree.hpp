@@ -68,6 +68,9 @@ struct Tree {
   int size() const { return int(theta.size()); }
   int run_count() const { return int(runs.size()); }
 
+  // Put gap k, whose nodes are filled in, into the tree.
+  void place_gap(const Nodes& nodes, int k);
+
   // Place the charges of a run, and compute its interpolation and kernel; the charges of which
   // halves have moved, if its own have not.
   void place_charges(int run, bool own = true, std::array<bool, 2> halves = {true, true});
@@ -92,7 +95,7 @@ struct Tree {
 // Count the negative eigenvalues of [[h, 1], [1, r]], h and r symmetric, n×n, and overwritten.
 //
 // By pivots of two rows, one of each half: where h r is small they are far from singular. `nearest`
-// is the least of their determinants, without sign: about the least of those of 1 - h r.
+// is the least of their determinants, without sign: about the least eigenvalue of 1 - h r.
 NegativeCount count_negative(double* h, double* r, int n);
 
 }  // namespace adhesis

@@ -118,7 +118,8 @@ class EquilibriumPath(ByValue, ResultViews):
         Shortest length in m that decides where edges stand (``zero_range``).
     turn_range : float
         Range of adhesion in m at which jumps that lie beyond a turning point, and would come before
-        it, take a hundredth of the loss. Infinite if it is longer than the other three ranges.
+        it, take a hundredth of the loss. Infinite if it is longer than the other three ranges, 0 if
+        such a jump lies nearer than the places of jumps are known.
 
     References
     ----------

@@ -206,7 +206,7 @@ class LoopResult(EquilibriumPath):
         ]
 
     def _rows_of_end(self) -> list[tuple[str, str]]:
-        return [("pull-off", f"mean tension {self.pull_off_stress + 0.0:.6g} Pa")]
+        return [("pull-off", f"mean tension {self.pull_off_stress:.6g} Pa")]
 
     @property
     def turning_text(self) -> str:

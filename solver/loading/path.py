@@ -25,6 +25,7 @@ from adhesis.solver.checks import counted, finite_row, flag, function, instance
 from adhesis.solver.loading.cycle import DEFAULT_LOAD_STEPS, check_cycle
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields, with_turn_range
 from adhesis.solver.loading.ledger import Ledger
+from adhesis.solver.loading.mean_stress_event import before_jumps
 from adhesis.solver.loading.path_record import (
     HOW_METHOD,
     Axis,
@@ -67,7 +68,7 @@ class MinorLoop(NotebookDisplay):
         A/A0 at its end less that at its start.
     closes : bool
         True if it ends in its initial state: stress and contact agree to a millionth of their
-        ranges on the loop.
+        ranges on the loop, or contact to 1e-9 of the largest one.
 
     References
     ----------
@@ -361,7 +362,7 @@ class _PathRecord(Record):
             load_steps=load_steps,
             leg=legs,
             potential=self.column("potential"),
-            jump_leg=legs[self.before_jumps()],
+            jump_leg=legs[before_jumps(self.states, self.jumps)],
             minor_loops=tuple(self._minor_loop(ledger, *ends) for ends in self.closed),
             work=ledger.work,
             energy_change=ledger.rise,

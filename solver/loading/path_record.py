@@ -12,7 +12,7 @@ import numpy as np
 
 from adhesis.solver import views
 from adhesis.solver.checks import function
-from adhesis.solver.loading.mean_stress_event import before_jumps, follow_to_stress
+from adhesis.solver.loading.mean_stress_event import follow_to_stress
 from adhesis.solver.method import ContactState, Method, PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Branch, Jump
@@ -225,10 +225,6 @@ class Record:
     def column(self, name: str) -> Array:
         """Return one attribute of every state, shape (states,)."""
         return np.array([getattr(state, name) for state in self.states])
-
-    def before_jumps(self) -> list[int]:
-        """Return the index of the state before each jump; the next one is that after it."""
-        return before_jumps(self.states, self.jumps)
 
     def copy(self) -> Self:
         """Return a copy with lists of its own."""

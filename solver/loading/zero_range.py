@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver.loading.mean_stress_event import before_jumps
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import ContactState, Method, PathError
 from adhesis.solver.model.control import Control
@@ -119,7 +120,7 @@ def interior_tension(method: Method, record: Record) -> InteriorTension | None:
 
 def _sampled(record: Record) -> list[int]:
     """Return the indices of the states that are searched where nothing opens."""
-    before = zip(record.jumps, record.before_jumps(), strict=True)
+    before = zip(record.jumps, before_jumps(record.states, record.jumps), strict=True)
     starts = sorted((-jump.energy_drop, i) for jump, i in before if jump.branch == "unloading")
     spaced = np.linspace(0, len(record.states) - 1, _SAMPLES + 2)[1:-1].astype(int)
     return sorted({*(index for _, index in starts[:_JUMPS]), *spaced.tolist()})
@@ -145,9 +146,8 @@ def _persistent_states(problem: Problem, record: Record) -> list[int]:
 def narrowest_length(problem: Problem, record: Record) -> float:
     """Return the shortest length in m that decides where edges stand; see the module."""
     shortest = problem.shortest_wavelength
-    order = sorted(
-        zip(record.jumps, record.before_jumps(), strict=True), key=lambda one: -one[0].energy_drop
-    )
+    starts = zip(record.jumps, before_jumps(record.states, record.jumps), strict=True)
+    order = sorted(starts, key=lambda one: -one[0].energy_drop)
     rest = _MOST_OF_LOSS * sum(jump.energy_drop for jump, _ in order)
     for jump, index in order:
         if rest <= 0:

@@ -61,7 +61,8 @@ EQUAL_CRESTS = 1e-9
 below it make no two parts of a period differ."""
 
 MIRRORED = 1e-6
-"""Of h_max: waves may be so far from their mirror image. Jumps are hardly located more finely."""
+"""Of h_max, of a pattern of γ: waves may be so far from their mirror image. Jumps are hardly
+located more finely."""
 
 # Of the shortest wave: places in equal parts of the period that differ by less are copies.
 _SAME_PLACE = 1e-3
@@ -297,10 +298,11 @@ class Profile(ByValue):
     @cached_property
     def mirror_axes(self) -> Array:
         """Places x in m, from 0 to λ/2, about which the profile is nearly its own mirror image."""
-        harmonics, allowed = self._harmonics, MIRRORED * self.h_max
-        first = int(harmonics[0])
-        angle = (np.pi * np.arange(first) - np.angle(self.coefficients[first])) / first
-        for m in harmonics[1:]:
+        allowed = MIRRORED * self.h_max
+        # those of the largest wave: of a small one the phase may be noise
+        largest = int(np.abs(self.coefficients).argmax())
+        angle = (np.pi * np.arange(largest) - np.angle(self.coefficients[largest])) / largest
+        for m in self._harmonics:
             if not len(angle):
                 break
             odd = np.imag(self.coefficients[m] * np.exp(1j * m * angle))
@@ -489,7 +491,7 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     real("largest height", float(np.abs(h).max()), _HEIGHT_OR_NONE)
     a = np.fft.rfft(h - h.mean()) / h.size
     # Rounding noise is set to 0, so that a flat or band-limited input remains so.
-    a[np.abs(a) < 1e-15 * max(float(np.max(np.abs(h))), 1e-300)] = 0
+    a[np.abs(a) < 1e-15 * np.abs(h).max()] = 0
     a[0] = 0
     if h.size % 2 == 0:
         a[-1] = a[-1].real / 2

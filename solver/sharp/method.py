@@ -235,12 +235,12 @@ class SharpMethod(Method):
 
     def _history(self, state: ContactState, target: Target) -> History:
         history = History()
+        touch, highest = self.jumps.first_touch()  # kept: the first path must not depend on it
         self.edges.forget()
         control = self.problem.control
         d = self.states.prescribed_of(state)
         point = self.follower.recall_point(state.internal)
         if not state.patches:
-            touch, highest = self.jumps.first_touch()
             first = 0.0 if control.is_load else touch
             if target.direction == "unloading" or target.d > first:
                 apart = self.problem.detached_separation(state, target.prescribed)
@@ -292,10 +292,8 @@ class SharpMethod(Method):
         lighter = [s for s in self._loaded if prescribed_in(s) >= target.prescribed]
         start = prescribed_in(state)
         back = [s for s in self._loaded if start < prescribed_in(s) < target.prescribed]
-        h_max = self.problem.profile.h_max
-        first = self.detached(
-            h_max if self.problem.control.is_load else max(target.prescribed, h_max)
-        )
+        apart = self.problem.detached_separation(state, target.prescribed)
+        first = self.detached(max(apart, self.problem.profile.h_max))
         last = min(lighter, key=prescribed_in, default=first)
         if prescribed_in(last) > target.prescribed:
             last = self._history(last, replace(target, direction="loading")).states[-1]

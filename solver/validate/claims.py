@@ -2,7 +2,8 @@
 
 Claims and the reasons for their bounds (see also ``judge``):
 
-*   losses: the stated error of the method (grid: 0.5 % with at most 4096 nodes; sharp: 1e-8);
+*   losses: the stated error of the method (grid: 0.5 % with at most 4096 nodes; sharp: 1e-8 of the
+    drops, 1e-5 of the loop integral);
 *   energies along the branch: the adhesion energy 2γe of the resolution e at both edges;
 *   a small contact, compared with a parabola: with ψ = πa/λ the repulsion is smaller by less than
     a share ψ²/3, the tension larger by less than ψ²/6 (1 + ψ²), exactly from the closed forms;

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from adhesis import Control, HalfSpace, LoopResult, Problem, make_method, run_path, single_wave
+from adhesis import (
+    Control,
+    HalfSpace,
+    LoopResult,
+    Problem,
+    make_method,
+    run_loop,
+    run_path,
+    single_wave,
+)
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.jump import Jumps
@@ -136,6 +145,15 @@ def test_surfaces_that_would_part_again_touch_from_nearer_by():
     assert 0 <= touch.energy_drop < 1e-4 * wave.loop.loss
     assert abs(float(wave.energy(wave.half_width(touch.separation)))) < 1e-9 * PERIOD
     assert any("edge_range" in warning for warning in loop.warnings)
+
+
+def test_a_second_loop_of_a_method_has_the_bits_of_the_first():
+    """First touch is found once, by descents that the first path must not depend on."""
+    profile = scenes.rough(2, 8, 6, period=1e-3)
+    problem = Problem(profile, HalfSpace(1e6, 0.5), 0.001, adhesion_range=3e-8)
+    method = make_method("sharp", problem)
+    first, second = (run_loop(method, max_penetration=0.5, load_steps=5) for _ in range(2))
+    assert first == second
 
 
 def test_the_loss_falls_with_the_range_as_stress_changes_at_touches():

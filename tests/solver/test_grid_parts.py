@@ -11,7 +11,7 @@ from adhesis.solver.grid.edges import survey
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.grid.moves import Move
+from adhesis.solver.grid.moves import Move, edge_moves, pair_moves
 from adhesis.solver.model.control import Control
 from tests.support.scenes import HALF_SPACE, grid_of
 
@@ -83,7 +83,7 @@ def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
     elastic = ElasticGrid(n, 2.0 * n, 1e6)
     kernel = elastic.kernel()
     compliance = EdgeCompliance(kernel)
-    lattice = Lattice(elastic, compliance, np.zeros(n), np.zeros(n), Control(), 1.0)
+    lattice = Lattice(elastic, compliance, np.zeros(n), np.zeros(n), Control(), 1.0, 0, 1)
     errors = []
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -122,6 +122,21 @@ def test_compliance_of_a_pair_of_edges_where_patches_fill_the_period(gap):
         exact = own - across @ np.linalg.solve(dense(kernel, nodes, nodes), across.T)
         found = compliance.across_gap(near, gap, n - gap - near)
         assert np.abs(found - exact).max() < 0.05 * exact[0, 0]
+
+
+def test_a_blocked_move_of_one_edge_blocks_no_pair():
+    """Nodes of a pair were taken for side and node of one edge where a patch began at node 1."""
+    method = rough()
+    contact = method.solver.empty(5e-6)
+    contact.mask[1:8] = True
+    method.solver.solve(contact, 1e-4)
+    edges = survey(contact, method.lattice)
+    pair = pair_moves(contact, edges, method.lattice, set(), False)
+    assert [(move.edge, move.direction) for move in pair] == [(0, -1), (1, -1)]
+    single = edge_moves(edges, method.lattice, 1, {}, set(), 0, False)
+    assert {(1, 7, -1)} < {move.key for move in single}
+    blocked = {move.key for move in single}
+    assert pair_moves(contact, edges, method.lattice, blocked, False) == pair
 
 
 def settle(method: GridMethod, separation: float) -> tuple[Contact, list[float]]:

@@ -164,6 +164,11 @@ def test_axes_and_equal_parts_of_a_profile():
     assert even.mirror_axes.tolist() == [0.0]
     np.testing.assert_allclose(even.shifted(0.3).mirror_axes, [0.3])
     assert len(bumpy(8, 6e-5, np.exp(0.1j)).mirror_axes) == 0
+    # noise of a wave that is longer than all others settles no axis
+    flat = Profile(1.0, np.array([0, 0, 0, 0, 1e-6, 2e-7, 1e-7]))
+    for odd, found in ((1e-9, 1), (0.9e-6, 1), (1.1e-6, 0)):
+        noise = flat.h_max * odd * np.array([0, 1j, 0, 0, 0, 0, 0])
+        assert len(Profile(1.0, flat.coefficients + noise).mirror_axes) == found
     assert even.equal_parts == 1
     assert Profile(1.0, np.array([0, 0, 0, 0, 1e-6, 0, 1e-7])).equal_parts == 2
 

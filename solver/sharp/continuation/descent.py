@@ -8,7 +8,6 @@ and whether the minimum that was reached depends on the speeds of the edges.
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 
 import numpy as np
 from numpy.linalg import norm
@@ -57,25 +56,24 @@ class Descents:
         """Descend to the next minimum of the energy; None when no contact is left.
 
         Where edges may have raced, finer steps decide, if they end with less energy: more may be
-        that of a minimum on the way that the field's error shows. A minimum that equal speeds or
-        steps of the other length lead to instead is added to ``rivals``, unless there is one; or
-        where edges passed what a finer field may show to be one.
+        that of a minimum on the way that the field's error shows. Another end to which equal speeds
+        or steps of the other length lead is added to ``rivals``, unless there is one; or where
+        edges passed what a finer field may show to be a minimum.
         """
         others: list[Rival] = []
         passed: list[Rival] = []
         point, raced = self.relax(gaps, d, passed=passed)
         if raced and self.may_race:
-            try:
-                others.append(self.relax(gaps, d, equal_speeds=True)[0])
-            except (FullContact, NoState) as unknown:
-                others.append(unknown)
-            with suppress(NoState, FullContact):
-                finer, _ = self.relax(gaps, d, share=FINER_STEPS)
-                if point and finer and not self.is_same_minimum(point, finer):
-                    end, other = (self._states.of_point(one).potential for one in (finer, point))
-                    if end < other:
-                        point, finer = finer, point
-                    others.append(finer)
+            for way in ({"equal_speeds": True}, {"share": FINER_STEPS}):
+                try:
+                    others.append(self.relax(gaps, d, **way)[0])
+                except (FullContact, NoState) as unknown:
+                    others.append(unknown)
+            finer = others[-1]
+            if point and isinstance(finer, Point) and not self.is_same_minimum(point, finer):
+                end, other = (self._states.of_point(one).potential for one in (finer, point))
+                if end < other:
+                    point, others[-1] = finer, point
         for rival in others + passed:
             if not rivals and self._is_rival(rival, gaps, point):
                 rivals.append(rival)

@@ -138,8 +138,7 @@ class Follower:
             branch.refine()
             return None
         after = jump.point
-        goes_on = fold.d != target.d and self._is_near(fold.point, after)
-        if goes_on and after is not None:
+        if after is not None and fold.d != target.d and self._is_near(fold.point, after):
             # Newton's iteration failed where there was no fold: the branch goes on.
             branch.continue_from(after)
             return None
@@ -271,7 +270,8 @@ class Follower:
         if jump.misplaced > allowed and located > self.resolution.field_limit:
             return None
         displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
-        misplaced = jump.misplaced + max(0.0, displaced - self.resolution.field_share * abs(drop))
+        # in this order a displacement that is no number leaves the error unknown
+        misplaced = jump.misplaced + max(displaced - self.resolution.field_share * abs(drop), 0.0)
         if jump.point is None and self.edges.is_load:
             # The loop is closed at the separation of the last state (``model.control``). There s
             # goes like a square root of the distance from the fold, 2 ds/dd times that further on.
@@ -330,8 +330,8 @@ class Follower:
         motion[edge] = math.copysign(longest[edge], length)
         return move_edges(gaps, motion)
 
-    def _is_near(self, point: Point, after: Point | None) -> bool:
+    def _is_near(self, point: Point, after: Point) -> bool:
         """Whether no edge left the reach of Newton's iteration in a descent."""
-        if after is None or after.gaps.shape != point.gaps.shape:
+        if after.gaps.shape != point.gaps.shape:
             return False
         return bool(np.abs(after.gaps - point.gaps).max() < self.edges.law.rest_step)

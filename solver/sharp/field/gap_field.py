@@ -93,10 +93,9 @@ class GapField:
         nearly: tuple[float, float] | None = None,
     ) -> None:
         self.source, self.gaps, self.prescribed = source, gaps, prescribed
-        self._solve: Callable[[], Field] | None = solve
-        self._nearly = nearly
+        self._solve, self._nearly = solve, nearly
 
-    @property
+    @cached_property
     def solution(self) -> Field:
         """Solution of equation (1), solved at first access.
 
@@ -105,11 +104,9 @@ class GapField:
         FloatingPointError
             If the matrix of the gaps is not positive definite to rounding.
         """
-        if self._solve is not None:
-            solution = self._solve()
-            check_definite(solution)
-            self._solution, self._solve = solution, None
-        return self._solution
+        solution = self._solve()
+        check_definite(solution)
+        return solution
 
     @cached_property
     def work(self) -> float:

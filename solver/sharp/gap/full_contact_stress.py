@@ -108,12 +108,12 @@ class StressSource:
             finest_count=count,
             x=x,
             w=w,
-            stress=np.ascontiguousarray(stress @ to_chebyshev),
-            slope=np.ascontiguousarray(slope @ to_chebyshev),
-            tilt=np.ascontiguousarray(tilt),
-            pattern=np.ascontiguousarray(shares),
+            stress=stress @ to_chebyshev,
+            slope=slope @ to_chebyshev,
+            tilt=tilt,
+            pattern=shares,
             half_plane=half_plane,
-            weights=list(np.ascontiguousarray(np.concatenate(levels, axis=1))),
+            weights=list(np.concatenate(levels, axis=1)),
             level_start=np.cumsum([0, *sizes[:-1]]),
             end_x=(t + 1) / 2,
             end_w=end / 2,
@@ -121,7 +121,7 @@ class StressSource:
             length_x=piece_x,
             length_w=piece_w,
             length_before=np.concatenate([[0.0], np.cumsum(whole * width)]),
-            top=top,
+            highest_harmonic=top,
         )
 
 
