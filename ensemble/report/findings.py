@@ -50,7 +50,8 @@ def _outcome(data: Aggregate) -> str:
     cells.sort(key=lambda cell: cell.estimates["loss"].mean)
     cycle = data.campaign.cycle
     top = f"A loop to {turning_point(data)} and back until detached loses"
-    what = "it is lost"
+    friction = _friction(data, cells)
+    what = "the drops are lost" if friction else "it is lost"
     if cycle.under_load:
         ends = from_to(_all(data, "pull_off_stress").tolist(), stress_text)
         top = (
@@ -58,7 +59,6 @@ def _outcome(data: Aggregate) -> str:
             "(the loop is closed at the separation of the fall), loses"
         )
         what = "the drops before the fall are lost"
-    friction = _friction(data, cells)
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}{friction}."
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
@@ -75,7 +75,7 @@ def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
         return ""
     pairs = ((cell.estimates["friction"].mean, cell.estimates["loss"].mean) for cell in cells)
     share = [friction / loss for friction, loss in pairs if loss > 0]
-    return f"; {_from_to(share)} is friction of receding edges" if share else ""
+    return f"; friction of receding edges is {_from_to(share)} of the loss" if share else ""
 
 
 def pattern(data: Aggregate) -> Iterator[str]:
