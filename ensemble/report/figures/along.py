@@ -25,7 +25,7 @@ _LOG_FROM = 20  # an axis that spans more is logarithmic
 # Name, label, unit, and whether the panel begins at 0.
 _OF_TURNING_POINT = (
     ("pull_off_stress", "largest tension (kPa)", 1e3, True),
-    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0, False),
+    ("pull_off_penetration", r"detached by $\Delta/h_\mathrm{max}$", 1.0, False),
     ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0, True),
 )
 
