@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops
+from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
@@ -234,7 +235,7 @@ def quality(data: Aggregate) -> Iterator[str]:
         )
     ends = [float(cell.penetration["unloading"][-1]) for cell in data.cells]
     pull_off = [cell.values["pull_off_penetration"] for cell in data.cells]
-    if cut := sum(int(np.sum(at < end)) for at, end in zip(pull_off, ends, strict=True)):
+    if cut := sum(int(np.sum(at < end - 1e-9)) for at, end in zip(pull_off, ends, strict=True)):
         yield (
             f"{cut} loops detached below Δ/h_max = {from_to(ends)}, where the stored unloading "
             "curve ends: their curves are cut, their losses are complete."
@@ -248,8 +249,10 @@ def warnings(data: Aggregate) -> list[str]:
 
 
 def _doubtful_companions(data: Aggregate) -> Iterator[str]:
-    """Sentences on the campaigns beside this one that have doubtful losses."""
+    """Sentences on campaigns beside this one with doubtful losses, or with no loop in common."""
     for other in data.companions:
+        if not any(difference(cell, other.like(cell)) for cell in data.cells):
+            yield f"WARNING: {other.path.name}, beside this campaign, shares no loop with it."
         wrong = sum(int(np.sum(cell.doubtful | cell.beyond_zero_range)) for cell in other.cells)
         if wrong:
             yield (
