@@ -305,7 +305,7 @@ def shown_unit(name: str, largest: float) -> tuple[str, float]:
     """
     unit = UNITS.get(name, "")
     quantity = QUANTITIES.get(unit)
-    if quantity is None:
+    if quantity is None or math.isinf(largest):
         return unit, 1.0
     unit = quantity.unit_for(largest)
     return unit, quantity.units[unit]

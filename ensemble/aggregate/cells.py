@@ -64,8 +64,7 @@ class Cell:
     rows: Rows  # shape (done,); rows of the done tasks in the file, by realisation
     seed: NDArray[np.int64]  # shape (done,)
     # Each of shape (done,); per-task numbers under the names of the results file, and
-    # ``small_scale_share`` (loss_small_scale / loss_from_drops, under a load over the
-    # drops before the solid falls off); ``instability`` (loss without friction);
+    # ``small_scale_share`` (of the drops of both scales); ``instability`` (loss without friction);
     # ``loss_error_dimensionless``, ``energy_at_stake_dimensionless`` (in W~);
     # ``pull_off_stress_dimensionless`` (in σ~); ``loss_per_contact``,
     # ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
@@ -182,9 +181,7 @@ def read_cells(results: Results) -> list[Cell]:
         of_rows = status[rows_of_cell]
         rows = rows_of_cell[of_rows == DONE]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
-        drops = values["loss_from_drops"]
-        if campaign.cycle.under_load:  # without the drop that closes the loop
-            drops = values["loss_small_scale"] + values["loss_large_scale"]
+        drops = values["loss_small_scale"] + values["loss_large_scale"]
         values["small_scale_share"] = np.divide(
             values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
         )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops, precisions
+from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
 from adhesis.ensemble.quantities import gamma_text, in_one_unit, percent, stress_text, with_unit
@@ -50,7 +51,8 @@ def _outcome(data: Aggregate) -> str:
     cells.sort(key=lambda cell: cell.estimates["loss"].mean)
     cycle = data.campaign.cycle
     top = f"A loop to {turning_point(data)} and back until detached loses"
-    what = "it is lost"
+    friction = _friction(data, cells)
+    what = "the drops are lost" if friction else "it is lost"
     if cycle.under_load:
         ends = from_to(_all(data, "pull_off_stress").tolist(), stress_text)
         top = (
@@ -58,7 +60,6 @@ def _outcome(data: Aggregate) -> str:
             "(the loop is closed at the separation of the fall), loses"
         )
         what = "the drops before the fall are lost"
-    friction = _friction(data, cells)
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}{friction}."
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
@@ -75,7 +76,7 @@ def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
         return ""
     pairs = ((cell.estimates["friction"].mean, cell.estimates["loss"].mean) for cell in cells)
     share = [friction / loss for friction, loss in pairs if loss > 0]
-    return f"; {_from_to(share)} is friction of receding edges" if share else ""
+    return f"; friction of receding edges is {_from_to(share)} of the loss" if share else ""
 
 
 def pattern(data: Aggregate) -> Iterator[str]:
@@ -233,7 +234,7 @@ def quality(data: Aggregate) -> Iterator[str]:
         )
     ends = [float(cell.penetration["unloading"][-1]) for cell in data.cells]
     pull_off = [cell.values["pull_off_penetration"] for cell in data.cells]
-    if cut := sum(int(np.sum(at < end)) for at, end in zip(pull_off, ends, strict=True)):
+    if cut := sum(int(np.sum(at < end - 1e-9)) for at, end in zip(pull_off, ends, strict=True)):
         yield (
             f"{cut} loops detached below Δ/h_max = {from_to(ends)}, where the stored unloading "
             "curve ends: their curves are cut, their losses are complete."
@@ -247,8 +248,10 @@ def warnings(data: Aggregate) -> list[str]:
 
 
 def _doubtful_companions(data: Aggregate) -> Iterator[str]:
-    """Sentences on the campaigns beside this one that have doubtful losses."""
+    """Sentences on campaigns beside this one with doubtful losses, or with no loop in common."""
     for other in data.companions:
+        if not any(difference(cell, other.like(cell)) for cell in data.cells):
+            yield f"WARNING: {other.path.name}, beside this campaign, shares no loop with it."
         wrong = sum(int(np.sum(cell.doubtful | cell.beyond_zero_range)) for cell in other.cells)
         if wrong:
             yield (

@@ -12,10 +12,11 @@ from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import Illustration
 from adhesis.ensemble.report.figures.shapes_and_spectra import beside_paper
 from adhesis.ensemble.report.figures.style import left_out
-from adhesis.ensemble.report.further_axes import shown_cells
+from adhesis.ensemble.report.further_axes import from_to, shown_cells
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.table import Table
+from adhesis.solver.checks import counted
 
 
 def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -> str:
@@ -122,10 +123,10 @@ def _summary(data: Aggregate) -> str:
         for axis in data.further
         if axis.name not in TURNING_POINTS
     )
-    many = f"{sweep.realisations} realisations"
+    many = counted(sweep.realisations, "realisation")
     if data.campaign.stop.relative_error is not None:
         counts = [cell.done for cell in data.cells]
-        many = f"{min(counts)} to {max(counts)} realisations by `[stop]`"
+        many = f"{from_to(counts)} realisations by `[stop]`"
     return (
         f"{data.done} loops of {data.total} tasks: "
         f"H = {in_one_unit('hurst', sweep.hurst)}; "

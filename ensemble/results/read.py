@@ -54,7 +54,11 @@ class Results:
                     f"{self.path} is damaged or truncated, or another program has changed it: the "
                     f"bytes beside its rows do not have their checksum; {_INSTEAD}"
                 )
-            self._file = stack.enter_context(h5py.File(self.path, "r", locking=False))
+            try:
+                file = h5py.File(self.path, "r", locking=False)
+            except OSError:  # this process has it open already, by xarray say: then as it has
+                file = h5py.File(self.path, "r")
+            self._file = stack.enter_context(file)
             self._check_links()
             self._check_size()
             self.attributes = self._root_attributes()

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -88,6 +88,7 @@ class Plan:
     # done, failed: rows that are
     done: int
     failed: int
+    known: NDArray[np.int64]  # checksum of each row that is done or failed; -1 of others
     # Of each group of tasks that take about the same time: seconds measured, and tasks
     times: dict[Group, tuple[float, int]] = field(default_factory=dict)
     batches: Batches | None = None  # where the campaign has ``[stop]``: what comes after ``rows``
@@ -133,9 +134,7 @@ def prepare(
                 f"not exist: leave it out, or give the file ({parameter('out')})"
             )
 
-    @cache
-    def check_cell(task: Task) -> None:
-        check(campaign, task)
+    check_cell = cache(partial(check, campaign))
 
     def lay_out(sources: Sequence[Source] = (), **attributes: Any) -> None:
         check_space(path, campaign, part)
@@ -223,13 +222,12 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         sum_before, count = times.get(group, (0.0, 0))
         times[group] = (sum_before + seconds[row], count + 1)
     rows, batches = np.flatnonzero(status == schema.PENDING).tolist(), None
+    is_known = np.isin(status, (schema.DONE, schema.FAILED))
     if results.campaign.stop.relative_error is not None:
         steered = results.column(results.campaign.stop.quantity)
         values = np.where(status == schema.FAILED, np.nan, steered)
-        known = np.flatnonzero((status == schema.DONE) | (status == schema.FAILED))
-        batches = Batches(
-            results.campaign, tasks, {row: float(values[row]) for row in known.tolist()}
-        )
+        known = {row: float(values[row]) for row in np.flatnonzero(is_known).tolist()}
+        batches = Batches(results.campaign, tasks, known)
         rows = batches.to_do
     return Plan(
         tasks=tasks,
@@ -237,6 +235,7 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         batches=batches,
         done=int(np.sum(status == schema.DONE)),
         failed=int(np.sum(status == schema.FAILED)),
+        known=np.where(is_known, results.column(schema.CHECKSUM.name).astype(np.int64), -1),
         times=times,
     )
 

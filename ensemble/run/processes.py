@@ -17,7 +17,7 @@ from typing import Self
 
 from adhesis.ensemble.exit_codes import ended_by
 from adhesis.ensemble.run.dispatch import MASTER, Compute, Limits, Message, Worker
-from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
+from adhesis.ensemble.run.launch import ONE_THREAD, python, python_environment
 
 _TO_END = 10.0  # s for a process to end once its socket is closed
 
@@ -140,7 +140,6 @@ class _Socket:
 
 def _work(rank: int, connection: Connection) -> None:
     """Work until dismissed."""
-    end_with_parent()
     try:
         compute, task_seconds, report_interval = connection.recv()
     except EOFError:

@@ -138,7 +138,6 @@ class _Session:
         self._ends = None if deadline is None else deadline.at - time.time() + self._started
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Summary(total, plan.done, plan.failed)
-        self._written: dict[int, int] = {}  # checksums of the rows of this run
         self._compute = partial(_compute, engine.compute, campaign, plan.tasks)
         self._limits = dispatch.Limits(
             stop=self._stop,
@@ -193,19 +192,17 @@ class _Session:
     def summary(self, stopped: str | None, path: Path) -> Summary:
         """Return the counts, and how the run has ended.
 
-        What a run has finished is read once more: another program may have written to the file
-        (InputError, WriteError), or have copied an older one over rows that the run wrote.
+        What is finished is read once more: another program may have written to the file
+        (InputError, WriteError), or have copied another one over it.
         """
-        summary = self._counts
+        summary, known = self._counts, self.plan.known
         if self.plan.rows or self.plan.batches is not None:
             with Results(path) as results:
-                finished = int(np.isin(results.status(), (DONE, FAILED)).sum())
-                checksums = results.column(CHECKSUM.name)
+                finished = np.isin(results.status(), (DONE, FAILED))
+                held = np.sum(finished & (results.column(CHECKSUM.name) == known))
                 if self.plan.batches is not None:
                     summary.precisions = precisions(read_cells(results))
-            other = sum(checksums[row] != known for row, known in self._written.items())
-            count = summary.done + summary.failed
-            if (held := min(finished, count - other)) < count:
+            if held < (count := np.sum(known >= 0)):
                 raise WriteError(
                     f"{path} holds {held} of {count} finished tasks: another program has "
                     "changed it while a run wrote to it"
@@ -229,7 +226,7 @@ class _Session:
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         counts, what, row = self._counts, str(self.plan.tasks[outcome.task]), outcome.result
-        self._written[outcome.task] = row[CHECKSUM.name]
+        self.plan.known[outcome.task] = row[CHECKSUM.name]
         if outcome.error is not None:
             counts.failed += 1
             counts.failed_now += 1

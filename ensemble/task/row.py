@@ -125,7 +125,7 @@ NUMBERS = (
         "elastic energy of full contact",
         "problem.full_contact_energy",
     ),
-    _number("pull_off_penetration", "1", "penetration/h_max where the last contact is lost"),
+    _number("pull_off_penetration", "1", "penetration/h_max of the first load step out of contact"),
     _number("pull_off_stress", "Pa", "largest mean tension on unloading"),
     _number(
         "states",

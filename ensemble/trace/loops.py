@@ -137,7 +137,7 @@ def compute(run: Run, progress: Progress | None = None) -> Result:
     method = make_method(cycle.method, problem, accuracy=cycle.accuracy)
     turn = turn_arguments(cycle.control, run.turning_point, cycle.at_preload, cycle.latest)
     loop = run_loop(method, load_steps=cycle.load_steps, progress=progress, **turn)
-    drops = loop.loss_from_drops - loop.closing_drop
+    small, large = loop.drops(small_scale=True), loop.drops(small_scale=False)
     return loop.numbers() | {
         "loss": loop.loss if run.work_of_adhesion > 0 else 0.0,  # but for rounding
         "preload_warnings": loop.preload_warnings,
@@ -147,7 +147,7 @@ def compute(run: Run, progress: Progress | None = None) -> Result:
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),
-        "small_scale_share": loop.drops(small_scale=True) / drops if drops > 0 else 0.0,
+        "small_scale_share": small / (small + large) if small + large > 0 else 0.0,
         "waves": run.profile.highest_harmonic,
         "states": {name: values.tolist() for name, values in loop.columns().items()},
     }

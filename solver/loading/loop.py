@@ -177,20 +177,20 @@ class LoadingBranch:
             raise ValueError(f"{turn!r} is not a turning point of this loading branch")
         if turn not in self._ahead:
             raise ValueError(f"this loading branch has passed {turn!r}")
-        started = process_time()
+        started = process_time() - self._seconds
         self._advance_to(self._ahead[0], progress)
         while self._ahead[0] != turn:
             del self._ahead[0]
             self._advance_to(self._ahead[0], progress)
-        self._seconds += process_time() - started
-        started = process_time() - self._seconds
+        self._seconds = process_time() - started
         record = self._record.copy()
         record.on_state, record.progress = on_state, progress
         if on_state is not None:
             for branch, state in zip(record.branches, record.states, strict=True):
                 on_state(branch, state)
         turned = record.drive
-        record.unload(record.axis.apart(marks))
+        back = marks if record.problem.work_of_adhesion else self._drives  # reversible: same states
+        record.unload(record.axis.apart(back))
         preload = turn if self._of_preloads else None
         ended = self._passed == len(self._drives) or not self._of_preloads
         steps = self._passed - 1 if ended else self._passed

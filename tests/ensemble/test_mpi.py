@@ -6,7 +6,6 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import time
 
 import pytest
@@ -110,8 +109,6 @@ def test_ranks_end_with_their_run_and_the_next_one_goes_on(
     tmp_path, whole, started, fake, hit, number, code, said
 ):
     """A kill of all ranks: test_precision.py, and with the other writer below; see test_run.py."""
-    if code == -signal.SIGKILL and sys.platform != "linux":
-        pytest.skip("the system ends children on Linux alone")
     path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
     words, launched = started
     process = start("run", path, "--out", out, *words, ranks=launched, fake=f"{fake} free={free}")

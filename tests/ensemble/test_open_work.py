@@ -124,6 +124,7 @@ def both(tmp_path_factory):
         values = rows(plan)
         if key:
             values["friction"] = 0.25 * values["loss"]
+            values["loss_from_drops"] = 2.0 * values["loss"]  # half is friction between the jumps
             values["gamma_open"] = values["work_of_adhesion_open"]
         found.append(aggregate(write(folder / f"{name}.h5", plan, values)))
     return found
@@ -149,5 +150,9 @@ def test_the_table_of_losses_has_both_parts_where_the_key_is_given(both, tmp_pat
 
 def test_the_report_says_which_part_is_friction(both):
     opened, one = ("\n".join(verdict(data)) for data in both)
-    assert "; 25 % is friction of receding edges." in opened
+    assert "% of the drops are lost where edges run inside patches; " in opened
+    assert "; friction of receding edges is 25 % of the loss." in opened
+    values = both[0].cells[0].values
+    share = values["small_scale_share"] / (1 - values["small_scale_share"])
+    assert share == pytest.approx(values["loss_small_scale"] / values["loss_large_scale"])
     assert "friction" not in one

@@ -42,6 +42,7 @@ def test_every_loop_is_found_under_its_labels(file, results):
             np.testing.assert_array_equal(
                 data.unloading_energy.sel(label), raw["unloading_energy"][row]
             )
+        assert repr(adhesis.open(file)) == repr(results)  # also while this process has it open
     assert int(np.isnan(data.loss).sum()) == 2
     assert repr(results).endswith("22 done, 1 failed, 1 pending>")
 

@@ -594,6 +594,9 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     wrong += [row["row"] for row in read_status(finer)["beyond_limit"]]
     assert doubts[0].startswith(f"WARNING: {len(set(wrong))} of 30 losses of finer.h5, beside")
     assert not any("beside this campaign" in text for text in findings.quality(data))
+    other = write(tmp_path / "other.h5", text_of(**PLAN).replace("seed = 1", "seed = 2"))
+    said = "WARNING: other.h5, beside this campaign, shares no loop with it."
+    assert said in findings.quality(aggregate(file, [other]))
     assert [c.kind for c in both.companions] == ["resolution", "load steps"]
     assert both.companions[1].differs == ("cycle.load_steps = 40",)
     names = [column.name for column in loss_tables.losses(both).columns]

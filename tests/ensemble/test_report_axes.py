@@ -182,9 +182,11 @@ def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):
 def test_a_second_scale_of_stress_needs_one_modulus(tmp_path):
     for zipped, scales in (("", 1), ('\nzip = [["hurst", "young"]]', 0)):
         text = text_of(realisations=2).replace("seed = 1", f"seed = 1{zipped}")
-        text = text.replace("young = 1e6", "young = [1e6, 2e6]")
-        path = write(tmp_path / f"{scales}.h5", text)
-        (axes,) = adhesis.open(path).plot.pull_off().axes
+        text = text.replace("young = 1e6", "young = [1e6, 2e6]\nstrength = [1e6, 9e7, inf]")
+        plot = adhesis.open(write(tmp_path / f"{scales}.h5", text)).plot
+        (line, *_) = plot.loss_along("strength").axes[0].containers  # inf is said, not drawn
+        np.testing.assert_allclose(line.lines[0].get_xdata(), [1e6, 9e7], rtol=0.2)
+        (axes,) = plot.pull_off().axes
         found = [child for child in axes.child_axes if "sigma" in child.get_ylabel()]
         assert len(found) == scales
 

@@ -314,6 +314,7 @@ CHANGED = r"holds \d of \d finished tasks: another program has"
 COPIED_OVER = {
     "zeros": (3, lambda empty, other: bytes(len(empty)), InputError, "is damaged"),
     "rows of before lost": (0, lambda empty, other: empty, WriteError, CHANGED),
+    "rows of before of another run": (0, lambda empty, other: other, WriteError, CHANGED),
     "rows of another run": (3, lambda empty, other: other, WriteError, CHANGED),
 }
 
@@ -406,7 +407,7 @@ def test_the_deadline_of_the_batch_system():
 
 def test_workers_have_as_long_to_answer_as_the_walltime_leaves_by_any_clock(tmp_path, monkeypatch):
     campaign = load_campaign(write_campaign(tmp_path))
-    plan = Plan(campaign.tasks(), [0], 0, 0)
+    plan = Plan(campaign.tasks(), [0], 0, 0, np.full(8, -1))
 
     def session_of(options):
         return session._Session(campaign, plan, None, options, StopSignals(), Engine())

@@ -60,7 +60,7 @@ time.sleep(600)
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the system ends children on Linux alone")
 def test_a_process_ends_with_its_parent_even_if_that_is_killed():
-    """Workers, which also see that their sockets end, with a whole run: test_mpi.py."""
+    """Workers of a run, which see that their sockets end: test_mpi.py."""
     parent = started([sys.executable, "-c", PARENT])
     child = int(parent.stdout.readline())
     parent.kill()

@@ -15,6 +15,7 @@ from adhesis import (
     Profile,
     make_method,
     run_loop,
+    run_loops,
     single_wave,
 )
 from adhesis.solver.references.single_wave import SingleWave
@@ -124,7 +125,8 @@ def test_a_wave_without_adhesion_carries_a_weight_as_westergaard_has_it(stiffnes
     problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, 0.0, control)
     with pytest.raises(PathError, match="without adhesion the method 'sharp' finds no first"):
         run_loop(make_method("sharp", problem), **turn, load_steps=5)
-    loop = run_loop(make_method("grid", problem), **turn, load_steps=5)
+    turns = {name: [0.43 * stress, stress] for name, stress in turn.items()}
+    _, loop = run_loops(make_method("grid", problem), **turns, load_steps=5)
     share = pressed / (np.pi * 1e6 * AMPLITUDE / PERIOD)
     turning = int(np.argmax(loop.mean_stress))
     assert loop.turning_stress == pytest.approx(pressed)
@@ -132,7 +134,7 @@ def test_a_wave_without_adhesion_carries_a_weight_as_westergaard_has_it(stiffnes
     assert loop.contact_fraction[turning] == pytest.approx(contact, rel=0.02)
     assert loop.penetration[turning] == pytest.approx(share - share * np.log(share), rel=1e-4)
     stored = pressed * (AMPLITUDE + (pressed / stiffness if stiffness else 0.0))
-    assert abs(loop.loss) <= 1e-4 * stored
+    assert abs(loop.loss) <= (1e-9 if control.is_load else 1e-4) * stored
     if control.is_load:
         assert loop.pull_off_penetration == pytest.approx(0.0, abs=1e-6)
 

@@ -36,10 +36,7 @@ from tests.support.exact_wave import ExactWave
 from tests.support.explicit_solution import explicit_openings, explicit_solution, scaled_stress
 
 PERIOD = 2e-3
-
-
-def rough(ratio: int = 8, seed: int = 0) -> Profile:
-    return scenes.rough(2, ratio, seed)
+ROUGH = scenes.rough(2, 8, 0)
 
 
 def method_of(profile: Profile, young: float, gamma: float = 0.04, name="sharp") -> Method:
@@ -47,8 +44,9 @@ def method_of(profile: Profile, young: float, gamma: float = 0.04, name="sharp")
 
 
 @cache
-def loop_of(young: float, ratio: int = 8, seed: int = 0, gamma: float = 0.04) -> LoopResult:
-    return run_loop(method_of(rough(ratio, seed), young, gamma), max_penetration=0.9, load_steps=20)
+def loop_of(young: float, ratio: int = 8, seed: int = 0) -> LoopResult:
+    method = method_of(scenes.rough(2, ratio, seed), young)
+    return run_loop(method, max_penetration=0.9, load_steps=20)
 
 
 def test_the_tension_is_that_of_an_independent_solution():
@@ -145,7 +143,7 @@ def test_a_loss_of_a_soft_machine_is_not_taken_for_that_of_closed_valleys(stiffn
 
 
 def test_where_and_when_are_those_of_a_state_also_of_a_path_and_of_one_loading_branch():
-    method, loop = method_of(rough(), 1e8), loop_of(1e8)
+    method, loop = method_of(ROUGH, 1e8), loop_of(1e8)
     path = run_path(method, [0.9], load_steps=20)
     assert path.interior == loop.interior
     assert path.narrowest_length == loop.narrowest_length
@@ -268,7 +266,7 @@ def next_touch() -> float:
 
 def test_a_jump_just_beyond_the_turning_point_bounds_the_range():
     """A loop that turns by 10 nm deeper loses half as much again: that range is not zero."""
-    method, jump = method_of(rough(), 1e7), next_touch()
+    method, jump = method_of(ROUGH, 1e7), next_touch()
     way = 10e-9 / method.problem.profile.h_max
     before, after = run_loops(method, max_penetration=[jump - way, jump + way], load_steps=20)
     assert after.loss > 1.5 * before.loss
@@ -280,7 +278,7 @@ def test_a_jump_just_beyond_the_turning_point_bounds_the_range():
 
 
 def test_a_turning_point_within_a_nanometre_of_a_jump_is_doubtful():
-    method, jump = method_of(rough(), 1e7), next_touch()
+    method, jump = method_of(ROUGH, 1e7), next_touch()
     way = 0.5e-9 / method.problem.profile.h_max
     loop = run_loop(method, max_penetration=jump - way, load_steps=20)
     (doubt,) = loop.warnings
@@ -297,9 +295,9 @@ def test_a_turning_point_within_a_nanometre_of_a_jump_is_doubtful():
 
 def test_a_turn_nearer_to_a_jump_than_its_place_is_known_is_doubtful():
     """The grid's jumps lie elsewhere by its own error: one may come before a turn at 2 nm."""
-    at = next_touch() - 2e-9 / rough().h_max
+    at = next_touch() - 2e-9 / ROUGH.h_max
     sharp, grid = (
-        run_loop(method_of(rough(), 1e7, 0.04, name), max_penetration=at, load_steps=20)
+        run_loop(method_of(ROUGH, 1e7, 0.04, name), max_penetration=at, load_steps=20)
         for name in ("sharp", "grid")
     )
     assert sharp.turn_range == pytest.approx(2e-9, rel=1e-6)
@@ -311,7 +309,7 @@ def test_a_turn_nearer_to_a_jump_than_its_place_is_known_is_doubtful():
 def test_every_turn_of_a_path_is_followed_beyond(name):
     """The first of two turns lies before the jump, which the second has passed."""
     gamma, jump = 0.04, next_touch()
-    method = method_of(rough(), 1e7, gamma, name)
+    method = method_of(ROUGH, 1e7, gamma, name)
     way = 20e-9 / method.problem.profile.h_max
     path = run_path(method, [jump - way, 0.3, 0.6], load_steps=20)
     # the jump of the grid lies elsewhere by its own error
@@ -340,7 +338,7 @@ def test_the_way_beyond_a_turn_is_one_of_the_separation(control):
 
 
 def test_nothing_is_known_beyond_a_path_that_cannot_be_followed(monkeypatch):
-    method, jump = method_of(rough(), 1e7), next_touch()
+    method, jump = method_of(ROUGH, 1e7), next_touch()
     loop = run_loop(method, max_penetration=jump - 0.03, load_steps=20)
     assert loop.turn_range == math.inf
     h_max, follow = loop.problem.profile.h_max, type(method).follow
@@ -358,7 +356,7 @@ def test_nothing_is_known_beyond_a_path_that_cannot_be_followed(monkeypatch):
 
 def test_full_contact_bounds_the_range_beyond_the_turn():
     """Nothing is followed into it: at most the mean gap is known to be free of jumps."""
-    loop = run_loop(method_of(rough(), 1e6), max_penetration=0.99, load_steps=20)
+    loop = run_loop(method_of(ROUGH, 1e6), max_penetration=0.99, load_steps=20)
     gap = 0.01 * loop.problem.profile.h_max
     assert gap < loop.touch_range
     assert 0 < loop.turn_range < gap

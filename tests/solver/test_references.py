@@ -12,35 +12,30 @@ from adhesis.solver.references.single_wave import SingleWave
 from tests.support.dugdale_wave import DugdaleWave
 
 MODULUS = 1.3
-
-
-def rough():
-    return self_affine_profile(0.8, period=2.0, n0=2, ratio=6, seed=5, h_rms=0.01)
+ROUGH = self_affine_profile(0.8, period=2.0, n0=2, ratio=6, seed=5, h_rms=0.01)
 
 
 def test_full_contact_stress_displaces_the_surface_onto_the_profile():
     """The displacement by quadrature over the periodic logarithmic kernel, no Fourier series."""
-    profile = rough()
 
     def displacement(x: float) -> float:
         def integrand(xi: float) -> float:
             kernel = np.log(2 * abs(np.sin(np.pi * (x - xi) / 2.0)) + 1e-300)
-            return float(full_contact_stress(profile, MODULUS, xi)) * kernel
+            return float(full_contact_stress(ROUGH, MODULUS, xi)) * kernel
 
         left = quad(integrand, x - 1.0, x, limit=400)[0]
         right = quad(integrand, x, x + 1.0, limit=400)[0]
         return -2 / (np.pi * MODULUS) * (left + right)
 
     for x in (0.1, 0.77, 1.6):
-        assert displacement(x) == pytest.approx(float(profile.at(x)), abs=1e-8)
+        assert displacement(x) == pytest.approx(float(ROUGH.at(x)), abs=1e-8)
 
 
 def test_full_contact_energy_is_half_the_work_and_adds_up_over_waves():
-    profile = rough()
     work = quad(
-        lambda x: float(full_contact_stress(profile, MODULUS, x) * profile.at(x)), 0, 2, limit=400
+        lambda x: float(full_contact_stress(ROUGH, MODULUS, x) * ROUGH.at(x)), 0, 2, limit=400
     )[0]
-    assert full_contact_energy(profile, MODULUS) == pytest.approx(work / 2 / 2.0, rel=1e-9)
+    assert full_contact_energy(ROUGH, MODULUS) == pytest.approx(work / 2 / 2.0, rel=1e-9)
     wave = single_wave(0.02, 2.0)
     assert full_contact_energy(wave, MODULUS) == pytest.approx(MODULUS * np.pi * 0.02**2 / 8)
 

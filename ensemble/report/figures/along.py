@@ -24,7 +24,7 @@ _LOG_FROM = 20  # an axis that spans more is logarithmic
 # Name, label, unit, and whether the panel begins at 0.
 _OF_TURNING_POINT = (
     ("pull_off_stress", "largest tension (kPa)", 1e3, True),
-    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0, False),
+    ("pull_off_penetration", r"detached by $\Delta/h_\mathrm{max}$", 1.0, False),
     ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0, True),
 )
 
@@ -48,15 +48,15 @@ def along(axis: Axis, data: Aggregate) -> style.PublishedFigure:
     width = style.ONE_COLUMN if len(titles) == 1 else style.TWO_COLUMNS
     height = (22 + 40 * len(rows)) * style.MM
     figure = style.new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
-    low, high = min(axis.values), max(axis.values)
+    finite = [value for value in axis.values if np.isfinite(value)]
+    low, high = min(finite), max(finite)
     logarithmic = low > 0 and high > _LOG_FROM * low
     grid = figure.rows
     axis_text, axis_unit = axis_label(axis)
     for row, (name, label, unit, from_zero) in zip(grid, rows, strict=True):
         for axes, title in zip(row, titles, strict=True):
             for k, of_line in enumerate(labels):
-                line = lines.get((title, of_line), [])
-                if not line:
+                if not (line := lines.get((title, of_line))):
                     continue
                 x = np.array([cell.at[axis.name] for cell in line], dtype=float)
                 aside = (k - (len(labels) - 1) / 2) * 0.01
@@ -71,7 +71,7 @@ def along(axis: Axis, data: Aggregate) -> style.PublishedFigure:
         row[0].set_ylabel(label)
     for axes, title in zip(grid[0], titles, strict=True):
         style.label_panel(axes, title)
-    ticks = [value / axis_unit for value in axis.values]
+    ticks = [value / axis_unit for value in finite]
     figure.label(axis_text)
     for axes in (*grid[-1], *figure.given):
         if logarithmic:
@@ -88,15 +88,15 @@ def along(axis: Axis, data: Aggregate) -> style.PublishedFigure:
     handles, texts = grid[0][0].get_legend_handles_labels()
     if any(texts):
         figure.legend_above([*handles, *hollow_handle(drawn)], 3 if second is None else 2)
-    figure.say_below("\n".join(filter(None, (below(drawn, fixed), _sample(drawn)))))
+    apart = "" if len(finite) == len(axis.values) else f"not drawn: {axis.name} = inf"
+    figure.say_below("\n".join(filter(None, (below(drawn, fixed), apart, _sample(drawn)))))
     return figure
 
 
 def _sample(cells: list[AveragedCell]) -> str:
     """Return the number of profiles that means are over, and what their bars are."""
     counts = [cell.done for cell in cells if cell.done]
-    several = max(counts) > 1
-    of_what = "profiles, 95 % interval of the mean" if several else "profile"
+    of_what = "profiles, 95 % interval of the mean" if max(counts) > 1 else "profile"
     return f"n = {from_to(counts)} {of_what}"
 
 
@@ -105,7 +105,7 @@ def _lines(
 ) -> tuple[list[tuple[str, float]], dict[tuple[str, str], list[AveragedCell]]]:
     """Return the values that all lines share, and the cells by title of a panel and label.
 
-    The cells of a line ascend along the axis, and may have no finished task.
+    The cells of a line ascend along the axis to a finite end, and may have no finished task.
     Further axes beside these two are at one place, that of :attr:`Aggregate.shown`.
     """
     moving = together(data, axis) | (set() if second is None else together(data, second))
@@ -116,7 +116,7 @@ def _lines(
     wanted = [at(cell) for cell in data.shown.cells]
     lines: dict[tuple[str, str], list[AveragedCell]] = {}
     for cell in sorted(data.cells, key=lambda cell: cell.at[axis.name]):
-        if at(cell) not in wanted:
+        if at(cell) not in wanted or np.isinf(cell.at[axis.name]):
             continue
         title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
         if second is not None:

@@ -74,7 +74,7 @@ def mechanisms(data: Aggregate) -> Table:
             *("pull_off_stress_sem", "estimates.pull_off_stress.sem", "s.e. (kPa)"),
             number(2, unit=1e3),
         ),
-        *estimated("pull_off_penetration", "value", "last contact lost at Δ/h_max", number(3)),
+        *estimated("pull_off_penetration", "value", "detached by Δ/h_max", number(3)),
         *estimated("wall_time", "value", "s a loop", lambda s: f"{float(f'{s:.3g}'):g}"),
     ]
     return make_table("Mechanisms and pull-off", columns, data.cells)
