@@ -201,7 +201,7 @@ def row_of(
                 row[dataset.name] = found if dataset.dtype == FLOAT else _rounded(found, dataset)
                 continue
             curve = np.zeros(length, dataset.dtype)
-            on_axis = loop.on_axis(branch, values)[:length]
+            on_axis = loop.on_axis(branch, values, length)[:length]
             curve[: len(on_axis)] = on_axis
             row[dataset.name] = curve
     drops = np.array([j.energy_drop for j in loop.jumps])

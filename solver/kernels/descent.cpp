@@ -391,6 +391,8 @@ Descent descend(LinearResponse& response, Vector ends, const Vector& start, doub
     moved = true;
     before = ends;
     ends = move_edges(ends, way);
+    for (int e = 0; law.pins() && e < int(ends.size()); ++e)
+      if (way_from_memory(e, ends[e], law) == 0) ends[e] = law.memory[e];  // not by rounding
     if (shortest_length(ends) < law.smallest) {
       out.event = DescentEvent::vanished;
       break;

@@ -237,13 +237,15 @@ class LoopResult(EquilibriumPath):
         way = f"{held}far side to" if held else "to penetration"
         return f"{way} {point:g} h_max{depth}"
 
-    def on_axis(self, branch: Branch, values: Array) -> Array:
+    def on_axis(self, branch: Branch, values: Array, most: float = math.inf) -> Array:
         """Return values of one branch at every load step, interpolated at skipped ones.
 
         Parameters
         ----------
         branch : {"loading", "unloading"}
         values : array, shape (states,)
+        most : float
+            Load steps of unloading at most; to contact with a soft spring there may be billions.
 
         Returns
         -------
@@ -268,7 +270,7 @@ class LoopResult(EquilibriumPath):
         if branch == "loading" or len(chosen) < 2 or index[-1] == len(chosen) - 1:
             return values[chosen]
         # under a load the last state lies where contact was lost, off the axis
-        return np.interp(np.arange(index[-1] + 1), index, values[chosen])
+        return np.interp(np.arange(min(index[-1] + 1, most)), index, values[chosen])
 
     def at(self, branch: Branch, drives: Array, values: Array) -> Array:
         """Interpolate values of one branch linearly between its states.

@@ -70,6 +70,11 @@ def to_depth(problem: Problem, depth: float, load_steps: int, *accuracies: float
         of_scene(draw(5202, 90, "open")),  # an edge recedes by less than Newton's tolerance
         # an edge turns back within a step: a jump came 9e-5 h_max early
         of_scene(replace(draw(5202, 32, "open"), accuracy=1e-4)),
+        # edges at their memory but for rounding did not stay pinned: no rest was found
+        to_depth(
+            Problem(rough(4, 16, 6, hurst=0.5), HALF_SPACE, 0.01, work_of_adhesion_open=0.05),
+            *(0.9, 40, 1e-4, 1e-5),
+        ),
         # edges begin to move together, and the error of an equilibrium pins some again, by turns
         of_scene(replace(draw(9001, 0, "open"), accuracy=1e-4, load_steps=40)),
         # after a jump one edge was predicted to move by 3 λ_min, and a state found there was taken
