@@ -137,6 +137,7 @@ class LoadingBranch:
         self._passed = 0  # number of prescribed values reached
         self._record = Record(method, axis)
         self._record.begin("loading")
+        self._reached: list[float] = []  # prescribed values at the ends of steps
         self._seconds = 0.0
 
     def _advance_to(self, turn: float, progress: Progress | None) -> None:
@@ -145,6 +146,7 @@ class LoadingBranch:
         self._record.progress = progress
         while not self._is_at(turn):
             self._passed += not self._record.step(self._drives[self._passed], preload)
+            self._reached.append(self._record.drive)
 
     def _is_at(self, turn: float) -> bool:
         """Return whether a turning point is reached, or the branch has ended before a preload."""
@@ -189,8 +191,9 @@ class LoadingBranch:
             for branch, state in zip(record.branches, record.states, strict=True):
                 on_state(branch, state)
         turned = record.drive
-        back = marks if record.problem.work_of_adhesion else self._drives  # reversible: same states
-        record.unload(record.axis.apart(back))
+        # without adhesion a loop is reversible: back over the states of loading
+        back = [] if record.problem.work_of_adhesion else self._reached
+        record.unload(record.axis.apart([*marks, *back]))
         preload = turn if self._of_preloads else None
         ended = self._passed == len(self._drives) or not self._of_preloads
         steps = self._passed - 1 if ended else self._passed

@@ -94,8 +94,9 @@ class GapField:
     ) -> None:
         self.source, self.gaps, self.prescribed = source, gaps, prescribed
         self._solve, self._nearly = solve, nearly
+        self._solution: Field | None = None
 
-    @cached_property
+    @property  # a cached_property of Python 3.11 would hold one lock for the fields of all threads
     def solution(self) -> Field:
         """Solution of equation (1), solved at first access.
 
@@ -104,9 +105,11 @@ class GapField:
         FloatingPointError
             If the matrix of the gaps is not positive definite to rounding.
         """
-        solution = self._solve()
-        check_definite(solution)
-        return solution
+        if self._solution is None:
+            solution = self._solve()
+            check_definite(solution)
+            self._solution = solution
+        return self._solution
 
     @cached_property
     def work(self) -> float:
