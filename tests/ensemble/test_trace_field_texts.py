@@ -186,6 +186,7 @@ def test_delimiters_of_whole_numbers_are_no_decimal_signs(tmp_path: Path) -> Non
         ({50: "-3.2768", 51: "-3.2768", 200: "-3.2768"}, 3),
         ({50: "5.0", 51: "5.0", 52: "5.0", 200: "-5.0", 201: "-5.0", 202: "-5.0"}, 6),
         ({k: ("-99.9999", "-99.9998")[k % 2] for k in range(50, 66)}, 16),
+        ({k: f"-20.00{k % 3}0" for k in range(50, 66)}, 0),  # a smooth floor
         (dict.fromkeys(range(50, 56), "-1.2"), 0),  # the floor of a groove
         ({50: "0.800", 51: "0.800", 52: "0.800"}, 0),  # the flat top of a grain
         ({50: "9.1", 51: "9.2", 52: "9.2", 53: "9.2", 54: "9.3"}, 0),  # one that is high

@@ -64,7 +64,10 @@ TEXTS: dict[str, list[str]] = {
         "",
         "End of file",
     ],
-    "scientific, in metres, untold": rows(" ", ".", 1, 1, ".9e"),
+    **{
+        f"scientific, in metres: {said}": [said, "x z", *rows(" ", ".", 1, 1, ".9e")]
+        for said in ("", "SI units", "(all in m)", "Drive unit: LD", "Cut-off (mm): none")
+    },
 }
 
 

@@ -238,11 +238,16 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
 
 
 def _mentions_unit(line: str) -> bool:
-    """Return whether a line without numbers has a unit of length but m, or a word for one."""
+    """Return whether a line without numbers ends with a unit but m, or has "Units:" of another."""
     column = Column(line)
-    if column.unit == "m" or any(map(str.isdigit, line)):
+    words = re.findall(r"[^\W\d_]+", column.plain.lower())
+    if not words or any(map(str.isdigit, line)):
         return False
-    return column.has_length or not _UNITS.isdisjoint(_words(line))
+    if column.unit or words[-1] in ("m", *_UNAMBIGUOUS):
+        return (column.unit or LENGTH.unit_named(words[-1])) != "m"
+    before = words[: next((k for k, word in enumerate(words) if word in _UNITS), None)]
+    known = len(before) < len(words) - 1 and (_X | _Z | _BESIDE).issuperset(before)
+    return known and "si" not in words
 
 
 def _row_of_units(row: Sequence[Column], above: Sequence[Column] | None) -> HeaderUnits | None:

@@ -20,6 +20,7 @@ _MOST_CODES = 4  # of one instrument; more different numbers are heights, as of 
 _CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 _ENORMOUS = 1e20
 _NINES = re.compile(r"-?9{2,}\.?9+")
+_BEGINS = re.compile(r"-?(9\.?){3}")  # as codes beside each other do, but no floor at -10 or -20
 # The name of a column that marks which heights are valid
 VALID = re.compile(
     r"\W*((is|z|data)?[ _]?valid(ity)?|v[aá]lid[aeo]|gültig|ok|good|有効|有效|유효)(\b|_)", re.I
@@ -54,7 +55,9 @@ def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, 
     away = np.maximum(low - values, values - high)
     are_single = float(np.median(times)) == 1.0
     gaps = np.diff(values)
-    gaps[are_single & (gaps < _ALIKE * np.abs(values[1:]))] = np.inf
+    begin = np.array([bool(_BEGINS.match(f"{value:.12g}")) for value in values], dtype=bool)
+    alike = begin[1:] & begin[:-1] & (gaps < _ALIKE * np.abs(values[1:]))
+    gaps[are_single & alike] = np.inf
     apart = np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf))
     far = (away > _BEYOND * (high - low)) & (apart > _BEYOND_KNOWN * (high - low))
     far &= repeated | nines | on_both_sides
