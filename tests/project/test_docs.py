@@ -175,14 +175,6 @@ def test_lessons_print_what_their_pages_show(page, tmp_path, monkeypatch):
     assert transcripts.wrong(page, transcripts.lesson(page)) == []
 
 
-def test_outputs_are_compared_number_by_number() -> None:
-    shown = "0.0354151 J/m² in 28 jumps, residual 4.29e-06, 1.2 s\n"
-    same = shown.replace("151 J", "152 J").replace("1.2 s", "71 s").replace("4.29", "6.1")
-    assert transcripts.differences(shown, same) == []
-    for old, new in (("4151", "4161"), ("28", "29"), ("e-06", "e-05")):
-        assert transcripts.differences(shown, shown.replace(old, new))
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_in_the_text_exist(page: Path) -> None:
     text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)

@@ -7,16 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from adhesis import (
-    Control,
-    HalfSpace,
-    LoopResult,
-    Problem,
-    make_method,
-    run_loop,
-    run_path,
-    single_wave,
-)
+from adhesis import Control, HalfSpace, LoopResult, Problem, make_method, run_path, single_wave
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.continuation.jump import Jumps
@@ -152,7 +143,7 @@ def test_a_second_loop_of_a_method_has_the_bits_of_the_first():
     profile = scenes.rough(2, 8, 6, period=1e-3)
     problem = Problem(profile, HalfSpace(1e6, 0.5), 0.001, adhesion_range=3e-8)
     method = make_method("sharp", problem)
-    first, second = (run_loop(method, max_penetration=0.5, load_steps=5) for _ in range(2))
+    first, second = (run_path(method, [0.5], load_steps=5) for _ in range(2))
     assert first == second
 
 
