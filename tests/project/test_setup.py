@@ -1,5 +1,6 @@
 """Set-up, launch scripts and packaging: what can be checked without installing anything."""
 
+import ast
 import fcntl
 import importlib.metadata
 import os
@@ -13,8 +14,13 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from tests.project.test_package import PROJECT
 from tests.support.campaign_support import ROOT, started, wait_until
 from tests.support.processes import ran
+
+# Distribution names that differ from what is imported, and what other packages need to find.
+IMPORTED_AS = {"markdown-it-py": "markdown_it", "surfacetopography": "SurfaceTopography"}
+LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
 
 
 def locked(name: str = "requirements.lock") -> dict[str, str]:
@@ -30,6 +36,18 @@ def test_batch_scripts_force_no_rules_on_a_cluster() -> None:
         assert "ALLOW_RUN_AS_ROOT" not in text
         assert "oversubscribe" not in text
         assert "tools/mpi.sh" not in text
+
+
+def test_dependencies_are_what_is_imported() -> None:
+    files = (f for name in ("solver", "ensemble") for f in (ROOT / "adhesis" / name).rglob("*.py"))
+    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text()))]
+    modules = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    modules += [str(n.module) for n in nodes if isinstance(n, ast.ImportFrom) and not n.level]
+    imported = {name.split(".")[0] for name in modules} - {*sys.stdlib_module_names, "adhesis"}
+    extras = PROJECT["optional-dependencies"]
+    needed = [*PROJECT["dependencies"], *extras["mpi"], *extras["instruments"]]
+    declared = {Requirement(text).name.lower() for text in needed}
+    assert imported | LOADED_BY_NAME == {IMPORTED_AS.get(name, name) for name in declared}
 
 
 def test_lists_of_versions_leave_nothing_to_resolve() -> None:
