@@ -10,6 +10,7 @@ from adhesis import Control, Problem, Profile, run_loop, run_loops
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.continuation.descent import leaving_step
 from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE as SOLID
 from tests.support.scenes import grid_of, loop_of, loops_at, of_paper, rough
@@ -82,6 +83,22 @@ def test_finer_steps_decide_next_to_a_separatrix(swapped):
     assert loop.loss == pytest.approx(0.122149467, abs=loop.loss_error + 6.5e-8)
     assert loop.races == 1
     assert swapped or len(loop.jumps) == 133
+
+
+def test_finer_steps_that_come_to_no_rest_are_a_race():
+    """As equal speeds are: where they would have ended is not known."""
+    method = SharpMethod(race())
+    relax = method.jumps.descents.relax
+
+    def never_at_rest(gaps, d, share=1.0, equal_speeds=False, **how):
+        if share < 1:
+            raise NoState("edges that descend in energy do not come to rest", d)
+        return relax(gaps, d, **how)
+
+    method.jumps.descents.relax = never_at_rest
+    first = run_loop(method, max_penetration=0.8, load_steps=20).jumps[0]
+    assert first.raced
+    assert first.at_stake == 0
 
 
 def test_under_a_load_the_speeds_of_the_edges_decide_nothing():
