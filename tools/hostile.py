@@ -42,6 +42,8 @@ _DECADES = 1e-4  # least strength that is drawn, of the largest tension without 
 LAWS = ("one", "open", "pattern", "range", "many")
 """Laws of adhesion: one γ, two works, γ(x), a range; ``many`` has one γ and many patches."""
 CONTROLS = ("separation", "stiffness", "load")
+MOST_DECADES = 0.5
+"""Decimal logarithm of the largest γ_open/γ - 1 that is drawn unless another one is asked for."""
 
 
 @dataclass(frozen=True)
@@ -97,12 +99,18 @@ class Scene:
         return {"max_penetration": self.max_penetration + far}
 
 
-def draw(seed: int, number: int, law: str = "one", control: str = "separation") -> Scene:
+def draw(
+    seed: int,
+    number: int,
+    law: str = "one",
+    control: str = "separation",
+    decades: float = MOST_DECADES,
+) -> Scene:
     """Draw the scene of a number: mostly few waves, one in fifty up to 250.
 
     Where adhesion is weak, thousands of fields go into each jump: few crests there. With a range
     adhesion is mostly weak, as patches open from inside only there. ``many`` are scenes of 20 to 80
-    patches and hundreds of waves.
+    patches and hundreds of waves. Of two works of adhesion γ_open/γ - 1 is at most 10**``decades``.
     """
     if law == "many":
         scene = _draw_many(np.random.default_rng([seed, number, 2]))
@@ -113,7 +121,7 @@ def draw(seed: int, number: int, law: str = "one", control: str = "separation") 
         held = 0.0 if control == "load" else float(10 ** rng.uniform(-1.5, 2))
         scene = replace(scene, stiffness=held)
     if law == "open" or (law == "pattern" and rng.integers(4) == 0):
-        scene = replace(scene, opening=1 + float(10 ** rng.uniform(-2, 0.5)))
+        scene = replace(scene, opening=1 + float(10 ** rng.uniform(-2, decades)))
     if law == "pattern":
         count = int(10 ** rng.uniform(0, math.log10(2 * scene.n0 * scene.ratio + 1)))
         pattern = count, float(rng.uniform(0.01, 0.95)), float(rng.uniform(0, 2 * math.pi))

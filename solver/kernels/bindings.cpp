@@ -291,11 +291,13 @@ void bind_field(nb::module_& m) {
       .def(
           "fine_opening",
           [](const Field& f, int k, double per_wave) {
+            if (std::isnan(f.pressure)) throw std::invalid_argument("there is no field");
             const int count = count_sine_nodes(f, k, per_wave);
             return rising(open_gap(f, k, Circle(count + 1)));
           },
           "k"_a, "per_wave"_a, Unlocked(),
-          "Evaluate θ, T and the weight of ∫ T g dθ over T of a gap at fine nodes, and b_n.")
+          "Evaluate θ, T and the weight of ∫ T g dθ over T of a gap at fine nodes, and b_n.\n\n"
+          "ValueError if there is no field.")
       .def(
           "sum_modes",
           [](const Field& f, int k, Vector at, const Vector& modes) {

@@ -21,24 +21,29 @@ FineOpening fine_moments(const Gap& gap, const Circle& circle, const Panels& pan
   return out;
 }
 
-// Locate a minimum by narrowing parabolas.
+// Locate a minimum by narrowing parabolas, each where the last one has it; the next is as wide
+// where that is far.
 void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
-  double width = 0.5 * minimum.width, low = infinity, half = 0;
-  for (int i = 0; i < MINIMUM_REFINEMENTS; ++i) {
-    width /= 8;
+  double width = 0.5 * minimum.width / 8, low = infinity, half = 0;
+  int left = MINIMUM_REFINEMENTS;
+  for (int i = 0; i < MOST_PARABOLAS && left > 0; ++i) {
     const double theta = minimum.theta;
-    const auto [left, here, right, same] =
+    const auto [before, here, after, same] =
         sum_modes(gap, {theta - width, theta, theta + width, theta}, modes);
-    half = (right - 2 * here + left) / (2 * width * width);
-    const double slope = (right - left) / (2 * width);
+    half = (after - 2 * here + before) / (2 * width * width);
+    const double slope = (after - before) / (2 * width);
     if (!(half > 0)) {
       low = here;
       half = std::max(half, std::numeric_limits<double>::min());
       break;
     }
-    const double step = std::min(std::max(-slope / (2 * half), -4 * width), 4 * width);
+    const double whole = -slope / (2 * half);
+    const double step = std::min(std::max(whole, -4 * width), 4 * width);
     minimum.theta += step;
     low = here + slope * step + half * step * step;
+    if (step != whole) continue;
+    width /= 8;
+    --left;
   }
   minimum.opening = low;
   minimum.half = half;

@@ -163,6 +163,11 @@ inline constexpr double MINIMUM_DOUBT = 3.0;
 // Parabolas by which a low minimum is located, each an eighth as wide as the one before.
 inline constexpr int MINIMUM_REFINEMENTS = 3;
 
+// Parabolas at most, with those of equal widths where the next minimum is far. With none of equal
+// widths a minimum was 7.5e-6 h_max too high, and its touch was missed: there the third derivative
+// was large beside the curvature.
+inline constexpr int MOST_PARABOLAS = 24;
+
 // ---------------------------------------------------------------- continuation of a branch
 
 // Distances between its points, in d or of the leading edge, beyond which a predictor is not

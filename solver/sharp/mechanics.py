@@ -61,12 +61,20 @@ class PinnedEdges(NamedTuple):
     share: Array
     rate: Array
 
-    def distance(self, step: float) -> float:
-        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
+    def distances(self, step: float) -> Array:
+        """Return the way in d, along ``step``, after which each edge begins to move; inf if never.
+
+        Negative where its opening is beyond a critical one by the error of the field.
+        """
         rate = self.rate * np.sign(step)
         left = np.where(rate > 0, 1 - self.share, self.share)
-        moving = np.isfinite(rate) & (rate != 0) & (left > 0)
-        return float((left[moving] / np.abs(rate[moving])).min(initial=np.inf))
+        moving = np.isfinite(rate) & (rate != 0)
+        return np.divide(left, np.abs(rate), out=np.full(len(rate), np.inf), where=moving)
+
+    def distance(self, step: float) -> float:
+        """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
+        ways = self.distances(step)
+        return float(ways[ways > 0].min(initial=np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,21 +270,28 @@ class EdgeMechanics:
             check_definite(self._finer[1])
         return self._finer[1]
 
-    def fold_displacement(self, point: Point) -> float:
-        """Estimate how far in d the error of the field displaces the fold next to a point.
+    def fold_displacement(self, point: Point, step: float) -> float:
+        """Estimate how far in d the error of the field displaces the end of a branch.
 
-        The error δC of the openings is their difference from those of a more accurate field. At a
-        fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
-        vector. Scaled by sqrt(C_e/C_f) it is symmetric, so its left null vector is
-        ψ_e = C_e dn_e/dd. In first order the fold is moved to where ψ·(δC + δd ∂C/∂d) = 0.
+        The branch ends within a ``step`` of the point. The error δC of the openings is their
+        difference from those of a more accurate field. At a fold ∂(C_e - C_c)/∂n_f is singular. The
+        rates of the edges diverge along its right null vector. Scaled by sqrt(C_e/C_f) it is
+        symmetric, so its left null vector is ψ_e = C_e dn_e/dd. In first order the fold is moved to
+        where ψ·(δC + δd ∂C/∂d) = 0. Where pinned edges begin to move in the step, the branch may
+        end for one that runs then: at another d, if its opening is wrong.
         """
         finer = self.solve_finer(point)
         change = finer.edge_opening - point.field.solution.edge_opening
         _, _, by_prescribed = finer.by_prescribed()  # ∂C/∂d at fixed edges
         left = point.field.edge_opening.ravel() * point.rate
-        if not left.any():
-            return 0.0  # all edges are pinned
-        return -float(left @ change / (left @ by_prescribed))
+        displaced = abs(float(left @ change / (left @ by_prescribed))) if left.any() else 0.0
+        if point.pinned is None:
+            return displaced
+        for e in np.flatnonzero(point.pinned.distances(step) <= abs(step)):
+            works = [self.adhesion.work(point.gaps.flat[e], recedes)[0] for recedes in (False, True)]
+            pinning_range = self.critical * float(np.diff(np.sqrt(works))[0])
+            displaced = max(displaced, abs(change[e] / (pinning_range * point.pinned.rate[e])))
+        return displaced
 
     def equilibrium(
         self,

@@ -89,6 +89,10 @@ come in either order. Of 400 loops with 20 to 80 patches two were wrong, by 0.09
 order was not that at a finer accuracy: they were 0.5 and 4.5 times that apart. Where all folds
 less than a resolution apart counted, half of the loops with 20 to 80 patches had races, instead of
 a tenth."""
+TURNED_BACK = 0.2
+"""Of the displacement of an equilibrium by the error of the field: an edge that is pinned where it
+turns back may have gone back by so much in a step. Later events have the error of its place: with
+five times as much a loss was off by 2.8 of its ``loss_error``."""
 TRAPEZOID_FAR = 4.0
 """Of the allowed error of the trapezoidal rule: a step with more is halved."""
 QUIET_STRESS = 0.05

@@ -9,6 +9,7 @@ within both errors, where nothing raced; and for every twentieth that ``grid`` d
 refused (PathError) is counted.
 
     python tools/fuzz/loops.py --seed N [--scenes 2000] [--number K] [--law LAW] [--control C]
+        [--decades D]
 
 The law of adhesion is one γ, two works (open), γ(x) (pattern) or a range; loops of ``--law many``
 have one γ and 20 to 80 patches, and all are compared: half a minute each. Of the ranges half are up
@@ -32,16 +33,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
 import numpy as np
 
-from tools.hostile import CONTROLS, LAWS, draw, judge
+from tools.hostile import CONTROLS, LAWS, MOST_DECADES, draw, judge
 from tools.isolated import Isolated
 
 LIMIT = 120.0  # s of CPU time of one scene, all its runs together
 _QUANTILES = (0.1, 0.5, 0.9, 0.99)  # of the differences over loss_error that are printed
 
 
-def judged(seed: int, number: int, law: str, control: str) -> dict[str, Any]:
+def judged(seed: int, number: int, law: str, control: str, decades: float) -> dict[str, Any]:
     """Draw a scene and judge it."""
-    return judge(draw(seed, number, law, control), number)
+    return judge(draw(seed, number, law, control, decades), number)
 
 
 def calibration(found: list[dict[str, Any]]) -> str:
@@ -84,9 +85,10 @@ def main() -> int:
     parser.add_argument("--number", type=int, help="this scene alone")
     parser.add_argument("--law", choices=LAWS, default="one")
     parser.add_argument("--control", choices=CONTROLS, default="separation")
+    parser.add_argument("--decades", type=float, default=MOST_DECADES, help="of γ_open/γ - 1")
     args = parser.parse_args()
     if args.number is not None:
-        alone = draw(args.seed, args.number, args.law, args.control)
+        alone = draw(args.seed, args.number, args.law, args.control, args.decades)
         print(alone)
         one = judge(alone, args.number)
         print(one)
@@ -99,7 +101,8 @@ def main() -> int:
         for number in range(args.scenes):
             if time.monotonic() > end and everything:
                 break
-            found, ended = isolated(args.seed, number, args.law, args.control)
+            scene = args.seed, number, args.law, args.control, args.decades
+            found, ended = isolated(*scene)
             found = found or {"wrong": [ended], "kind": "ended"}
             everything.append(found)
             kinds[found["kind"]] += 1
@@ -108,6 +111,7 @@ def main() -> int:
                 failures += 1
                 again = f"python tools/fuzz/loops.py --seed {args.seed} --number {number}"
                 again += f" --law {args.law} --control {args.control}"
+                again += f" --decades {args.decades!r}"
                 print(f"{'; '.join(found['wrong'])}\n    {again}")
             if time.monotonic() - shown > 14:
                 shown = time.monotonic()

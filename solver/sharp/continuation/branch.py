@@ -26,6 +26,7 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
+    TURNED_BACK,
     WORK_STALLED,
 )
 
@@ -252,8 +253,8 @@ class StableBranch:
     def _share_to_turn(self, reached: Point, step: float) -> float:
         """Return the share of a step at which an edge turns back, 1 if none does.
 
-        With two works of adhesion it is pinned where it turns; what it goes back in a step counts
-        up to the error of the field. An edge that is pinned where the step began turned midway.
+        With two works of adhesion it is pinned where it turns. An edge that is pinned where the
+        step began turned midway.
         """
         if not self._edges.adhesion.pins:
             return 1.0
@@ -264,7 +265,8 @@ class StableBranch:
         share = np.divide(start, start - end, out=np.zeros_like(start), where=start != end)
         back = np.where(motion * end < 0, 0.5 * (1 - share) * np.abs(end), 0.0)
         worst = int(np.argmax(back))
-        if back[worst] <= self._edges.field_error:
+        edges = self._edges
+        if back[worst] <= max(edges.newton_tolerance, TURNED_BACK * edges.field_error):
             return 1.0
         return float(np.clip(share[worst], 0.1, 0.9))
 

@@ -269,7 +269,8 @@ class Follower:
         allowed = min(self.resolution.late * max(drop, self.resolution.least_drop), drop)
         if jump.misplaced > allowed and located > self.resolution.field_limit:
             return None
-        displaced = self.states.work(before, after, abs(self.edges.fold_displacement(point)))
+        displaced = self.edges.fold_displacement(point, fold.d - point.d)
+        displaced = self.states.work(before, after, displaced)
         # in this order a displacement that is no number leaves the error unknown
         misplaced = jump.misplaced + max(displaced - self.resolution.field_share * abs(drop), 0.0)
         if jump.point is None and self.edges.is_load:
@@ -284,7 +285,7 @@ class Follower:
         two, point = fold.with_another, fold.point
         if two is None:
             return None
-        displaced = abs(self.edges.fold_displacement(point))
+        displaced = self.edges.fold_displacement(point, fold.d - point.d)
         if two.apart > max(self.resolution.order, SECOND_FOLD_DISPLACED * displaced):
             return None
         furthest = max(fold.d, two.beyond) if fold.d > point.d else min(fold.d, two.beyond)
