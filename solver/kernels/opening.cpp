@@ -21,8 +21,8 @@ FineOpening fine_moments(const Gap& gap, const Circle& circle, const Panels& pan
   return out;
 }
 
-// Locate a minimum by narrowing parabolas, each where the last one has it; the next is as wide
-// where that is far.
+// Locate a minimum by narrowing parabolas. Where one has it far away, or has none, the next is as
+// wide, further down.
 void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
   double width = 0.5 * minimum.width / 8, low = infinity, half = 0;
   int left = MINIMUM_REFINEMENTS;
@@ -32,12 +32,7 @@ void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
         sum_modes(gap, {theta - width, theta, theta + width, theta}, modes);
     half = (after - 2 * here + before) / (2 * width * width);
     const double slope = (after - before) / (2 * width);
-    if (!(half > 0)) {
-      low = here;
-      half = std::max(half, std::numeric_limits<double>::min());
-      break;
-    }
-    const double whole = -slope / (2 * half);
+    const double whole = half > 0 ? -slope / (2 * half) : std::copysign(infinity, -slope);
     const double step = std::min(std::max(whole, -4 * width), 4 * width);
     minimum.theta += step;
     low = here + slope * step + half * step * step;
@@ -46,7 +41,7 @@ void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
     --left;
   }
   minimum.opening = low;
-  minimum.half = half;
+  minimum.half = std::max(half, std::numeric_limits<double>::min());
 }
 
 // Round up a number N of nodes to one that many gaps share, N + 1 with small prime factors.

@@ -77,6 +77,10 @@ def to_depth(problem: Problem, depth: float, load_steps: int, *accuracies: float
         ),
         # edges begin to move together, and the error of an equilibrium pins some again, by turns
         of_scene(replace(draw(9001, 0, "open"), accuracy=1e-4, load_steps=40)),
+        # a branch ended where all edges were pinned: the error of the field displaces that, too
+        of_scene(replace(draw(5560, 89, "open"), opening=3.3183, accuracy=1e-3)),
+        # edges that turned back were pinned by 1e-5 λ_min behind their places: 2.8 times the error
+        of_scene(replace(draw(5560, 762, "open"), opening=9.359, accuracy=1e-3, load_steps=15)),
         # after a jump one edge was predicted to move by 3 λ_min, and a state found there was taken
         of_scene(OF_MANY_PATCHES, finer=0.3),
         # a fold of receding edges: at 1e-3 it came late, at 1e-5 contact was never lost
