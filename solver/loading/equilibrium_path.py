@@ -170,6 +170,7 @@ class EquilibriumPath(ByValue, ResultViews):
         """Energy that edges dissipate as they recede, in J/m² of nominal area.
 
         By so much do the two works of adhesion differ, within jumps and between them; 0 for one.
+        Under a load what they dissipate when the solid falls off is not counted.
         """
         return math.fsum(self.ledger.friction)
 

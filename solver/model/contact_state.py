@@ -36,7 +36,8 @@ class ContactState(ByValue):
         prescribed (:mod:`adhesis.solver.model.control`); NaN if the method does not compute it.
     edge_friction : float
         Energy in J/m, per period, that edges have dissipated on the way to the state as they
-        receded: what both works of adhesion differ by, over the length along the profile.
+        receded: what both works of adhesion differ by, over the length along the profile; without
+        the fall of the solid under a load.
     hold_energy : float
         Contribution of the control to the potential, in J/m per period; 0 at fixed separation.
     internal : object

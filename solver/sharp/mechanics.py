@@ -69,7 +69,8 @@ class PinnedEdges(NamedTuple):
         rate = self.rate * np.sign(step)
         left = np.where(rate > 0, 1 - self.share, self.share)
         moving = np.isfinite(rate) & (rate != 0)
-        return np.divide(left, np.abs(rate), out=np.full(len(rate), np.inf), where=moving)
+        never = np.full(len(rate), np.inf)
+        return np.asarray(np.divide(left, np.abs(rate), out=never, where=moving))
 
     def distance(self, step: float) -> float:
         """Return the way in d, along ``step``, after which an edge begins to move; inf if none."""
@@ -288,7 +289,9 @@ class EdgeMechanics:
         if point.pinned is None:
             return displaced
         for e in np.flatnonzero(point.pinned.distances(step) <= abs(step)):
-            works = [self.adhesion.work(point.gaps.flat[e], recedes)[0] for recedes in (False, True)]
+            works = [
+                self.adhesion.work(point.gaps.flat[e], recedes)[0] for recedes in (False, True)
+            ]
             pinning_range = self.critical * float(np.diff(np.sqrt(works))[0])
             displaced = max(displaced, abs(change[e] / (pinning_range * point.pinned.rate[e])))
         return displaced

@@ -204,3 +204,10 @@ def test_openings_at_fine_nodes_are_sums_of_their_modes(k):
         assert len(opening) == len(modes) == len(theta)
         exact = field.sum_modes(k, theta, modes)
         np.testing.assert_allclose(opening, exact, atol=1e-12 * np.abs(exact).max())
+
+
+def test_gaps_without_a_field_have_no_opening():
+    field = solve_field(GAPS[::-1], SEPARATION, FieldModel(FIXED_SEPARATION, 10.0, SOURCE.panels))
+    assert np.isnan(field.pressure)
+    with pytest.raises(ValueError, match="there is no field"):
+        field.fine_opening(0, 6.0)

@@ -110,6 +110,32 @@ def test_a_loop_of_many_patches_closes_its_audit_and_its_friction_only_grows():
     np.testing.assert_array_equal(data.edge_friction, loop.edge_friction)
 
 
+@pytest.mark.parametrize(
+    ("control", "turn"),
+    [
+        (Control(), {"max_penetration": 0.8}),
+        (Control(1e9), {"max_penetration": 0.8}),
+        (Control(0.0), {"max_stress": 600.0}),
+    ],
+)
+def test_no_jump_dissipates_more_by_friction_than_it_loses(control, turn):
+    """Under a load the fall of the solid made it several times the loss."""
+    problem = Problem(rough(4, 4, 3), SOLID, 2e-3, control, work_of_adhesion_open=2e-2)
+    loop = loop_of(problem, load_steps=10, **turn)
+    by_friction = loop.ledger.friction[loop.states_before_jumps()]
+    drops = np.array([jump.energy_drop for jump in loop.jumps])
+    assert np.all(drops - by_friction > -loop.loss_error)
+    assert 0 < loop.friction < loop.loss
+
+
+def test_edges_that_are_pinned_at_both_thresholds_at_once_are_at_rest():
+    """By the response of the edges on the way they moved and were pinned by turns: a refusal."""
+    scene = draw(8804, 20, "pattern", decades=1.28)
+    problem = scene.problem()
+    loop = loop_of(problem, load_steps=scene.load_steps, **scene.turn(problem))
+    assert abs(loop.audit_residual) < 1e-4
+
+
 def test_auto_takes_sharp_for_two_works():
     assert make_method("auto", wave(2.0)).name == "sharp"
     assert make_method("grid", wave(1.0)).name == "grid"

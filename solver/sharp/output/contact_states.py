@@ -128,10 +128,15 @@ class States:
         )
 
     def with_friction(self, before: ContactState, states: list[ContactState]) -> list[ContactState]:
-        """Return states with the energy that receding edges have dissipated since one before."""
+        """Return states with the energy that receding edges have dissipated since one before.
+
+        Where the solid falls off under a load neither the work of that counts nor what they
+        dissipate then (``model.control``).
+        """
         out, total = [], before.edge_friction
         for state in states:
-            if before.patches:
+            falls_off = self.problem.control.is_load and not state.patches
+            if before.patches and not falls_off:
                 lost = self._friction_of(before.internal.gaps)
                 if state.patches:
                     lost -= self._friction_of(union_of(before.internal.gaps, state.internal.gaps))
