@@ -278,8 +278,9 @@ class EdgeMechanics:
         difference from those of a more accurate field. At a fold ∂(C_e - C_c)/∂n_f is singular. The
         rates of the edges diverge along its right null vector. Scaled by sqrt(C_e/C_f) it is
         symmetric, so its left null vector is ψ_e = C_e dn_e/dd. In first order the fold is moved to
-        where ψ·(δC + δd ∂C/∂d) = 0. Where pinned edges begin to move in the step, the branch may
-        end for one that runs then: at another d, if its opening is wrong.
+        where ψ·(δC + δd ∂C/∂d) = 0. At a pitchfork, whose mode the rates lack, that is where the
+        edges are in the places at which it softens. Where pinned edges begin to move in the step,
+        the branch may end for one that runs then: at another d, if its opening is wrong.
         """
         finer = self.solve_finer(point)
         change = finer.edge_opening - point.field.solution.edge_opening
@@ -293,7 +294,9 @@ class EdgeMechanics:
                 self.adhesion.work(point.gaps.flat[e], recedes)[0] for recedes in (False, True)
             ]
             pinning_range = self.critical * float(np.diff(np.sqrt(works))[0])
-            displaced = max(displaced, abs(change[e] / (pinning_range * point.pinned.rate[e])))
+            displaced = max(
+                displaced, abs(float(change[e] / (pinning_range * point.pinned.rate[e])))
+            )
         return displaced
 
     def equilibrium(
