@@ -164,7 +164,7 @@ inline constexpr double MINIMUM_DOUBT = 3.0;
 inline constexpr int MINIMUM_REFINEMENTS = 3;
 
 // Parabolas at most, with those of equal widths. Without these one in eighty minima was too high, by
-// up to 2e-4 h_max, where the third derivative is large beside the curvature.
+// up to 4e-4 h_max, where the third derivative is large beside the curvature.
 inline constexpr int MOST_PARABOLAS = 24;
 
 // ---------------------------------------------------------------- continuation of a branch

@@ -59,7 +59,7 @@ def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None
 
 
 def test_a_minimum_is_the_lowest_opening_around_it() -> None:
-    """Where the third derivative is large one in eighty was too high, by up to 2e-4 h_max."""
+    """Where the third derivative is large one in eighty was too high, by up to 4e-4 h_max."""
     profile = rough(4, 60, 1)
     edges = SharpMethod(Problem(profile, HALF_SPACE, 0.02)).edges
     h_max = profile.h_max * profile.q0
