@@ -704,7 +704,9 @@ def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_pa
     with pytest.raises(InputError, match=r"line 1 of .*, at the end of a column: remove it"):
         read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
     others = ZS[int(np.argmin(np.abs(Z))) :]  # which begin near nought
-    assert read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um").size == len(others) + 1
+    assert (
+        len(read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um")[0]) == len(others) + 1
+    )
 
 
 NAMED = [

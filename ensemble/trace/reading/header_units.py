@@ -71,6 +71,9 @@ _IN_TEXT = re.compile(
     rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_])|{_OPEN}(?:[^)\]>}}]*\s)?(?:{_ANY}){_CLOSE}|[\s_]in$",
     re.IGNORECASE,
 )
+# A unit in a sentence, but none of a speed or of a label with its value
+_LONE_UNIT = re.compile(rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_]|\W*[/:=])", re.IGNORECASE)
+_ENDS_IN_NUMBER, _BEGINS_WITH_NUMBER = re.compile(r"\d[^\w]*$"), re.compile(r"\W*\d")
 # Units of other quantities, in brackets or alone: what has one holds no lengths.
 _OTHER = re.compile(
     r"(.*[(\[<{]\s*)?((?:[μumnpk]?(?:A|V|N|s)|[mkMG]?(?:Pa|Hz|W|J|eV|g|K|bar)|min|h|°|°C|deg|degrees?"
@@ -238,8 +241,16 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
 
 
 def _mentions_unit(line: str) -> bool:
-    """Return whether a line without numbers ends with a unit but m, or has "Units:" of another."""
+    """Return whether a line has a unit but m that stands beside no number, or "Units:" of another.
+
+    At the end of a line without numbers it may have any form, elsewhere it is unmistakable.
+    """
     column = Column(line)
+    for unit in _LONE_UNIT.finditer(column.plain):
+        before, after = column.plain[: unit.start()], column.plain[unit.end() :]
+        is_lone = not (_ENDS_IN_NUMBER.search(before) or _BEGINS_WITH_NUMBER.match(after))
+        if is_lone and LENGTH.unit_named(unit[0]) != "m":
+            return True
     words = re.findall(r"[^\W\d_]+", column.plain.lower())
     if not words or any(map(str.isdigit, line)):
         return False

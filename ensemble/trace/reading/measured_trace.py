@@ -46,6 +46,7 @@ _SAME = 1e-9
 # So many heights of a row or column of a map do not rise or fall throughout by chance.
 _NO_CHANCE = 6
 _KINDS = ("positions", "heights")
+ASSUMED = "assumed: no unit is given"
 # Names of a column that counts the points.
 _COUNTS = re.compile(
     r"\W*((data|mess|sample|scan)?\W*(no|nr|number|n|i|idx|index|points?|punkt|sample|row|pixels?|px"
@@ -73,6 +74,8 @@ class Trace(ByValue):
         How it was read, line by line.
     tip_radius : float, optional
         Of the stylus or probe, in m, if it is known.
+    warnings : tuple of str
+        What is doubtful about how it was read.
 
     Raises
     ------
@@ -100,6 +103,7 @@ class Trace(ByValue):
     source: str = "array"
     notes: tuple[str, ...] = ()
     tip_radius: float | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         heights = _numbers(self.source, self.heights)
@@ -414,7 +418,7 @@ def _from_table(
         )
     columns[-1], gaps = without_codes(columns[-1])
     found = units_of_header(table.header, names)
-    if len(columns) == 2 and found.units[0] is None:
+    if len(columns) == 2 and not (found.by_name and found.units[0]):
         # a label beside a number ("Points", "400") names no column
         first = ["=" if looks_like_numbers(row[-1]) else row[0] for row in names]
         given = _step_beside_count(name, table, first, columns[0], unit, step)
@@ -462,7 +466,13 @@ def _from_table(
             notes.append(f"the header has a step or pitch of {stated}, against a step of {used}")
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length_on_top(name, columns[0], step, lines)
-    trace = Trace(heights, float(step), name, tuple(notes))
+    warnings = []
+    if given_by == ASSUMED:
+        warnings.append(
+            f"no unit is given for the numbers of {name}, so they are taken as metres: give "
+            f"{parameter('unit')} m if they are, or else their unit"
+        )
+    trace = Trace(heights, float(step), name, tuple(notes), warnings=tuple(warnings))
     slope = _slope(trace.heights, trace.step)
     if slope > _STEEPEST:
         raise InputError(
@@ -692,7 +702,7 @@ def units_of_columns(
             f"X,Z, as in mm,um{mend}"
         )
     if _sure_to_be_metres(columns, step):
-        return ("m", "m"), "numbers"
+        return ("m", "m"), ASSUMED
     low, high = np.nanmin(columns[0]), np.nanmax(columns[0])
     raise InputError(
         f"{name} states no unit, and {_KINDS[2 - len(columns)]} from {low:g} to {high:g} need not "

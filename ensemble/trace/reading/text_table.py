@@ -6,6 +6,7 @@ refused: where they belong to cannot be known.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -197,7 +198,7 @@ class _Reader:
         """
         if place in self.rows:
             return adjoins or self.is_whole(place)
-        line = self.lines[place].strip()
+        line = self.lines[place].strip(' "')
         if not line or line[0] in COMMENT or self.holds_names(place):
             return False
         return adjoins and (_DIGIT.match(line) is not None or is_without_words(line))
@@ -350,7 +351,8 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
             adjoins = False
     # Lines beside the block that differ in their digits alone are rows of another form.
     n = _ROWS_TO_BEGIN
-    for beside in lines[max(start - n, 0) : start], lines[last + 1 : last + 1 + n]:
+    for outside in lines[:start][::-1], lines[last + 1 :]:
+        beside = list(itertools.islice(filter(str.strip, outside), n))
         forms = {re.sub(r"[\d.,+\-\s]+", " ", line) for line in beside}
         if len(beside) == n and len(forms) == 1 < len(set(beside)):
             raise InputError(
@@ -466,6 +468,9 @@ def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tupl
 
 
 def _split_names(line: str, delimiter: str) -> list[str]:
-    if delimiter == " " and '"' not in line and re.search(r"\s{2}|\t", line):
-        return re.split(r"\s{2,}|\t", line)
+    if delimiter == " " and '"' not in line:
+        if re.search(r"\s{2}|\t", line):
+            return re.split(r"\s{2,}|\t", line)
+        if re.search(r" in ", line):  # no name, and no inch: "Data in mm"
+            return [line]
     return split(line, delimiter)
