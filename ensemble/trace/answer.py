@@ -574,7 +574,7 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
     return [*found, "; ".join(failed)] if failed else found
 
 
-def _of_ranges(answer: Answer, ranges: Mapping[str, float | None]) -> list[str]:
+def _of_ranges(answer: Answer, ranges: Mapping[str, Any]) -> list[str]:
     """Return the warning of a range of adhesion below which zero range holds, if it is short."""
     if answer.main["strength"] is not None:
         return []  # its own range is given

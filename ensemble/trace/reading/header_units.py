@@ -247,8 +247,8 @@ def _mentions_unit(line: str) -> bool:
     """
     column = Column(line)
     for unit in _LONE_UNIT.finditer(column.plain):
-        before, after = column.plain[: unit.start()], column.plain[unit.end() :]
-        is_lone = not (_ENDS_IN_NUMBER.search(before) or _BEGINS_WITH_NUMBER.match(after))
+        head, tail = column.plain[: unit.start()], column.plain[unit.end() :]
+        is_lone = not (_ENDS_IN_NUMBER.search(head) or _BEGINS_WITH_NUMBER.match(tail))
         if is_lone and LENGTH.unit_named(unit[0]) != "m":
             return True
     words = re.findall(r"[^\W\d_]+", column.plain.lower())

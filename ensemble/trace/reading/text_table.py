@@ -351,8 +351,8 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
             adjoins = False
     # Lines beside the block that differ in their digits alone are rows of another form.
     n = _ROWS_TO_BEGIN
-    for outside in lines[:start][::-1], lines[last + 1 :]:
-        beside = list(itertools.islice(filter(str.strip, outside), n))
+    for others in reversed(lines[:start]), iter(lines[last + 1 :]):
+        beside = list(itertools.islice((line for line in others if line.strip()), n))
         forms = {re.sub(r"[\d.,+\-\s]+", " ", line) for line in beside}
         if len(beside) == n and len(forms) == 1 < len(set(beside)):
             raise InputError(
