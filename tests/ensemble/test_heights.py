@@ -172,6 +172,23 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
 }
 
 
+@pytest.mark.parametrize(
+    ("kind", "options", "said"),
+    [
+        ("z", (), "16 heights in m (assumed: no unit is given)"),
+        ("z", ("--unit", "m"), "16 heights in m (--unit)"),
+        ("z (m)", (), "16 heights in m (header)"),
+    ],
+)
+def test_how_heights_were_read_stands_beside_the_loss(kind, options, said, tmp_path, capsys):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([kind, *METRES]))
+    words = ["loop", "--heights", path, *OF_WAVE, "--load-steps", 2, "--quiet", *options]
+    assert main([*map(str, words), "--json", str(tmp_path / "o.json")]) == 0
+    assert f"read        {path}: {said}\n" in capsys.readouterr().out
+    assert json.loads((tmp_path / "o.json").read_text())["read"] == {"said": [said]}
+
+
 @pytest.mark.parametrize("kind", DOUBTFUL)
 def test_doubtful_heights_are_refused(kind: str, tmp_path: Path) -> None:
     lines, options, words = DOUBTFUL[kind]

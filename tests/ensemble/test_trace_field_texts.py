@@ -47,6 +47,19 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [UM, *(f'"{x}","{z}"'.replace(".", ",") for x, z in PAIRS)],
         {},
     ),
+    "a count beside units in lines of their own": (
+        ["Unit: um", "Spacing = 0.5 um", "No.;z", *(f"{k};{z}" for k, z in enumerate(ZS))],
+        {},
+    ),
+    "a count without a name beside units in lines": (
+        ["X unit: cm", "Z unit: um", "dx = 0.5 um", ";z"]
+        + [f"{k};{z}" for k, z in enumerate(ZS, 1)],
+        {},
+    ),
+    "a sentence with a unit above a count": (
+        ["Data in meter", ";z", *(f"{k};{z}E-6;" for k, z in enumerate(ZS))],
+        {"step": STEP},
+    ),
     "units by option": ([f"{x} {z}" for x, z in PAIRS], {"unit": "um"}),
     "two units by option": (
         [f"{k * 5e-4:.7f},{1e3 * float(z):.3f}" for k, z in enumerate(ZS)],
@@ -342,6 +355,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         Z_UM,
         "unevenly at 1 place, the first on line 402: write NaN where one is a row, remove the",
     ),
+    "rows of another form below empty lines": (
+        ["x (um);z (um)", *(f'"{x}";{z}\n' for x, z in PAIRS[:99])]
+        + [f'"1Ê{x}";{z}\n' for x, z in PAIRS[99:]],
+        {},
+        r"line 200 of .* it ends the rows of 2 numbers",
+    ),
     "a shorter block below": ([UM, *TWO, "Raw", *ZS], {}, "line 402 .* follow on line 403"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
     "brackets for minus": (
@@ -492,7 +511,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         )
         for head, shown in {
             "x (?m);z (?m)": "(?m)", "X (1e-3 m);Z (1e-3 m)": "X (1e-3 m)", "X in;Z in": "X in",
-            **{line: line for line in ("Units: feet", "All data in mm")},
+            "[cm],[m];": "[cm],[m]",
+            **{line: line for line in (
+                "Units: feet", "All data in mm", "exported in mm by Surf 2.1",
+                "x inch Depth meter OK",
+            )},
         }.items()
     },
     "rows that go on": (
@@ -685,6 +708,21 @@ def test_a_depth_is_noted_and_an_angstrom_read(tmp_path: Path) -> None:
     rows = [f"{x};{1e4 * float(z):.2f}" for x, z in PAIRS]
     trace = read_trace(put(tmp_path / "t.txt", ["X [um];Z [A]", *rows]))
     np.testing.assert_allclose(trace.heights, Z, rtol=0, atol=1e-12)
+
+
+def test_metres_that_are_assumed_are_a_doubt(tmp_path: Path) -> None:
+    rows = [f"{5e-7 * k:.7f};{z:.12f}" for k, z in enumerate(Z)]
+    for head, options, is_assumed in (
+        ("X;Z", {}, True),
+        ("X;Z", {"unit": "m"}, False),
+        ("X (m);Z (m)", {}, False),
+    ):
+        trace = read_trace(put(tmp_path / "t.txt", [head, *rows]), **options)
+        doubts = [f"no unit is given for the numbers of {tmp_path / 't.txt'}, so they are taken "
+                  "as metres: give unit m if they are, or else their unit"]  # fmt: skip
+        assert list(trace.warnings) == (doubts if is_assumed else [])
+        assert prepare_trace(trace).warnings == trace.warnings
+        assert any("(assumed: no unit is given)" in note for note in trace.notes) == is_assumed
 
 
 @pytest.mark.parametrize("gap", ["---", "-", ""])
