@@ -28,6 +28,7 @@ from adhesis.ensemble.trace.options import (
     what_was_read,
 )
 from adhesis.ensemble.versions import input_record, provenance
+from adhesis.solver import checks
 from adhesis.solver.checks import plain
 from adhesis.solver.loading.loop import run_loop, run_loops
 from adhesis.solver.loading.loop_result import LoopResult
@@ -222,7 +223,11 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
     heights, said = read_heights(
-        args.heights, unit=args.unit, delimiter=args.delimiter, decimal=args.decimal
+        args.heights,
+        period=checks.real("period", args.period, checks.LENGTH),
+        unit=args.unit,
+        delimiter=args.delimiter,
+        decimal=args.decimal,
     )
     warning = heights_warning(heights, f"{args.heights}")
     print(printable(f"read        {args.heights}: {said}"))

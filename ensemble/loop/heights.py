@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import replace
 
@@ -33,6 +34,7 @@ _SAME, _FEW = 1e-9, 2
 def read_heights(
     path: str | os.PathLike[str],
     *,
+    period: float = math.inf,
     unit: str | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
@@ -40,7 +42,8 @@ def read_heights(
     """Read the heights of one period in m from a .npy or a text of one column (or one row).
 
     Returns them, and a text on how they were read. Without ``unit`` the header's counts. Without
-    either they are in metres if they range over at most 1 mm, and otherwise refused. InputError for
+    either they are in metres if they range over at most 1 mm, and in the middle rise by no more
+    than a step of the ``period`` in m from point to point; else they are refused. InputError for
     anything but one column of finite numbers.
     """
     if unit is not None and "," in unit:
@@ -80,7 +83,8 @@ def read_heights(
     # No note says that the option overruled a line of the header, so it is refused as a name is;
     # metres are assumed in any case.
     found = replace(found, by_name=True, unclear="" if found.units[-1] == "m" else found.unclear)
-    step = None if heights.size and np.ptp(heights) > HEIGHT.largest else 1.0  # all heights count
+    is_high = heights.size and np.ptp(heights) > HEIGHT.largest  # all heights count
+    step = None if is_high else period / max(heights.size, 1)
     (_, of_heights), given_by = units_of_columns(f"{source}", found, unit, heights[None], step)
     said = f"{counted(heights.size, 'height')} in {of_heights} ({given_by})"
     return np.asarray(heights * LENGTH.units[of_heights]), said

@@ -6,6 +6,7 @@ import json
 import os
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,7 +136,7 @@ def test_a_file_that_may_not_be_read_is_refused(read, tmp_path, monkeypatch):
         read(path)
 
 
-DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
+DOUBTFUL: dict[str, tuple[list[str], dict[str, Any], str]] = {
     "a unit that was damaged": (["z [æm]", *METRES], {}, r"is clear, with '\[æm\]' in .*give unit"),
     "header against option": (
         ["z [µm]", *NM],
@@ -151,6 +152,11 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
         ["0.000"] * 400 + ["1.000"] * 2,
         {},
         "states no unit, and heights from 0 to 1 need not be metres",
+    ),
+    "steep ones": (
+        [f"{1e-4 * (-1) ** k}" for k in range(99)],
+        {"period": 1e-3},
+        "need not be metres",
     ),
     "two units": (METRES, {"unit": "mm,um"}, "--unit is 'mm,um': with --heights it is one unit"),
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),

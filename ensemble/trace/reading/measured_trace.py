@@ -714,11 +714,11 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     heights = columns[-1][np.isfinite(columns[-1])]
     if heights.size and np.ptp(np.percentile(heights, [1, 99])) > HEIGHT.largest:
         return False
-    if len(columns) == 1:
-        return step is not None
-    x = columns[0][np.isfinite(columns[0])]
-    longest = min(_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES * (x.size - 1))
-    return x.size > 1 and bool(np.ptp(x) <= longest)
+    if len(columns) == 2:
+        x = columns[0][np.isfinite(columns[0])]
+        longest = min(_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES * (x.size - 1))
+        step = float(np.ptp(x)) / (x.size - 1) if x.size > 1 and np.ptp(x) <= longest else None
+    return step is not None and step > 0 and _slope(heights, step) <= _STEEPEST
 
 
 def _slope(heights: Array, step: float) -> float:
