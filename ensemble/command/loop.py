@@ -111,6 +111,8 @@ def execute(args: argparse.Namespace) -> int:
     if args.film is not None:
         with writing.output("--film", args.film):
             results[0].film(args.film, progress=not args.quiet)
+    if args.heights is not None:
+        print(printable(f"read        {args.heights}: {'; '.join(said)}"))
     print("\n\n".join(result.summary() for result in results))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
@@ -230,7 +232,6 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str], list[s
         decimal=args.decimal,
     )
     warning = heights_warning(heights, f"{args.heights}")
-    print(printable(f"read        {args.heights}: {said}"))
     return profile_from_heights(heights, args.period), [warning] if warning else [], [said]
 
 
