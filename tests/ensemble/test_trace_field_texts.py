@@ -110,6 +110,14 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
+    "a map whose rows differ by the same height": (
+        ["\t".join(f"{float(z) + 0.01 * k:.6f}" for z in ZS) for k in (-1, 0, 1)],
+        {"row": 1, **Z_UM},
+    ),
+    "a line of a raster below a line with a unit": (
+        ["# Value units: um", *(f"{x} {y} {z}" for y in range(3) for x, z in PAIRS)],
+        {"unit": "um", "columns": [1, 3], "row": 1},
+    ),
     "a line of the heights of a raster that lacks its first one": (
         [f"{XS[k]},{y},{ZS[k] if y + k else 'nan'}" for y in range(2) for k in range(N)],
         {"columns": [3], "row": 1, **Z_UM},
@@ -594,10 +602,23 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"row": 1, "step": STEP, "unit": "um"},
         "the first column of .* rises or falls throughout, as positions do",
     ),
-    "a map of four rows with their positions": (
-        [",".join([f"{k / 2}", *ZS]) for k in range(4)],
-        {"row": 1, "step": STEP, "unit": "um"},
-        "the first column of .* rises or falls throughout, as positions do",
+    **{
+        f"a map of {rows} rows with their positions": (
+            [",".join([f"{k / 2}", *ZS]) for k in range(rows)],
+            {"row": 1, "step": STEP, "unit": "um"},
+            "the first column of .* rises or falls throughout, as positions do",
+        )
+        for rows in (3, 4)
+    },
+    "a raster of short lines": (
+        [f"{k // 5 / 2},{k % 5},{z}" for k, z in enumerate(ZS)],
+        {"columns": [3], **Z_UM},
+        "it is a raster of 80 lines of 5 points",
+    ),
+    "a raster whose positions are the slow ones": (
+        [f"{k // 3},{k % 3},{z}" for k, z in enumerate(ZS[:399])],
+        {"columns": [1, 3], "unit": "um"},
+        "it is a raster of 133 lines of 3 points",
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": ";;"}, "it must be one of semicolons"),

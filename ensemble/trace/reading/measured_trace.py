@@ -525,12 +525,13 @@ def _chosen(
 
 def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     """Return a row of a text whose rows are those of a map."""
-    for what, line in (("row", table.columns[:, 0]), ("column", table.columns[table.filled[0]])):
+    lines = {"row": table.columns.T[:2], "column": table.columns[list(table.filled[:2])]}
+    for what, (line, *beside) in lines.items():
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
         for part in line, line[1:]:
             steps = np.diff(part[np.isfinite(part)])
-            is_even = steps.size > 2 and np.ptp(steps) <= _SAME * abs(steps[0]) > 0
-            if (steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0))) or is_even:
+            rises = steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0))
+            if rises or (_is_even(part) and not any(map(_is_even, beside))):
                 raise InputError(
                     f"the first {what} of {name} rises or falls throughout, as positions do: "
                     f"remove it, and give {parameter('step')}"
@@ -540,17 +541,27 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     return table.columns[list(table.filled), row].reshape(1, -1)
 
 
+def _is_even(numbers: Array) -> bool:
+    """Return whether three numbers or more have equal steps, but for missing ones."""
+    steps = np.diff(numbers[np.isfinite(numbers)])
+    return bool(steps.size > 1 and np.ptp(steps) <= _SAME * abs(steps[0]) > 0)
+
+
 def _scan_line(
     name: str, table: Table, columns: Array, lines: Array, row: int | None, notes: list[str]
 ) -> tuple[Array, Array]:
     """Return one scan line, where the positions of a raster begin anew on each line.
 
-    Beside heights alone they may stand in any other column.
+    Beside heights alone they may stand in any other column, and so they may beside positions that
+    stand still on each line.
     """
     columns_of_positions, places = columns[:1], lines
-    if len(columns) == 1:  # heights may be missing in the first place or the last
+    if len(columns) == 1 or (lines.size > 1 and columns[0, 0] == columns[0, 1]):
+        # heights may be missing in the first place or the last
         others, places = table.columns[list(table.filled)], table.lines
-        columns_of_positions = others[(others[:, np.isin(places, lines)] != columns).any(axis=1)]
+        columns_of_positions = others[
+            (others[:, np.isin(places, lines)] != columns[-1]).any(axis=1)
+        ]
     points, count = next(filter(None, map(_raster, columns_of_positions)), (0, 0))
     if row is None and count:
         raise InputError(
@@ -577,7 +588,7 @@ def _raster(x: Array) -> tuple[int, int] | None:
     points = int(again[0]) if again.size else max(x.size, 1)
     count, rest = divmod(x.size, points)
     rises = np.sign(np.diff(x[:points]))
-    is_raster = count > 1 and not rest and abs(rises.sum()) == points - 1 >= _NO_CHANCE
+    is_raster = count > 1 and not rest and abs(rises.sum()) == points - 1 > 1  # flags have two
     return (points, count) if is_raster and np.array_equal(x, np.tile(x[:points], count)) else None
 
 

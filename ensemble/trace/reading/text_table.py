@@ -471,6 +471,6 @@ def _split_names(line: str, delimiter: str) -> list[str]:
     if delimiter == " " and '"' not in line:
         if re.search(r"\s{2}|\t", line):
             return re.split(r"\s{2,}|\t", line)
-        if re.search(r" in ", line):  # no name, and no inch: "Data in mm"
+        if re.search(r" in |: ", line):  # "Data in mm" has no inch, "Value units: mm" no names
             return [line]
     return split(line, delimiter)
