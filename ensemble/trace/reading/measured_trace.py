@@ -22,7 +22,7 @@ from adhesis.ensemble.trace.reading.header_units import (
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
-from adhesis.ensemble.trace.reading.missing_heights import VALID, invalid_rows, without_codes
+from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.printed_numbers import looks_like_numbers
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
@@ -201,8 +201,8 @@ def read_trace(
         Columns of positions and heights, shape (2,), or of heights alone, shape (1,): counted from
         1, or names of a DataFrame.
     row, channel : int, optional
-        Row of a map (of an instrument file or a text) and channel of an instrument file, counted
-        from 0.
+        Row of a map (of an instrument file, a text or a table) and channel of an instrument file,
+        counted from 0.
     delimiter, decimal : str, optional
         Delimiter and decimal sign, where a text can be read in two ways.
 
@@ -237,20 +237,16 @@ def read_trace(
                 f"{parameter('unit')} is {checks.shown(unit)}: it must be a text, as 'um' or "
                 "'mm,um'"
             )
-        named = columns is not None and hasattr(source, "iloc")
-        named = named and all(isinstance(name, str) for name in columns or ())
-        if columns is not None and not named:
-            columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
+        if columns is not None and hasattr(source, "iloc"):
+            columns = _columns_named(source, columns)
+        wanted = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns or ()] or None
         row = None if row is None else checks.whole(parameter("row"), row, _ROW)
         channel = None if channel is None else checks.whole(parameter("channel"), channel, _ROW)
-    in_memory = _table_of(source, columns, named)
+    in_memory = _table_of(source, wanted)
     if in_memory is not None:
-        _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
-        name, table = in_memory
-        form = f"columns {', '.join(table.header)}" if table.header else name
-        if named and columns is not None:
-            columns = range(1, len(columns) + 1)
-        return _from_table(name, table, unit, step, columns, None, form)
+        _refuse_options("files", channel=channel, delimiter=delimiter, decimal=decimal)
+        name, form, table = in_memory
+        return _from_table(name, table, unit, step, wanted, row, form)
     source = source_of(source)
     is_text = source.holds_numbers()
     if is_text and channel is not None:
@@ -260,10 +256,10 @@ def read_trace(
         )
     if is_text and source.is_npy:
         table = _columns_of(source.name, load_array(source))
-        return _from_table(source.name, table, unit, step, columns, row, "npy")
+        return _from_table(source.name, table, unit, step, wanted, row, "npy")
     if is_text:
         table = read_table(source, delimiter, decimal)
-        return _from_table(source.name, table, unit, step, columns, row, f"text, {table.form}")
+        return _from_table(source.name, table, unit, step, wanted, row, f"text, {table.form}")
     _refuse_options(
         "texts: an instrument's file states its own lengths (a text that holds zero bytes, as in "
         "UTF-16 without a mark, is to be saved as UTF-8)",
@@ -334,25 +330,26 @@ def _refuse_units(name: str, values: Any) -> None:
         entries = list(itertools.chain.from_iterable(lists))
 
 
-def _table_of(
-    source: Any, wanted: Sequence[int | str] | None, named: bool
-) -> tuple[str, Table] | None:
-    """Return name and columns of an array or a DataFrame; None for any other source."""
+def _columns_named(table: Any, wanted: Sequence[int | str]) -> list[int | str]:
+    """Return the columns of a DataFrame or Series by their numbers, in place of names."""
+    names = list(table.columns) if hasattr(table, "columns") else [table.name]
+    missing = [name for name in wanted if isinstance(name, str) and names.count(name) != 1]
+    if missing:
+        known = ", ".join(map(repr, names))
+        raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
+    return [names.index(name) + 1 if isinstance(name, str) else name for name in wanted]
+
+
+def _table_of(source: Any, wanted: Sequence[int] | None) -> tuple[str, str, Table] | None:
+    """Return name, form and columns of an array or a DataFrame; None for any other source."""
     if isinstance(source, np.ndarray | list | tuple):
-        return "array", _columns_of("array", _numbers("array", source))
+        return "array", "array", _columns_of("array", _numbers("array", source))
     if not hasattr(source, "iloc"):  # which a DataFrame and a Series have
         return None
     if hasattr(source, "to_frame"):  # a Series is a column
         source = source.to_frame()
-    if named and wanted is not None:
-        missing = [name for name in wanted if list(source.columns).count(name) != 1]
-        if missing:
-            known = ", ".join(map(repr, source.columns))
-            raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
-        others = source.select_dtypes(["number", "bool"]).columns
-        source = source[[*wanted, *(n for n in others if n not in wanted and VALID.match(str(n)))]]
-        wanted = range(1, len(wanted) + 1)
-    chosen = range(1, len(source.columns) + 1) if wanted is None else wanted
+    all_of_it = range(1, len(source.columns) + 1)
+    chosen = all_of_it if wanted is None else [k for k in wanted if k in all_of_it]
     if len(chosen) == 1:
         with refused_as_input():
             checks.check_index("the table", source)
@@ -363,25 +360,29 @@ def _table_of(
             "columns to their units"
         )
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
-    for n in filter(units.get, source.columns):
-        if Column(str(n)).unit not in (None, Column(str(units[n])).unit):
+    values = np.full((len(header), len(source)), np.nan)
+    for k, (n, kind) in enumerate(source.dtypes.items(), 1):
+        if k not in chosen and kind.kind not in "biuf":
+            continue
+        if units.get(n) and Column(str(n)).unit not in (None, Column(str(units[n])).unit):
             raise InputError(
                 f"column {n!r} of the table has the unit {units[n]} in attrs: correct the wrong one"
             )
-    for k, (n, kind) in enumerate(source.dtypes.items(), 1):
-        # They would become numbers of another meaning.
-        if kind.kind in "cmM" or (kind.kind == "b" and (k in chosen or not VALID.match(str(n)))):
+        if k in chosen and kind.kind in "bcmM":  # they would get another meaning
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
-    objects = (k for k, kind in enumerate(source.dtypes) if kind.kind == "O")
-    _refuse_units("the table", [source.iloc[:, k].tolist() for k in objects])
-    try:
-        values = source.to_numpy(dtype=float, na_value=np.nan)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the table holds more than numbers: {error}") from None
+        column = source.iloc[:, k - 1]
+        if kind.kind == "O":
+            _refuse_units("the table", column.tolist())
+        try:
+            values[k - 1] = column.to_numpy(dtype=float, na_value=np.nan)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the table holds more than numbers: {error}") from None
     # a unit that is given beside the names needs none of them
     names = tuple(str(units.get(n) or name) for n, name in zip(source.columns, header, strict=True))
-    lines, filled = np.arange(1, values.shape[0] + 1), tuple(range(len(names)))
-    return "the table", Table(values.T, filled, tuple(header), (names,), lines, " ", ".")
+    lines: Any = np.arange(1, len(source) + 1)
+    filled = tuple(range(len(names)))
+    form = f"columns {', '.join(header[k - 1] for k in chosen)}"
+    return "the table", form, Table(values, filled, tuple(header), (names,), lines, " ", ".")
 
 
 def _columns_of(name: str, values: Array) -> Table:
