@@ -548,6 +548,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         r"give decimal \. if they are delimiters, or save it with semicolons",
     ),
+    "commas of thousands beside commas and blanks": (
+        ["x, z, flag", *(f"{x}, {2000 + k:,}, 0" for k, x in enumerate(XS))],
+        {"unit": "um,nm", "columns": [1, 2]},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
     "pairs of decimal commas below names with units": (
         ["x, um, z, um", *(f"{k},0,{1 + k % 7},{k % 9}" for k in range(99))],
         {"columns": [1, 3]},
