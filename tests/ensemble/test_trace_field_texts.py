@@ -60,6 +60,11 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["Data in meter", ";z", *(f"{k};{z}E-6;" for k, z in enumerate(ZS))],
         {"step": STEP},
     ),
+    "a count below a length whose words are no names": (
+        ["X resolution,9,um", "DataLine,POS = 0", *(f"{k},{z}" for k, z in enumerate(ZS))],
+        Z_UM,
+    ),
+    "a unit in Japanese": (["測定ピッチ,0.5,um", "単位,um", "データ", *ZS], {}),
     "units by option": ([f"{x} {z}" for x, z in PAIRS], {"unit": "um"}),
     "two units by option": (
         [f"{k * 5e-4:.7f},{1e3 * float(z):.3f}" for k, z in enumerate(ZS)],

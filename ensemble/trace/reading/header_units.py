@@ -35,17 +35,19 @@ _X = _set(
     "travel traverse 水平位置"
 )
 _Z = _DEPTH | _set(
-    "z zunit zunits h height heights höhe höhen hoehe hauteur altura altezza hoogte wysokość "
-    "výška höjd høyde højde высота vertical elevation topography profile profiles profil "
+    "z zunit zunits h height heights höhe höhen hoehe hauteur altitude altura altezza hoogte "
+    "wysokość výška höjd høyde højde высота vertical elevation topography profile profiles profil "
     "perfil profilo профиль roughness rauheit waviness 高さ 高度 断面 輪郭 粗さ 轮廓 높이 "
     "단면 relief 測定値"
 )
-_UNITS = _set("unit units einheit einheiten unité unités unidad unidades unità yunit yunits")
+_UNITS = _set(
+    "unit units einheit einheiten unité unités unidad unidades unità yunit yunits 単位 单位 단위"
+)
 _BESIDE = _UNITS | _set(
     "y axis achse axe eje asse direction label value values wert werte valeur column channel "
-    "kanal trace scan line sampling stylus stage data daten raw measured measurement primary "
-    "filtered unfiltered level levelled leveled coordinate ось surface sample along up point "
-    "points of in the all are"
+    "kanal trace scan line sampling stylus sensor stage data daten raw measured measurement "
+    "primary filtered unfiltered level levelled leveled coordinate ось surface sample along up "
+    "point points of in the all are"
 )
 _ALONE = _set("a b c d")  # columns of a spreadsheet
 _OF_PROFILES = _set("p r w total")  # which P, W and R profiles are, behind their filters

@@ -456,7 +456,9 @@ def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tupl
         return tuple(fields + [""] * (count - len(fields)))
     if len(fields) == count - 1 and '"' in line:  # R names no column of the numbers of rows
         return ("", *fields)
-    for sign in DELIMITERS:
+    # A line that the delimiter divides has no other one: "X resolution,0.5,um" are no two names.
+    is_divided = delimiter != " " and delimiter in line
+    for sign in delimiter if is_divided else DELIMITERS:
         fields = _split_names(line, sign)
         if len(fields) == count:
             return tuple(fields)
