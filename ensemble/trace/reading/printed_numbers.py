@@ -24,10 +24,10 @@ _SIGNS = re.compile(r"[-+*.()\s]")  # about such a word, or as wide as the numbe
 _PROGRAM_ERROR = re.compile(r"#{2,}|#\S+[!?]|[-+]?1\.#[A-Z]+0*", re.IGNORECASE)  # #NAME?, 1.#INF
 _FIRST = re.compile(r"[+\-]?\.?\d[\d.eEdD+\-'’`´٬_]*")  # of a line
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
-# "0,5,1,3": four numbers, or two
+# "0,5,1,3" and "0,5, 1,3": four numbers, or two
 _DECIMALS = r"\d*(?:e[+\-]?\d+)?"
-_PAIRS = re.compile(rf'\s*[^,."\s]*,{_DECIMALS}(?:,[^,."\s]*,{_DECIMALS})+\s*', re.IGNORECASE)
-# "0,5, 1,3" and "0.5, 1,234": commas with blanks and without
+_PAIRS = re.compile(rf'\s*[^,."\s]*,{_DECIMALS}(?:,\s?[^,."\s]*,{_DECIMALS})+\s*', re.IGNORECASE)
+# "0.5, 1,234": commas with blanks and without
 _MIXED = re.compile(r"\d,\d.*, |, .*\d,\d")
 _MOSTLY = 0.8  # share of the lines in which a delimiter stands
 _EXPONENT = re.compile(r"(?<=[\d.])\s*[eEdD](?=\s*[+\-]?\d)")
