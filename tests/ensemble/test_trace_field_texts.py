@@ -360,6 +360,21 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a step on top, printed alike": (["0.500000", *ZS], Z_UM, "line 1 .* the step or the length"),
     "a length on top, in mm": (["0.199500", *ZS], Z_UM, "line 1 .* the step or the length"),
     "a checksum below": ([*ZS, "34582"], Z_UM, "line 401 of .* has '34582'"),
+    "a length below, trimmed": (
+        ["z (um)", *(f"{float(z):.1g}" for z in ZS[50:]), "175"],
+        {"step": STEP},
+        "line 352 of .* is 175, and the step or the length of the trace is 175 µm",
+    ),
+    "a count below, trimmed": (
+        ["z (um)", *(f"{float(z):.1g}" for z in ZS), "400"],
+        {"step": 0.3e-6},
+        "line 402 of .* has '400', at the end of a column",
+    ),
+    "two traces, point by point": (
+        [UM, *(f"{2 * (k // 2)},{float(z) + k % 2}" for k, z in enumerate(ZS))],
+        {},
+        "every position of .* is there 2 times, and the heights jump between them: keep the rows",
+    ),
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
     "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402; .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),

@@ -473,7 +473,7 @@ def _from_table(
             stated, used = length_text(other, 5), length_text(step, 5)
             notes.append(f"the header has a step or pitch of {stated}, against a step of {used}")
     if len(columns) == 1 and form.startswith("text"):
-        _refuse_length_on_top(name, columns[0], step, lines)
+        _refuse_length(name, columns[0], step, lines)
     warnings = []
     if given_by == ASSUMED:
         warnings.append(
@@ -649,11 +649,11 @@ def _step_beside_count(
     return step
 
 
-def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | None) -> None:
-    """Refuse a step or a length that stands among the first heights, in whatever unit."""
-    for k, number in enumerate(column[:3]):
-        below = column.size - k - 1
-        for length in (step, below * step, (below - 1) * step):
+def _refuse_length(name: str, column: Array, step: float, lines: Array | None) -> None:
+    """Refuse a step or a length that is among the first heights or the last, in whatever unit."""
+    for k in (0, 1, 2, column.size - 1):
+        number, others = column[k], column.size - (k + 1 if k < 3 else 1)
+        for length in (step, others * step, (others - 1) * step):
             if any(abs(number * size / length - 1) < _SAME for size in LENGTH.units.values()):
                 where = f"point {k + 1}" if lines is None else f"line {lines[k]:.0f}"
                 raise InputError(

@@ -372,7 +372,7 @@ def _refuse_odd_ends(
 ) -> None:
     """Refuse counts, steps and checksums at the ends of a lone column, and a number cut off.
 
-    They are printed otherwise than all numbers between, or the first one counts the others. Of
+    They are printed otherwise than all numbers between, or count the others. Of
     several columns only the last row is judged, in which the file may end too early, and the number
     that pandas gives to a column as its ``name``.
     """
@@ -400,7 +400,8 @@ def _refuse_odd_ends(
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
         is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
         is_odd = form != usual if has_one_form else is_cut
-        if is_name or is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
+        is_count = numbers[k] == (n - k - 1 if k < _ENDS else n - 1)
+        if is_name or is_odd or (is_lone and is_count and (k < _ENDS or k == n - 1)):
             raise InputError(
                 f"line {places[k] + 1} of {source} has {column[k]!r}, at the end of a column: "
                 "remove it if it is a name, a count, a length, a step or a checksum, or was cut "
