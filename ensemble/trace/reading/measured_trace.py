@@ -81,7 +81,7 @@ class Trace(ByValue):
     ------
     InputError
         If it is no trace of a rough surface in m: too few heights, all of them equal, a length
-        below 10 nm or above 1 m, or steeper than its step from point to point in the middle.
+        below 10 nm or above 1 m.
     TypeError
         If a value is of the wrong type.
 
@@ -128,13 +128,6 @@ class Trace(ByValue):
             raise InputError(
                 f"{self.source} would be {self.length:.3g} m long: is its unit right "
                 f"({parameter('unit')})?"
-            )
-        slope = _slope(self.heights, self.step)
-        if slope > _STEEPEST:
-            raise InputError(
-                f"{self.source} would rise by {slope:.3g} times its step from point to point: are "
-                f"positions and heights in the same unit ({parameter('unit')} X,Z), and is the "
-                "step right?"
             )
         super().__post_init__()
 
@@ -480,7 +473,14 @@ def _from_table(
             f"no unit is given for the numbers of {name}, so they are taken as metres: give "
             f"{parameter('unit')} m if they are, or else their unit"
         )
-    return Trace(heights, float(step), name, tuple(notes), warnings=tuple(warnings))
+    trace = Trace(heights, float(step), name, tuple(notes), warnings=tuple(warnings))
+    slope = _slope(trace.heights, trace.step)
+    if slope > _STEEPEST:
+        raise InputError(
+            f"{name} would rise by {slope:.3g} times its step from point to point: are positions "
+            f"and heights in the same unit ({parameter('unit')} X,Z), and is the step right?"
+        )
+    return trace
 
 
 # ---------------------------------------------------------------------- columns and rows
