@@ -75,7 +75,9 @@ _IN_TEXT = re.compile(
 )
 # A unit in a sentence, but none of a speed or of a label with its value
 _LONE_UNIT = re.compile(rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_]|\W*[/:=])", re.IGNORECASE)
-_ENDS_IN_NUMBER, _BEGINS_WITH_NUMBER = re.compile(r"\d[^\w]*$"), re.compile(r"\W*\d")
+_UNIT_OF_NUMBER = re.compile(
+    rf"\d\W*(?:{_WORD})(?![^\W_])|(?<![^\W\d_])(?:{_WORD})\W*\d", re.IGNORECASE
+)
 # Units of other quantities, in brackets or alone: what has one holds no lengths.
 _OTHER = re.compile(
     r"(.*[(\[<{]\s*)?((?:[μumnpk]?(?:A|V|N|s)|[mkMG]?(?:Pa|Hz|W|J|eV|g|K|bar)|min|h|°|°C|deg|degrees?"
@@ -248,11 +250,9 @@ def _mentions_unit(line: str) -> bool:
     At the end of a line without numbers it may have any form, elsewhere it is unmistakable.
     """
     column = Column(line)
-    for unit in _LONE_UNIT.finditer(column.plain):
-        head, tail = column.plain[: unit.start()], column.plain[unit.end() :]
-        is_lone = not (_ENDS_IN_NUMBER.search(head) or _BEGINS_WITH_NUMBER.match(tail))
-        if is_lone and LENGTH.unit_named(unit[0]) != "m":
-            return True
+    lone = _LONE_UNIT.findall(_UNIT_OF_NUMBER.sub(" ", column.plain))
+    if any(LENGTH.unit_named(unit) != "m" for unit in lone):
+        return True
     words = re.findall(r"[^\W\d_]+", column.plain.lower())
     if not words or any(map(str.isdigit, line)):
         return False
