@@ -516,6 +516,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         r"may be one that counts the points, and does not count 1, 2, 3 .*: give columns Z, that",
     ),
+    "a unit of positions beside another step in the header": (
+        ["dx = 0.5 um", "x;z", *(f"{k};{z}" for k, z in enumerate(ZS))],
+        {"unit": "um,um"},
+        "the positions of .* are 1 µm apart by unit, and 500 nm by its header: if the first column",
+    ),
     "a factor above positions": (
         ["1.0e-03 *", *(f"{k}.5 {z}" for k, z in enumerate(ZS))],
         {"unit": "um"},

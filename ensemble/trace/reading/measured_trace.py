@@ -641,6 +641,15 @@ def _step_beside_count(
         )
     if step is None:
         step = step_of_header(name, table.header, table.decimal, counts=may_count)
+        is_pair = unit is not None and "," in unit and not is_named
+        of_positions = LENGTH.units[parse_units(unit)[0]] if unit and is_pair else None
+        if step and of_positions and not np.isclose(step, of_positions, atol=0):
+            raise InputError(
+                f"the positions of {name} are {length_text(of_positions)} apart by "
+                f"{parameter('unit')}, and {length_text(step, 6)} by its header: if the first "
+                f"column counts the points, give {parameter('columns')} Z, that of the heights, "
+                f"and {parameter('step')}, or else remove the step from the header"
+            )
     if step is None and (is_named or (is_foreign and unit is not None)):
         word = "counts" if is_named else f"({names[-1]}) may count" if names[-1] else "may count"
         raise InputError(
