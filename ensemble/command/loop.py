@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
+from adhesis.ensemble.escape import printable
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
@@ -27,6 +28,7 @@ from adhesis.ensemble.trace.options import (
     what_was_read,
 )
 from adhesis.ensemble.versions import input_record, provenance
+from adhesis.solver import checks
 from adhesis.solver.checks import plain
 from adhesis.solver.loading.loop import run_loop, run_loops
 from adhesis.solver.loading.loop_result import LoopResult
@@ -50,7 +52,7 @@ def execute(args: argparse.Namespace) -> int:
     taken = _take_defaults(args)
     _check_files(args)
     with refused_as_input(vars(args), thickness="layer", turning_points="path"):
-        profile, warnings = _profile(args)
+        profile, warnings, said = _profile(args)
         source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
@@ -87,6 +89,8 @@ def execute(args: argparse.Namespace) -> int:
     if args.json is not None:
         with writing.output("--json", args.json):
             numbers = record.document(results, warnings)
+            if source is not None:
+                numbers["read"] = {"said": said}
             seed = args.seed if source is None else None
             numbers["provenance"] = provenance(args.words, source, seed, numbers)
             write_json(args.json, numbers)
@@ -107,6 +111,8 @@ def execute(args: argparse.Namespace) -> int:
     if args.film is not None:
         with writing.output("--film", args.film):
             results[0].film(args.film, progress=not args.quiet)
+    if args.heights is not None:
+        print(printable(f"read        {args.heights}: {'; '.join(said)}"))
     print("\n\n".join(result.summary() for result in results))
     if taken:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
@@ -189,8 +195,8 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
     check_film("--film", args.film)
 
 
-def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
-    """Return the profile of the one source that is given, and what is doubtful about it."""
+def _profile(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
+    """Return the profile of the one source that is given, what is doubtful, and how it was read."""
     refuse_several(args, "hurst", "heights", "trace")
     if not given(args, "hurst", "heights", "trace"):
         raise InputError("no profile is given: give one of --hurst, --heights and --trace")
@@ -209,20 +215,24 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
             if option not in of_heights:
                 raise InputError(f"{option} belongs to --trace, which is not given")
     if args.hurst is not None:
-        return _self_affine(args), []
+        return _self_affine(args), [], []
     if args.heights is not None:
         return _given_heights(args)
     prepared = prepared_of(args, trace_of(args, args.trace))
     print(what_was_read(prepared))
-    return prepared.profile(), list(prepared.warnings)
+    return prepared.profile(), list(prepared.warnings), list(prepared.trace.notes)
 
 
-def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
-    heights = read_heights(
-        args.heights, unit=args.unit, delimiter=args.delimiter, decimal=args.decimal
+def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
+    heights, said = read_heights(
+        args.heights,
+        period=checks.real("period", args.period, checks.LENGTH),
+        unit=args.unit,
+        delimiter=args.delimiter,
+        decimal=args.decimal,
     )
     warning = heights_warning(heights, f"{args.heights}")
-    return profile_from_heights(heights, args.period), [warning] if warning else []
+    return profile_from_heights(heights, args.period), [warning] if warning else [], [said]
 
 
 def _self_affine(args: argparse.Namespace) -> Profile:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from adhesis.ensemble.trace.reading.measured_trace import load_array, units_of_c
 from adhesis.ensemble.trace.reading.missing_heights import without_codes
 from adhesis.ensemble.trace.reading.source import source_of
 from adhesis.ensemble.trace.reading.text_table import read_column, refuse_uneven_rows
+from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
 
 # The ends do not meet where the step from the last height to the first is more than this many times
@@ -32,14 +34,17 @@ _SAME, _FEW = 1e-9, 2
 def read_heights(
     path: str | os.PathLike[str],
     *,
+    period: float = math.inf,
     unit: str | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
-) -> Array:
+) -> tuple[Array, str]:
     """Read the heights of one period in m from a .npy or a text of one column (or one row).
 
-    Without ``unit`` the header's counts. Without either they are in metres if they range over at
-    most 1 mm, and otherwise refused. InputError for anything but one column of finite numbers.
+    Returns them, and a text on how they were read. Without ``unit`` the header's counts. Without
+    either they are in metres if they range over at most 1 mm, and in the middle rise by no more
+    than a step of the ``period`` in m from point to point; else they are refused. InputError for
+    anything but one column of finite numbers.
     """
     if unit is not None and "," in unit:
         raise InputError(f"--unit is {unit!r}: with --heights it is one unit, that of the heights")
@@ -78,9 +83,11 @@ def read_heights(
     # No note says that the option overruled a line of the header, so it is refused as a name is;
     # metres are assumed in any case.
     found = replace(found, by_name=True, unclear="" if found.units[-1] == "m" else found.unclear)
-    step = None if heights.size and np.ptp(heights) > HEIGHT.largest else 1.0  # all heights count
-    of_heights = units_of_columns(f"{source}", found, unit, heights[None], step)[0][-1]
-    return np.asarray(heights * LENGTH.units[of_heights])
+    is_high = heights.size and np.ptp(heights) > HEIGHT.largest  # all heights count
+    step = None if is_high else period / max(heights.size, 1)
+    (_, of_heights), given_by = units_of_columns(f"{source}", found, unit, heights[None], step)
+    said = f"{counted(heights.size, 'height')} in {of_heights} ({given_by})"
+    return np.asarray(heights * LENGTH.units[of_heights]), said
 
 
 def heights_warning(heights: Array, name: str) -> str | None:
@@ -92,8 +99,9 @@ def heights_warning(heights: Array, name: str) -> str | None:
         )
     if _repeats_its_beginning(heights):
         return (
-            f"the last height of {name} is its first one, as if the end of the period were written "
-            "twice: leave it out if so, as the next period begins with it"
+            f"the last height of {name} is its first one: if the end of the period is written "
+            "twice, leave it out, as the next period begins with it; if a trace was levelled "
+            "through its ends, it is no period of a profile, and adhesis trace makes one of it"
         )
     # A median of three keeps edges and removes single spikes, which would hide the jump.
     smoothed = np.median([np.roll(heights, k) for k in (1, 0, -1)], axis=0)

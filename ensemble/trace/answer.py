@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
@@ -25,6 +25,7 @@ from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import TABLES, Plan, make_plan
 from adhesis.solver import checks
 from adhesis.solver.loading.cycle import check_cycle, check_preload, turning_of
+from adhesis.solver.loading.zero_range import RANGES, range_warnings
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.pattern import AdhesionPattern
@@ -86,10 +87,7 @@ _CONTACT = (
     *("stiffness", "strength", "adhesion_range", "zone_error"),
     *("least_work_of_adhesion", "stripes", "stripe_amplitude", "stripe_phase"),
 )
-_OF_ALL_LOOPS = (
-    *("valid_range", "edge_range", "touch_range", "turn_range"),
-    "largest_interior_tension",
-)
+_OF_ALL_LOOPS = (*RANGES, "largest_interior_tension")
 # The longest cut-offs are drawn, and no doubts.
 _FOR_THE_FIGURE = ("cut-off × 16", "cut-off × 8", "cut-off × 4", "cut-off × 2")
 
@@ -548,7 +546,11 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
             f"“{largest}” ({words[largest]}; standard uncertainty "
             f"{100 * loss.doubts[largest]:.0f} %): {_REMEDIES[largest]}"
         )
-    found += [text for text in answer.main["warnings"] if text not in preload]
+    # The line ``range`` has the least ranges of all loops, and a warning goes by them, too.
+    least = {name: getattr(answer, name) for name in RANGES}
+    known = (*preload, *_of_ranges(answer, answer.main))
+    found += [text for text in answer.main["warnings"] if text not in known]
+    found += _of_ranges(answer, least)
     races = answer.main["races"]
     if races:
         found.append(
@@ -570,6 +572,16 @@ def _warnings(answer: Answer, loss: Uncertain) -> list[str]:
             lacks = "its doubt is not counted" if counts else "it is missing from table and figure"
             failed.append(f"the loop “{run.name}” did not end ({text}): {lacks}")
     return [*found, "; ".join(failed)] if failed else found
+
+
+def _of_ranges(answer: Answer, ranges: Mapping[str, Any]) -> list[str]:
+    """Return the warning of a range of adhesion below which zero range holds, if it is short."""
+    if answer.main["strength"] is not None:
+        return []  # its own range is given
+    run = answer.plan.runs[0]
+    problem = answer.cycle.problem(run.profile, run.work_of_adhesion)
+    inside, *outside = (math.inf if ranges[name] is None else ranges[name] for name in RANGES)
+    return range_warnings(problem, inside, 0.0, (), *outside)
 
 
 def _one_patch(answer: Answer) -> list[str]:

@@ -262,7 +262,11 @@ def prepare_trace(
         limits=limits,
         spectrum=spectrum,
         steps=tuple(work.steps),
-        warnings=(*(feature.warning for feature in features), *work.warnings),
+        warnings=(
+            *trace.warnings,
+            *(feature.warning for feature in features),
+            *work.warnings,
+        ),
     )
 
 

@@ -40,7 +40,7 @@ from adhesis.solver.loading.equilibrium_path import (
     in_works_of_adhesion,
     sticking_text,
 )
-from adhesis.solver.loading.zero_range import limit_text
+from adhesis.solver.loading.zero_range import RANGES, limit_text
 
 
 def summary(answer: Answer) -> str:
@@ -138,8 +138,7 @@ def _range(answer: Answer) -> str:
     inside = "no tension inside patches"
     if answer.valid_range is not None:
         inside = f"tension inside patches of up to {stress_text(answer.largest_interior_tension)}"
-    names = ("valid_range", "edge_range", "touch_range", "turn_range")
-    ranges = (getattr(answer, name) for name in names)
+    ranges = (getattr(answer, name) for name in RANGES)
     return limit_text(inside, *(math.inf if one is None else one for one in ranges))
 
 

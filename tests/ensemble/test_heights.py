@@ -6,6 +6,7 @@ import json
 import os
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,20 +51,20 @@ def test_every_usual_text_gives_the_same_heights(kind: str, tmp_path: Path) -> N
     name, data, options = TEXTS[kind]
     path = tmp_path / name
     path.write_bytes(data)
-    np.testing.assert_allclose(read_heights(path, **options), WAVE, rtol=0, atol=2e-15)
+    np.testing.assert_allclose(read_heights(path, **options)[0], WAVE, rtol=0, atol=2e-15)
 
 
 def test_an_array_is_read_in_metres_or_the_unit_given(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", 1e9 * WAVE[:, None])
-    np.testing.assert_allclose(read_heights(tmp_path / "a.npy", unit="nm"), WAVE, rtol=1e-12)
+    np.testing.assert_allclose(read_heights(tmp_path / "a.npy", unit="nm")[0], WAVE, rtol=1e-12)
     np.save(tmp_path / "b.npy", WAVE)
-    assert np.array_equal(read_heights(tmp_path / "b.npy"), WAVE)
+    assert np.array_equal(read_heights(tmp_path / "b.npy")[0], WAVE)
 
 
 def test_pillars_and_ground_of_one_height_are_heights(tmp_path: Path) -> None:
     pillars = np.where(np.arange(64) % 16 < 3, 999.0, 100 * np.cos(np.arange(64)))
     np.save(tmp_path / "a.npy", pillars)
-    assert np.array_equal(read_heights(tmp_path / "a.npy", unit="nm"), 1e-9 * pillars)
+    assert np.array_equal(read_heights(tmp_path / "a.npy", unit="nm")[0], 1e-9 * pillars)
 
 
 def archive(name: str) -> bytes:
@@ -135,7 +136,7 @@ def test_a_file_that_may_not_be_read_is_refused(read, tmp_path, monkeypatch):
         read(path)
 
 
-DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
+DOUBTFUL: dict[str, tuple[list[str], dict[str, Any], str]] = {
     "a unit that was damaged": (["z [æm]", *METRES], {}, r"is clear, with '\[æm\]' in .*give unit"),
     "header against option": (
         ["z [µm]", *NM],
@@ -151,6 +152,11 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
         ["0.000"] * 400 + ["1.000"] * 2,
         {},
         "states no unit, and heights from 0 to 1 need not be metres",
+    ),
+    "steep ones": (
+        [f"{1e-4 * (-1) ** k}" for k in range(99)],
+        {"period": 1e-3},
+        "need not be metres",
     ),
     "two units": (METRES, {"unit": "mm,um"}, "--unit is 'mm,um': with --heights it is one unit"),
     "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
@@ -170,6 +176,23 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
         "has 2 heights of -32768, 32767, which instruments write for missing ones",
     ),
 }
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "said"),
+    [
+        ("z", (), "16 heights in m (assumed: no unit is given)"),
+        ("z", ("--unit", "m"), "16 heights in m (--unit)"),
+        ("z (m)", (), "16 heights in m (header)"),
+    ],
+)
+def test_how_heights_were_read_stands_beside_the_loss(kind, options, said, tmp_path, capsys):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([kind, *METRES]))
+    words = ["loop", "--heights", path, *OF_WAVE, "--load-steps", 2, "--quiet", *options]
+    assert main([*map(str, words), "--json", str(tmp_path / "o.json")]) == 0
+    assert f"read        {path}: {said}\n" in capsys.readouterr().out
+    assert json.loads((tmp_path / "o.json").read_text())["read"] == {"said": [said]}
 
 
 @pytest.mark.parametrize("kind", DOUBTFUL)
@@ -228,7 +251,7 @@ def test_a_period_is_not_warned_of(kind: str) -> None:
 @pytest.mark.parametrize("kind", ["self-affine", "sine", "a wave between its nodes", "white noise"])
 def test_an_end_that_repeats_the_beginning_is_warned_of(kind: str) -> None:
     heights = np.append(PERIODIC[kind], PERIODIC[kind][0])
-    assert "the last height of it is its first one, as" in str(heights_warning(heights, "it"))
+    assert "the last height of it is its first one: if" in str(heights_warning(heights, "it"))
 
 
 @pytest.mark.parametrize("kind", CUT)

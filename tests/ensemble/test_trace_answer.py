@@ -336,6 +336,18 @@ def test_the_finest_cut_offs_decide_whether_short_waves_matter(spoiled_answer: A
     assert "the cut-off that was given" in answers._warnings(found, found.loss)[0]
 
 
+def test_a_short_range_of_a_variant_is_warned_of_as_the_line_shows_it(spoiled_answer) -> None:
+    losses = {"answer": 1.0, "noise 1": 1.0, "noise 2": 1.0}
+    found = with_losses(spoiled_answer, losses, {"step": 1e-6})
+    found.results["noise 1"]["valid_range"] = 4e-10
+    (text,) = answers._warnings(found, answers._quantity(found, "loss"))
+    assert text.startswith("valid_range is 0.4 nm: the zero-range limit holds only")
+    assert "reaches less than 0.4 nm" in summary(found)
+    found.main["valid_range"] = 6e-10
+    found.main["warnings"] = [text.replace("0.4", "0.6", 1)]
+    assert answers._warnings(found, answers._quantity(found, "loss")) == [text]
+
+
 def test_a_loss_that_is_hardly_known_names_its_largest_doubt(spoiled_answer: Answer) -> None:
     losses = {"answer": 9.705, "cut-off × 1.41": 9.7, "noise 1": 19.4, "noise 2": 19.4}
     found = with_losses(spoiled_answer, losses, {"step": 1e-6})

@@ -47,6 +47,24 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         [UM, *(f'"{x}","{z}"'.replace(".", ",") for x, z in PAIRS)],
         {},
     ),
+    "a count beside units in lines of their own": (
+        ["Unit: um", "Spacing = 0.5 um", "No.;z", *(f"{k};{z}" for k, z in enumerate(ZS))],
+        {},
+    ),
+    "a count without a name beside units in lines": (
+        ["X unit: cm", "Z unit: um", "dx = 0.5 um", ";z"]
+        + [f"{k};{z}" for k, z in enumerate(ZS, 1)],
+        {},
+    ),
+    "a sentence with a unit above a count": (
+        ["Data in meter", ";z", *(f"{k};{z}E-6;" for k, z in enumerate(ZS))],
+        {"step": STEP},
+    ),
+    "a count below a length whose words are no names": (
+        ["X resolution,9,um", "DataLine,POS = 0", *(f"{k},{z}" for k, z in enumerate(ZS))],
+        Z_UM,
+    ),
+    "a unit in Japanese": (["測定ピッチ,0.5,um", "単位,um", "データ", *ZS], {}),
     "units by option": ([f"{x} {z}" for x, z in PAIRS], {"unit": "um"}),
     "two units by option": (
         [f"{k * 5e-4:.7f},{1e3 * float(z):.3f}" for k, z in enumerate(ZS)],
@@ -95,6 +113,14 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
     ),
     "a line of a raster": (
         [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
+        {"unit": "um", "columns": [1, 3], "row": 1},
+    ),
+    "a map whose rows differ by the same height": (
+        ["\t".join(f"{float(z) + 0.01 * k:.6f}" for z in ZS) for k in (-1, 0, 1)],
+        {"row": 1, **Z_UM},
+    ),
+    "a line of a raster below a line with a unit": (
+        ["# Value units: um", *(f"{x} {y} {z}" for y in range(3) for x, z in PAIRS)],
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
     "a line of the heights of a raster that lacks its first one": (
@@ -334,6 +360,21 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a step on top, printed alike": (["0.500000", *ZS], Z_UM, "line 1 .* the step or the length"),
     "a length on top, in mm": (["0.199500", *ZS], Z_UM, "line 1 .* the step or the length"),
     "a checksum below": ([*ZS, "34582"], Z_UM, "line 401 of .* has '34582'"),
+    "a length below, trimmed": (
+        ["z (um)", *(f"{float(z):.1g}" for z in ZS[50:]), "175"],
+        {"step": STEP},
+        "line 352 of .* is 175, and the step or the length of the trace is 175 µm",
+    ),
+    "a count below, trimmed": (
+        ["z (um)", *(f"{float(z):.1g}" for z in ZS), "400"],
+        {"step": 0.3e-6},
+        "line 402 of .* has '400', at the end of a column",
+    ),
+    "two traces, point by point": (
+        [UM, *(f"{2 * (k // 2)},{float(z) + k % 2}" for k, z in enumerate(ZS))],
+        {},
+        "every position of .* is there 2 times, and the heights jump between them: keep the rows",
+    ),
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
     "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402; .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
@@ -341,6 +382,12 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         ["z (um)", *ZS, "", "", *ZS],
         Z_UM,
         "unevenly at 1 place, the first on line 402: write NaN where one is a row, remove the",
+    ),
+    "rows of another form below empty lines": (
+        ["x (um);z (um)", *(f'"{x}";{z}\n' for x, z in PAIRS[:99])]
+        + [f'"1Ê{x}";{z}\n' for x, z in PAIRS[99:]],
+        {},
+        r"line 200 of .* it ends the rows of 2 numbers",
     ),
     "a shorter block below": ([UM, *TWO, "Raw", *ZS], {}, "line 402 .* follow on line 403"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
@@ -469,6 +516,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"unit": "um"},
         r"may be one that counts the points, and does not count 1, 2, 3 .*: give columns Z, that",
     ),
+    "a unit of positions beside another step in the header": (
+        ["dx = 0.5 um", "x;z", *(f"{k};{z}" for k, z in enumerate(ZS))],
+        {"unit": "um,um"},
+        "the positions of .* are 1 µm apart by unit, and 500 nm by its header: if the first column",
+    ),
     "a factor above positions": (
         ["1.0e-03 *", *(f"{k}.5 {z}" for k, z in enumerate(ZS))],
         {"unit": "um"},
@@ -492,7 +544,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         )
         for head, shown in {
             "x (?m);z (?m)": "(?m)", "X (1e-3 m);Z (1e-3 m)": "X (1e-3 m)", "X in;Z in": "X in",
-            **{line: line for line in ("Units: feet", "All data in mm")},
+            "[cm],[m];": "[cm],[m]",
+            **{line: line for line in (
+                "Units: feet", "All data in mm", "exported in mm by Surf 2.1",
+                "x inch Depth meter OK",
+            )},
         }.items()
     },
     "rows that go on": (
@@ -515,6 +571,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "pairs of decimal commas": (
         [f"{x}, {z}".replace(".", ",") for x, z in PAIRS],
         {"unit": "um"},
+        r"give decimal \. if they are delimiters, or save it with semicolons",
+    ),
+    "commas of thousands beside commas and blanks": (
+        ["x, z, flag", *(f"{x}, {2000 + k:,}, 0" for k, x in enumerate(XS))],
+        {"unit": "um,nm", "columns": [1, 2]},
         r"give decimal \. if they are delimiters, or save it with semicolons",
     ),
     "pairs of decimal commas below names with units": (
@@ -571,10 +632,23 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
         {"row": 1, "step": STEP, "unit": "um"},
         "the first column of .* rises or falls throughout, as positions do",
     ),
-    "a map of four rows with their positions": (
-        [",".join([f"{k / 2}", *ZS]) for k in range(4)],
-        {"row": 1, "step": STEP, "unit": "um"},
-        "the first column of .* rises or falls throughout, as positions do",
+    **{
+        f"a map of {rows} rows with their positions": (
+            [",".join([f"{k / 2}", *ZS]) for k in range(rows)],
+            {"row": 1, "step": STEP, "unit": "um"},
+            "the first column of .* rises or falls throughout, as positions do",
+        )
+        for rows in (3, 4)
+    },
+    "a raster of short lines": (
+        [f"{k // 5 / 2},{k % 5},{z}" for k, z in enumerate(ZS)],
+        {"columns": [3], **Z_UM},
+        "it is a raster of 80 lines of 5 points",
+    ),
+    "a raster whose positions are the slow ones": (
+        [f"{k // 3},{k % 3},{z}" for k, z in enumerate(ZS[:399])],
+        {"columns": [1, 3], "unit": "um"},
+        "it is a raster of 133 lines of 3 points",
     ),
     "one column twice": ([UM, *TWO], {"columns": [1, 1]}, "columns is 1,1: it must name two of"),
     "a delimiter of two signs": ([UM, *TWO], {"delimiter": ";;"}, "it must be one of semicolons"),
@@ -687,6 +761,21 @@ def test_a_depth_is_noted_and_an_angstrom_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(trace.heights, Z, rtol=0, atol=1e-12)
 
 
+def test_metres_that_are_assumed_are_a_doubt(tmp_path: Path) -> None:
+    rows = [f"{5e-7 * k:.7f};{z:.12f}" for k, z in enumerate(Z)]
+    for head, options, is_assumed in (
+        ("X;Z", {}, True),
+        ("X;Z", {"unit": "m"}, False),
+        ("X (m);Z (m)", {}, False),
+    ):
+        trace = read_trace(put(tmp_path / "t.txt", [head, *rows]), **options)
+        doubts = [f"no unit is given for the numbers of {tmp_path / 't.txt'}, so they are taken "
+                  "as metres: give unit m if they are, or else their unit"]  # fmt: skip
+        assert list(trace.warnings) == (doubts if is_assumed else [])
+        assert prepare_trace(trace).warnings == trace.warnings
+        assert any("(assumed: no unit is given)" in note for note in trace.notes) == is_assumed
+
+
 @pytest.mark.parametrize("gap", ["---", "-", ""])
 def test_the_shorter_one_of_two_traces_ends_where_it_does(gap: str, tmp_path: Path) -> None:
     rows = [
@@ -704,7 +793,9 @@ def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_pa
     with pytest.raises(InputError, match=r"line 1 of .*, at the end of a column: remove it"):
         read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
     others = ZS[int(np.argmin(np.abs(Z))) :]  # which begin near nought
-    assert read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um").size == len(others) + 1
+    assert (
+        len(read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um")[0]) == len(others) + 1
+    )
 
 
 NAMED = [

@@ -175,6 +175,19 @@ def test_rows_that_a_column_of_a_table_marks_are_gaps() -> None:
             read_trace(FRAME.assign(valid=valid), columns=columns)
 
 
+def test_columns_that_are_not_chosen_may_hold_anything_and_show_a_raster() -> None:
+    others = {"name": "a", "time": pd.Timestamp(0), "done": True, "more": np.arange(N) % 2}
+    for columns in ([1, 2], ["x (mm)", "z (um)"]):
+        trace = read_trace(FRAME.assign(**others), columns=columns)
+        assert_right(trace)
+        assert "column 3 (more) holds 0 and 1 alone: it is not used" in trace.notes
+    raster = pd.concat([FRAME, FRAME], ignore_index=True)
+    for columns in ([2], ["z (um)"]):
+        with pytest.raises(InputError, match="it is a raster of 2 lines of 200 points"):
+            read_trace(raster, columns=columns, step=STEP)
+        assert_right(read_trace(raster, columns=columns, step=STEP, row=1))
+
+
 def test_missing_heights_in_memory_are_gaps() -> None:
     masked = np.ma.masked_array(1e6 * Z, mask=np.arange(N) == 7)
     table = pd.DataFrame({"z (um)": pd.array([None, *(1e6 * Z[1:])], dtype="Float64")})
@@ -210,7 +223,7 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "another order": (HEIGHTS.sort_values(), {"step": STEP}, InputError, "another order"),
     "units in a list": (list(BOTH.T.view(WithUnit)), {"unit": "mm"}, TypeError, "array carries a"),
     "a map": (np.zeros((99, 98)), {}, InputError, "array holds 99 × 98 numbers"),
-    "a row": (BOTH, {"row": 1}, InputError, "row belongs to files"),
+    "a row": (BOTH, {"row": 1, "unit": "um"}, InputError, "row is 1: array is no map, as its pos"),
     "a decimal sign": (BOTH, {"decimal": ","}, InputError, "decimal belongs to files"),
     "an empty stream": (io.BytesIO(b""), {}, InputError, "the stream is empty"),
     "a zip": (io.BytesIO(b"\x1f\x8b0"), {}, InputError, "the stream is compressed"),

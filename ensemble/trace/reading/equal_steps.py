@@ -18,6 +18,8 @@ _UNEVEN = 0.10
 # steps differ from the others (one or two are rows left out), the step is at least this share of a
 # digit, and its bounds lie within this share of it.
 _IRREGULAR, _FINEST, _SURE = 3, 0.1, 0.02
+# Of one trace a rise between neighbours exceeds that to a later one by less than this factor.
+_JUMPS = 1.5
 _DIGITS = range(-6, 16)  # decimals that are looked for
 
 
@@ -45,6 +47,7 @@ def equal_steps(
     digit, steps = _printed_digit(x), np.diff(x)
     step = None if digit is None else _step_of_rounded(x, digit)
     if digit is not None and step is not None:
+        _refuse_interleaved(name, x, heights)
         notes.append(
             f"positions rounded to {length_text(digit * metres)}: equal steps of "
             f"{length_text(step * metres, 5)}"
@@ -138,6 +141,25 @@ def _step_of_rounded(x: Array, digit: float) -> float | None:
             f"heights alone, and {parameter('step')}"
         )
     return step
+
+
+def _refuse_interleaved(name: str, x: Array, heights: Array) -> None:
+    """Refuse positions that are each there equally often, where heights jump between them.
+
+    Rounding makes such positions as well, but the nearest heights are then the most alike.
+    """
+    times = np.unique(x, return_counts=True)[1]
+    often = int(times[0])
+    if often == 1 or np.ptp(times):
+        return
+    rises = (np.abs(heights[lag:] - heights[:-lag]) for lag in (1, often))
+    nearest, same_trace = (float(np.nanmedian(rise)) for rise in rises)
+    if nearest > _JUMPS * same_trace:
+        raise InputError(
+            f"every position of {name} is there {often} times, and the heights jump between them: "
+            f"keep the rows of one trace (or give {parameter('columns')} Z, that of the heights "
+            f"alone, and {parameter('step')}, if the positions are rounded)"
+        )
 
 
 def _printed_digit(x: Array) -> float | None:

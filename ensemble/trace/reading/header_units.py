@@ -35,17 +35,19 @@ _X = _set(
     "travel traverse 水平位置"
 )
 _Z = _DEPTH | _set(
-    "z zunit zunits h height heights höhe höhen hoehe hauteur altura altezza hoogte wysokość "
-    "výška höjd høyde højde высота vertical elevation topography profile profiles profil "
+    "z zunit zunits h height heights höhe höhen hoehe hauteur altitude altura altezza hoogte "
+    "wysokość výška höjd høyde højde высота vertical elevation topography profile profiles profil "
     "perfil profilo профиль roughness rauheit waviness 高さ 高度 断面 輪郭 粗さ 轮廓 높이 "
     "단면 relief 測定値"
 )
-_UNITS = _set("unit units einheit einheiten unité unités unidad unidades unità yunit yunits")
+_UNITS = _set(
+    "unit units einheit einheiten unité unités unidad unidades unità yunit yunits 単位 单位 단위"
+)
 _BESIDE = _UNITS | _set(
     "y axis achse axe eje asse direction label value values wert werte valeur column channel "
-    "kanal trace scan line sampling stylus stage data daten raw measured measurement primary "
-    "filtered unfiltered level levelled leveled coordinate ось surface sample along up point "
-    "points of in the all are"
+    "kanal trace scan line sampling stylus sensor stage data daten raw measured measurement "
+    "primary filtered unfiltered level levelled leveled coordinate ось surface sample along up "
+    "point points of in the all are"
 )
 _ALONE = _set("a b c d")  # columns of a spreadsheet
 _OF_PROFILES = _set("p r w total")  # which P, W and R profiles are, behind their filters
@@ -70,6 +72,11 @@ _COLUMN = re.compile(
 _IN_TEXT = re.compile(
     rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_])|{_OPEN}(?:[^)\]>}}]*\s)?(?:{_ANY}){_CLOSE}|[\s_]in$",
     re.IGNORECASE,
+)
+# A unit in a sentence, but none of a speed or of a label with its value
+_LONE_UNIT = re.compile(rf"(?<![^\W\d_])(?:{_WORD})(?![^\W_]|\W*[/:=])", re.IGNORECASE)
+_UNIT_OF_NUMBER = re.compile(
+    rf"\d\W*(?:{_WORD})(?![^\W_])|(?<![^\W\d_])(?:{_WORD})\W*\d", re.IGNORECASE
 )
 # Units of other quantities, in brackets or alone: what has one holds no lengths.
 _OTHER = re.compile(
@@ -238,8 +245,14 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> H
 
 
 def _mentions_unit(line: str) -> bool:
-    """Return whether a line without numbers ends with a unit but m, or has "Units:" of another."""
+    """Return whether a line has a unit but m that stands beside no number, or "Units:" of another.
+
+    At the end of a line without numbers it may have any form, elsewhere it is unmistakable.
+    """
     column = Column(line)
+    lone = _LONE_UNIT.findall(_UNIT_OF_NUMBER.sub(" ", column.plain))
+    if any(LENGTH.unit_named(unit) != "m" for unit in lone):
+        return True
     words = re.findall(r"[^\W\d_]+", column.plain.lower())
     if not words or any(map(str.isdigit, line)):
         return False

@@ -22,7 +22,7 @@ from adhesis.ensemble.trace.reading.header_units import (
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, available, check_row, read_scan
-from adhesis.ensemble.trace.reading.missing_heights import VALID, invalid_rows, without_codes
+from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.printed_numbers import looks_like_numbers
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table, refuse_uneven_rows
@@ -46,6 +46,7 @@ _SAME = 1e-9
 # So many heights of a row or column of a map do not rise or fall throughout by chance.
 _NO_CHANCE = 6
 _KINDS = ("positions", "heights")
+ASSUMED = "assumed: no unit is given"
 # Names of a column that counts the points.
 _COUNTS = re.compile(
     r"\W*((data|mess|sample|scan)?\W*(no|nr|number|n|i|idx|index|points?|punkt|sample|row|pixels?|px"
@@ -73,6 +74,8 @@ class Trace(ByValue):
         How it was read, line by line.
     tip_radius : float, optional
         Of the stylus or probe, in m, if it is known.
+    warnings : tuple of str
+        What is doubtful about how it was read.
 
     Raises
     ------
@@ -100,6 +103,7 @@ class Trace(ByValue):
     source: str = "array"
     notes: tuple[str, ...] = ()
     tip_radius: float | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         heights = _numbers(self.source, self.heights)
@@ -190,8 +194,8 @@ def read_trace(
         Columns of positions and heights, shape (2,), or of heights alone, shape (1,): counted from
         1, or names of a DataFrame.
     row, channel : int, optional
-        Row of a map (of an instrument file or a text) and channel of an instrument file, counted
-        from 0.
+        Row of a map (of an instrument file, a text or a table) and channel of an instrument file,
+        counted from 0.
     delimiter, decimal : str, optional
         Delimiter and decimal sign, where a text can be read in two ways.
 
@@ -226,20 +230,16 @@ def read_trace(
                 f"{parameter('unit')} is {checks.shown(unit)}: it must be a text, as 'um' or "
                 "'mm,um'"
             )
-        named = columns is not None and hasattr(source, "iloc")
-        named = named and all(isinstance(name, str) for name in columns or ())
-        if columns is not None and not named:
-            columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
+        if columns is not None and hasattr(source, "iloc"):
+            columns = _columns_named(source, columns)
+        wanted = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns or ()] or None
         row = None if row is None else checks.whole(parameter("row"), row, _ROW)
         channel = None if channel is None else checks.whole(parameter("channel"), channel, _ROW)
-    in_memory = _table_of(source, columns, named)
+    in_memory = _table_of(source, wanted)
     if in_memory is not None:
-        _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
-        name, table = in_memory
-        form = f"columns {', '.join(table.header)}" if table.header else name
-        if named and columns is not None:
-            columns = range(1, len(columns) + 1)
-        return _from_table(name, table, unit, step, columns, None, form)
+        _refuse_options("files", channel=channel, delimiter=delimiter, decimal=decimal)
+        name, form, table = in_memory
+        return _from_table(name, table, unit, step, wanted, row, form)
     source = source_of(source)
     is_text = source.holds_numbers()
     if is_text and channel is not None:
@@ -249,10 +249,10 @@ def read_trace(
         )
     if is_text and source.is_npy:
         table = _columns_of(source.name, load_array(source))
-        return _from_table(source.name, table, unit, step, columns, row, "npy")
+        return _from_table(source.name, table, unit, step, wanted, row, "npy")
     if is_text:
         table = read_table(source, delimiter, decimal)
-        return _from_table(source.name, table, unit, step, columns, row, f"text, {table.form}")
+        return _from_table(source.name, table, unit, step, wanted, row, f"text, {table.form}")
     _refuse_options(
         "texts: an instrument's file states its own lengths (a text that holds zero bytes, as in "
         "UTF-16 without a mark, is to be saved as UTF-8)",
@@ -323,25 +323,26 @@ def _refuse_units(name: str, values: Any) -> None:
         entries = list(itertools.chain.from_iterable(lists))
 
 
-def _table_of(
-    source: Any, wanted: Sequence[int | str] | None, named: bool
-) -> tuple[str, Table] | None:
-    """Return name and columns of an array or a DataFrame; None for any other source."""
+def _columns_named(table: Any, wanted: Sequence[int | str]) -> list[int | str]:
+    """Return the columns of a DataFrame or Series by their numbers, in place of names."""
+    names = list(table.columns) if hasattr(table, "columns") else [table.name]
+    missing = [name for name in wanted if isinstance(name, str) and names.count(name) != 1]
+    if missing:
+        known = ", ".join(map(repr, names))
+        raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
+    return [names.index(name) + 1 if isinstance(name, str) else name for name in wanted]
+
+
+def _table_of(source: Any, wanted: Sequence[int] | None) -> tuple[str, str, Table] | None:
+    """Return name, form and columns of an array or a DataFrame; None for any other source."""
     if isinstance(source, np.ndarray | list | tuple):
-        return "array", _columns_of("array", _numbers("array", source))
+        return "array", "array", _columns_of("array", _numbers("array", source))
     if not hasattr(source, "iloc"):  # which a DataFrame and a Series have
         return None
     if hasattr(source, "to_frame"):  # a Series is a column
         source = source.to_frame()
-    if named and wanted is not None:
-        missing = [name for name in wanted if list(source.columns).count(name) != 1]
-        if missing:
-            known = ", ".join(map(repr, source.columns))
-            raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
-        others = source.select_dtypes(["number", "bool"]).columns
-        source = source[[*wanted, *(n for n in others if n not in wanted and VALID.match(str(n)))]]
-        wanted = range(1, len(wanted) + 1)
-    chosen = range(1, len(source.columns) + 1) if wanted is None else wanted
+    all_of_it = range(1, len(source.columns) + 1)
+    chosen = all_of_it if wanted is None else [k for k in wanted if k in all_of_it]
     if len(chosen) == 1:
         with refused_as_input():
             checks.check_index("the table", source)
@@ -352,25 +353,29 @@ def _table_of(
             "columns to their units"
         )
     header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
-    for n in filter(units.get, source.columns):
-        if Column(str(n)).unit not in (None, Column(str(units[n])).unit):
+    values = np.full((len(header), len(source)), np.nan)
+    for k, (n, kind) in enumerate(source.dtypes.items(), 1):
+        if k not in chosen and kind.kind not in "biuf":
+            continue
+        if units.get(n) and Column(str(n)).unit not in (None, Column(str(units[n])).unit):
             raise InputError(
                 f"column {n!r} of the table has the unit {units[n]} in attrs: correct the wrong one"
             )
-    for k, (n, kind) in enumerate(source.dtypes.items(), 1):
-        # They would become numbers of another meaning.
-        if kind.kind in "cmM" or (kind.kind == "b" and (k in chosen or not VALID.match(str(n)))):
+        if k in chosen and kind.kind in "bcmM":  # they would get another meaning
             raise InputError(f"column {n!r} of the table holds {kind}: heights are real numbers")
-    objects = (k for k, kind in enumerate(source.dtypes) if kind.kind == "O")
-    _refuse_units("the table", [source.iloc[:, k].tolist() for k in objects])
-    try:
-        values = source.to_numpy(dtype=float, na_value=np.nan)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the table holds more than numbers: {error}") from None
+        column = source.iloc[:, k - 1]
+        if kind.kind == "O":
+            _refuse_units("the table", column.tolist())
+        try:
+            values[k - 1] = column.to_numpy(dtype=float, na_value=np.nan)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the table holds more than numbers: {error}") from None
     # a unit that is given beside the names needs none of them
     names = tuple(str(units.get(n) or name) for n, name in zip(source.columns, header, strict=True))
-    lines, filled = np.arange(1, values.shape[0] + 1), tuple(range(len(names)))
-    return "the table", Table(values.T, filled, tuple(header), (names,), lines, " ", ".")
+    lines: Any = np.arange(1, len(source) + 1)
+    filled = tuple(range(len(names)))
+    form = f"columns {', '.join(header[k - 1] for k in chosen)}"
+    return "the table", form, Table(values, filled, tuple(header), (names,), lines, " ", ".")
 
 
 def _columns_of(name: str, values: Array) -> Table:
@@ -414,7 +419,7 @@ def _from_table(
         )
     columns[-1], gaps = without_codes(columns[-1])
     found = units_of_header(table.header, names)
-    if len(columns) == 2 and found.units[0] is None:
+    if len(columns) == 2 and not (found.by_name and found.units[0]):
         # a label beside a number ("Points", "400") names no column
         first = ["=" if looks_like_numbers(row[-1]) else row[0] for row in names]
         given = _step_beside_count(name, table, first, columns[0], unit, step)
@@ -461,8 +466,14 @@ def _from_table(
             stated, used = length_text(other, 5), length_text(step, 5)
             notes.append(f"the header has a step or pitch of {stated}, against a step of {used}")
     if len(columns) == 1 and form.startswith("text"):
-        _refuse_length_on_top(name, columns[0], step, lines)
-    trace = Trace(heights, float(step), name, tuple(notes))
+        _refuse_length(name, columns[0], step, lines)
+    warnings = []
+    if given_by == ASSUMED:
+        warnings.append(
+            f"no unit is given for the numbers of {name}, so they are taken as metres: give "
+            f"{parameter('unit')} m if they are, or else their unit"
+        )
+    trace = Trace(heights, float(step), name, tuple(notes), warnings=tuple(warnings))
     slope = _slope(trace.heights, trace.step)
     if slope > _STEEPEST:
         raise InputError(
@@ -515,12 +526,13 @@ def _chosen(
 
 def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     """Return a row of a text whose rows are those of a map."""
-    for what, line in (("row", table.columns[:, 0]), ("column", table.columns[table.filled[0]])):
+    lines = {"row": table.columns.T[:2], "column": table.columns[list(table.filled[:2])]}
+    for what, (line, *beside) in lines.items():
         # Beside positions that head the columns, those of the rows have a name or number of theirs.
         for part in line, line[1:]:
             steps = np.diff(part[np.isfinite(part)])
-            is_even = steps.size > 2 and np.ptp(steps) <= _SAME * abs(steps[0]) > 0
-            if (steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0))) or is_even:
+            rises = steps.size >= _NO_CHANCE and (np.all(steps > 0) or np.all(steps < 0))
+            if rises or (_is_even(part) and not any(map(_is_even, beside))):
                 raise InputError(
                     f"the first {what} of {name} rises or falls throughout, as positions do: "
                     f"remove it, and give {parameter('step')}"
@@ -530,17 +542,27 @@ def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
     return table.columns[list(table.filled), row].reshape(1, -1)
 
 
+def _is_even(numbers: Array) -> bool:
+    """Return whether three numbers or more have equal steps, but for missing ones."""
+    steps = np.diff(numbers[np.isfinite(numbers)])
+    return bool(steps.size > 1 and np.ptp(steps) <= _SAME * abs(steps[0]) > 0)
+
+
 def _scan_line(
     name: str, table: Table, columns: Array, lines: Array, row: int | None, notes: list[str]
 ) -> tuple[Array, Array]:
     """Return one scan line, where the positions of a raster begin anew on each line.
 
-    Beside heights alone they may stand in any other column.
+    Beside heights alone they may stand in any other column, and so they may beside positions that
+    stand still on each line.
     """
     columns_of_positions, places = columns[:1], lines
-    if len(columns) == 1:  # heights may be missing in the first place or the last
+    if len(columns) == 1 or (lines.size > 1 and columns[0, 0] == columns[0, 1]):
+        # heights may be missing in the first place or the last
         others, places = table.columns[list(table.filled)], table.lines
-        columns_of_positions = others[(others[:, np.isin(places, lines)] != columns).any(axis=1)]
+        columns_of_positions = others[
+            (others[:, np.isin(places, lines)] != columns[-1]).any(axis=1)
+        ]
     points, count = next(filter(None, map(_raster, columns_of_positions)), (0, 0))
     if row is None and count:
         raise InputError(
@@ -567,7 +589,7 @@ def _raster(x: Array) -> tuple[int, int] | None:
     points = int(again[0]) if again.size else max(x.size, 1)
     count, rest = divmod(x.size, points)
     rises = np.sign(np.diff(x[:points]))
-    is_raster = count > 1 and not rest and abs(rises.sum()) == points - 1 >= _NO_CHANCE
+    is_raster = count > 1 and not rest and abs(rises.sum()) == points - 1 > 1  # flags have two
     return (points, count) if is_raster and np.array_equal(x, np.tile(x[:points], count)) else None
 
 
@@ -619,6 +641,15 @@ def _step_beside_count(
         )
     if step is None:
         step = step_of_header(name, table.header, table.decimal, counts=may_count)
+        is_pair = unit is not None and "," in unit and not is_named
+        of_positions = LENGTH.units[parse_units(unit)[0]] if unit and is_pair else None
+        if step and of_positions and not np.isclose(step, of_positions, atol=0):
+            raise InputError(
+                f"the positions of {name} are {length_text(of_positions)} apart by "
+                f"{parameter('unit')}, and {length_text(step, 6)} by its header: if the first "
+                f"column counts the points, give {parameter('columns')} Z, that of the heights, "
+                f"and {parameter('step')}, or else remove the step from the header"
+            )
     if step is None and (is_named or (is_foreign and unit is not None)):
         word = "counts" if is_named else f"({names[-1]}) may count" if names[-1] else "may count"
         raise InputError(
@@ -627,11 +658,11 @@ def _step_beside_count(
     return step
 
 
-def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | None) -> None:
-    """Refuse a step or a length that stands among the first heights, in whatever unit."""
-    for k, number in enumerate(column[:3]):
-        below = column.size - k - 1
-        for length in (step, below * step, (below - 1) * step):
+def _refuse_length(name: str, column: Array, step: float, lines: Array | None) -> None:
+    """Refuse a step or a length that is among the first heights or the last, in whatever unit."""
+    for k in (0, 1, 2, column.size - 1):
+        number, others = column[k], column.size - (k + 1 if k < 3 else 1)
+        for length in (step, others * step, (others - 1) * step):
             if any(abs(number * size / length - 1) < _SAME for size in LENGTH.units.values()):
                 where = f"point {k + 1}" if lines is None else f"line {lines[k]:.0f}"
                 raise InputError(
@@ -692,7 +723,7 @@ def units_of_columns(
             f"X,Z, as in mm,um{mend}"
         )
     if _sure_to_be_metres(columns, step):
-        return ("m", "m"), "numbers"
+        return ("m", "m"), ASSUMED
     low, high = np.nanmin(columns[0]), np.nanmax(columns[0])
     raise InputError(
         f"{name} states no unit, and {_KINDS[2 - len(columns)]} from {low:g} to {high:g} need not "
@@ -704,11 +735,11 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     heights = columns[-1][np.isfinite(columns[-1])]
     if heights.size and np.ptp(np.percentile(heights, [1, 99])) > HEIGHT.largest:
         return False
-    if len(columns) == 1:
-        return step is not None
-    x = columns[0][np.isfinite(columns[0])]
-    longest = min(_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES * (x.size - 1))
-    return x.size > 1 and bool(np.ptp(x) <= longest)
+    if len(columns) == 2:
+        x = columns[0][np.isfinite(columns[0])]
+        longest = min(_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES * (x.size - 1))
+        step = float(np.ptp(x)) / (x.size - 1) if x.size > 1 and np.ptp(x) <= longest else None
+    return step is not None and step > 0 and _slope(heights, step) <= _STEEPEST
 
 
 def _slope(heights: Array, step: float) -> float:

@@ -27,6 +27,8 @@ _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 # "0,5,1,3" and "0,5, 1,3": four numbers, or two
 _DECIMALS = r"\d*(?:e[+\-]?\d+)?"
 _PAIRS = re.compile(rf'\s*[^,."\s]*,{_DECIMALS}(?:,\s?[^,."\s]*,{_DECIMALS})+\s*', re.IGNORECASE)
+# "0.5, 1,234": commas with blanks and without
+_MIXED = re.compile(r"\d,\d.*, |, .*\d,\d")
 _MOSTLY = 0.8  # share of the lines in which a delimiter stands
 _EXPONENT = re.compile(r"(?<=[\d.])\s*[eEdD](?=\s*[+\-]?\d)")
 
@@ -155,7 +157,8 @@ def find_form(
     is_doubtful = decimal is None and best[0] == "," and not (is_named or is_quoted)
     # Fewer names than whole numbers, and enough for decimal ones
     is_short = 1 < len(fields) < len(numbers) <= 2 * len(fields) and "." not in "".join(sample)
-    if is_doubtful and (is_short or all(map(_PAIRS.fullmatch, sample))):
+    is_mixed = 2 * sum(bool(_MIXED.search(line)) for line in sample) > len(sample)
+    if is_doubtful and (is_short or is_mixed or all(map(_PAIRS.fullmatch, sample))):
         _refuse_two_ways(source, sample[0], f"give {parameter('decimal')} . if they are delimiters")
     return best
 

@@ -6,6 +6,7 @@ refused: where they belong to cannot be known.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -197,7 +198,7 @@ class _Reader:
         """
         if place in self.rows:
             return adjoins or self.is_whole(place)
-        line = self.lines[place].strip()
+        line = self.lines[place].strip(' "')
         if not line or line[0] in COMMENT or self.holds_names(place):
             return False
         return adjoins and (_DIGIT.match(line) is not None or is_without_words(line))
@@ -350,7 +351,8 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
             adjoins = False
     # Lines beside the block that differ in their digits alone are rows of another form.
     n = _ROWS_TO_BEGIN
-    for beside in lines[max(start - n, 0) : start], lines[last + 1 : last + 1 + n]:
+    for others in reversed(lines[:start]), iter(lines[last + 1 :]):
+        beside = list(itertools.islice((line for line in others if line.strip()), n))
         forms = {re.sub(r"[\d.,+\-\s]+", " ", line) for line in beside}
         if len(beside) == n and len(forms) == 1 < len(set(beside)):
             raise InputError(
@@ -370,7 +372,7 @@ def _refuse_odd_ends(
 ) -> None:
     """Refuse counts, steps and checksums at the ends of a lone column, and a number cut off.
 
-    They are printed otherwise than all numbers between, or the first one counts the others. Of
+    They are printed otherwise than all numbers between, or count the others. Of
     several columns only the last row is judged, in which the file may end too early, and the number
     that pandas gives to a column as its ``name``.
     """
@@ -398,7 +400,8 @@ def _refuse_odd_ends(
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
         is_cut = 0 < form[1] < shortest or (not form[1] and form[0] <= fewest - 2)
         is_odd = form != usual if has_one_form else is_cut
-        if is_name or is_odd or (is_lone and k < _ENDS and numbers[k] == n - k - 1):
+        is_count = numbers[k] == (n - k - 1 if k < _ENDS else n - 1)
+        if is_name or is_odd or (is_lone and is_count and (k < _ENDS or k == n - 1)):
             raise InputError(
                 f"line {places[k] + 1} of {source} has {column[k]!r}, at the end of a column: "
                 "remove it if it is a name, a count, a length, a step or a checksum, or was cut "
@@ -454,7 +457,9 @@ def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tupl
         return tuple(fields + [""] * (count - len(fields)))
     if len(fields) == count - 1 and '"' in line:  # R names no column of the numbers of rows
         return ("", *fields)
-    for sign in DELIMITERS:
+    # A line that the delimiter divides has no other one: "X resolution,0.5,um" are no two names.
+    is_divided = delimiter != " " and delimiter in line
+    for sign in delimiter if is_divided else DELIMITERS:
         fields = _split_names(line, sign)
         if len(fields) == count:
             return tuple(fields)
@@ -466,6 +471,9 @@ def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tupl
 
 
 def _split_names(line: str, delimiter: str) -> list[str]:
-    if delimiter == " " and '"' not in line and re.search(r"\s{2}|\t", line):
-        return re.split(r"\s{2,}|\t", line)
+    if delimiter == " " and '"' not in line:
+        if re.search(r"\s{2}|\t", line):
+            return re.split(r"\s{2,}|\t", line)
+        if re.search(r" in |: ", line):  # "Data in mm" has no inch, "Value units: mm" no names
+            return [line]
     return split(line, delimiter)
