@@ -13,11 +13,12 @@ import zlib
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS
-from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS, STATUS
+from adhesis.ensemble.task.dataset import KEPT, Dataset
 
 _BLOCK_BYTES = 16 * 2**20
 
@@ -63,3 +64,15 @@ def row_checksums(read: Read, kept: NDArray[np.intp], rows: NDArray[np.intp]) ->
             out[number] = value
         done = last
     return out
+
+
+def empty_checksums(file: h5py.File, status: int, rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+    """Return the checksums that rows have if they hold nothing but a status."""
+
+    def empty(dataset: Dataset) -> NDArray[Any]:
+        here, fill = file[dataset.name], status if dataset is STATUS else dataset.fill
+        return np.full((1, *here.shape[1:]), fill, here.dtype)
+
+    of_tasks = checksum(map(empty, OF_TASKS))
+    of_kept = checksum(map(empty, OF_KEPT), of_tasks)
+    return np.where(np.isin(rows, file[KEPT][:]), of_kept, of_tasks).astype(np.uint32)

@@ -179,11 +179,11 @@ def prepare(
         with Writer(path) as writer:
             writer.reset(again)
             if plan.batches is not None:
-                spare = plan.batches.not_needed
-                unneeded = [row for row in spare if status[row] == schema.PENDING]
-                writer.reset(unneeded, schema.NOT_NEEDED)
-                wanted = set(np.flatnonzero(status == schema.NOT_NEEDED).tolist()) - set(spare)
-                writer.reset(sorted(wanted))
+                spare = np.zeros(status.size, bool)
+                spare[plan.batches.not_needed] = True
+                is_marked = status == schema.NOT_NEEDED
+                writer.mark(np.flatnonzero(spare & ~is_marked), schema.NOT_NEEDED)
+                writer.mark(np.flatnonzero(is_marked & ~spare), schema.PENDING)
     if is_new:
         say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
         return plan
@@ -214,20 +214,20 @@ def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[s
 
 
 def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
-    tasks = results.tasks()
+    campaign, tasks = results.campaign, results.tasks()
     times: dict[Group, tuple[float, int]] = {}
-    seconds = results.column("wall_time").tolist()
-    for row in np.flatnonzero(status == schema.DONE).tolist():
-        group = results.campaign.branch_of(tasks[row]).cell
-        sum_before, count = times.get(group, (0.0, 0))
-        times[group] = (sum_before + seconds[row], count + 1)
+    seconds = results.column("wall_time")
+    for task, of_cell in tasks.by_cell():
+        done = of_cell[status[of_cell] == schema.DONE]
+        if done.size:
+            sum_before, count = times.get(group_of(campaign, task), (0.0, 0))
+            known = (sum_before + float(seconds[done].sum()), count + done.size)
+            times[group_of(campaign, task)] = known
     rows, batches = np.flatnonzero(status == schema.PENDING).tolist(), None
     is_known = np.isin(status, (schema.DONE, schema.FAILED))
-    if results.campaign.stop.relative_error is not None:
-        steered = results.column(results.campaign.stop.quantity)
-        values = np.where(status == schema.FAILED, np.nan, steered)
-        known = {row: float(values[row]) for row in np.flatnonzero(is_known).tolist()}
-        batches = Batches(results.campaign, tasks, known)
+    if campaign.stop.relative_error is not None:
+        steered = results.column(campaign.stop.quantity)
+        batches = Batches(campaign, np.where(status == schema.FAILED, np.nan, steered), is_known)
         rows = batches.to_do
     return Plan(
         tasks=tasks,
@@ -238,6 +238,11 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         known=np.where(is_known, results.column(schema.CHECKSUM.name).astype(np.int64), -1),
         times=times,
     )
+
+
+def group_of(campaign: Campaign, task: Task) -> Group:
+    """Return the group of a task; those of one group and realisation share a loading branch."""
+    return campaign.branch_of(task).cell
 
 
 def prior(task: Task) -> float:

@@ -26,7 +26,7 @@ from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.dispatch import Outcome, StopCheck
 from adhesis.ensemble.run.interrupt import GRACE, StopSignals
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.run.plan import Options, Plan, prepare, prior
+from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
@@ -244,17 +244,19 @@ class _Session:
             value = math.nan if outcome.error is not None else float(row[steered])
             further, spare = self.plan.batches.finished(outcome.task, value)
             assert self.writer is not None
-            self.writer.reset(spare, NOT_NEEDED)
+            self.writer.mark(spare, NOT_NEEDED)
             self._counts.total += len(further)
             schedule.add(further)
 
     def _schedule(self) -> Schedule:
-        tasks = self.plan.tasks
-        branches = {row: self.campaign.branch_of(task) for row, task in enumerate(tasks)}
-        groups = {row: branch.cell for row, branch in branches.items()}
-        priors: dict[Hashable, float] = {groups[row]: prior(task) for row, task in enumerate(tasks)}
-        rounds = {row: task.realisation for row, task in enumerate(tasks)}
-        schedule = Schedule(self.plan.rows, groups, priors, rounds, branches)
+        groups: list[Group] = []  # of each task
+        priors: dict[Hashable, float] = {}
+        for task, rows in self.plan.tasks.by_cell():
+            group = group_of(self.campaign, task)
+            groups += [group] * rows.size
+            priors[group] = prior(task)
+        rounds = self.plan.tasks.column("realisation").tolist()
+        schedule = Schedule(self.plan.rows, groups, priors, rounds)
         for group, (seconds, count) in self.plan.times.items():
             schedule.measured(group, seconds, count)
         return schedule
