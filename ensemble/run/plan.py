@@ -17,6 +17,7 @@ from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.layout import Source, check_space, create
 from adhesis.ensemble.results.read import Results
@@ -31,6 +32,8 @@ Group = tuple[float, ...]
 """Cell of the tasks that take about the same time: of those that share a loading branch, without
 their turning point."""
 _MOST_SHOWN = 10
+# Bytes of a file that some disks take more than ten seconds for.
+_LONG_TO_LAY_OUT = 10**9
 _AGAIN = "; this run computes damaged rows again"
 
 
@@ -138,6 +141,8 @@ def prepare(
 
     def lay_out(sources: Sequence[Source] = (), **attributes: Any) -> None:
         check_space(path, campaign, part)
+        if (size := schema.file_size(campaign, part)) > _LONG_TO_LAY_OUT:
+            say(f"{path}: laying out {bytes_text(size)}")
         for task in tasks.of_cells():
             check_cell(task)
         created = versions() | attributes
@@ -148,7 +153,7 @@ def prepare(
     if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
         raise InputError(f"{path} cannot be written: permission denied")
     lock.acquire(size, options.patience)
-    grown = ""
+    new: NDArray[np.intp] | None = None  # rows that came when the file grew
     is_new = not os.path.exists(path)
     if is_new:
         lay_out()
@@ -156,9 +161,11 @@ def prepare(
         with Results(path) as old:
             grown_keys = _growth(path, old, campaign, part)
             if grown_keys:
-                source = Source(old, campaign, old.status() != schema.DAMAGED)
+                # Which rows are not needed is decided anew.
+                taken = np.isin(old.status(), (schema.DONE, schema.FAILED))
+                source = Source(old, campaign, taken)
                 lay_out([source], created=old.attributes.get("created"))
-                grown = f", {len(tasks) - len(old)} of them new"
+                new = np.setdiff1d(np.arange(len(tasks)), source.target)
                 if old.damaged().size:
                     say(f"{old.damage()}{_AGAIN}")
     with Results(path) as results:
@@ -188,6 +195,7 @@ def prepare(
         say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
         return plan
     again_by = parameter("redo", "adhesis run")
+    grown = "" if new is None else f", {np.isin(plan.rows, new).sum()} of them new"
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
         f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
