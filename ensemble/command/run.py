@@ -208,7 +208,8 @@ def _again(args: argparse.Namespace) -> str:
 
 def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) -> None:
     from adhesis.ensemble.campaign.precision import precision_lines
-    from adhesis.ensemble.task.doubt import why_beyond
+    from adhesis.ensemble.task.doubt import doubtful_losses, why_beyond
+    from adhesis.solver.checks import counted
 
     status = f"adhesis status {shlex.quote(f'{path}')}"
     log(f"{path}: {summary}")
@@ -217,15 +218,21 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) ->
     for line in precision_lines(summary.precisions):
         log(line)
     if summary.doubtful:
+        they = "its own account it" if summary.doubtful == 1 else "their own account they"
         log(
-            f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
-            f"more than {100 * campaign.solver.accuracy:g} %, the accuracy asked for ({status})"
+            doubtful_losses(
+                summary.doubtful,
+                f": by {they} may be off by more than {100 * campaign.solver.accuracy:g} %, the "
+                f"accuracy asked for ({status})",
+            )
         )
     if summary.beyond_limit:
         why = why_beyond(campaign.material.opens)
-        log(f"{summary.beyond_limit} losses are doubtful: {why} ({status})")
+        log(doubtful_losses(summary.beyond_limit, f": {why} ({status})"))
     if summary.stopped:
-        log(f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {again}")
+        are = "is" if summary.pending == 1 else "are"
+        left = f"{counted(summary.pending, 'task')} {are} left"
+        log(f"stopped early: {summary.stopped}; {left}, {again}")
 
 
 def _price(campaign: Campaign, path: Path, part: Part, engine: Engine | None) -> int:

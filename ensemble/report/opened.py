@@ -77,7 +77,8 @@ class Plots:
         def draw(ax: object = None) -> Figure:
             return self._draw(item.of, ax)
 
-        draw.__name__, draw.__doc__ = name, item.draw.__doc__
+        _, _, further = (item.draw.__doc__ or "").partition("\n\n")
+        draw.__name__, draw.__doc__ = name, f"{item.title}.\n\n{item.caption}\n\n{further}".strip()
         return draw
 
     def _draw(self, function: Callable[[Aggregate], PublishedFigure], ax: object) -> Figure:

@@ -106,8 +106,8 @@ def tasks_of(campaign: Campaign, part: Part) -> Tasks:
         )
     if not tasks:
         raise InputError(
-            f"part is {part}: the campaign has {campaign.task_count} tasks and so at most as many "
-            "parts"
+            f"part is {part}: the campaign has {counted(campaign.task_count, 'task')} and so at "
+            "most as many parts"
         )
     return tasks
 
@@ -192,13 +192,14 @@ def prepare(
                 writer.mark(np.flatnonzero(spare & ~is_marked), schema.NOT_NEEDED)
                 writer.mark(np.flatnonzero(is_marked & ~spare), schema.PENDING)
     if is_new:
-        say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
+        at_first = " at first" if plan.batches else ""
+        say(f"{path}: {counted(len(plan.rows), 'task')} to do{at_first}")
         return plan
     again_by = parameter("redo", "adhesis run")
     grown = "" if new is None else f", {np.isin(plan.rows, new).sum()} of them new"
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
-        f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
+        f"{path}: {plan.done} of {counted(planned, 'task')} done, {len(plan.rows)} to do{grown}"
         + (f", {plan.failed} failed before (see {again_by} failed)" if plan.failed else "")
     )
     return plan

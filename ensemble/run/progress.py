@@ -9,6 +9,7 @@ from typing import TextIO
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.reporter import Display
+from adhesis.solver.checks import counted
 
 _MOST_FAILURES_SHOWN = 5
 
@@ -43,7 +44,7 @@ class Summary:
     def __str__(self) -> str:
         failed = f", {self.failed} failed" if self.failed else ""
         now = f"{self.computed} computed in {duration(self.seconds)}"
-        return f"{self.done} of {self.total} tasks done{failed}; {now}"
+        return f"{self.done} of {counted(self.total, 'task')} done{failed}; {now}"
 
 
 class ProgressLine(Display):
@@ -76,7 +77,7 @@ class ProgressLine(Display):
 
     def _line(self, seconds: float) -> str:
         c = self._counts
-        parts = [f"{c.done} of {c.total} tasks done"]
+        parts = [f"{c.done} of {counted(c.total, 'task')} done"]
         if c.failed_now:
             parts.append(f"{c.failed_now} failed")
         if c.computed:

@@ -35,6 +35,7 @@ from adhesis.ensemble.task.compute import Runner, check_task
 from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, errors_text
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.path_record import Progress
 
 ComputeLoop = Callable[[Campaign, Task, Progress | None], Row]
@@ -271,7 +272,7 @@ class _Session:
         most = self.options.max_failures
         if most is not None and self._counts.failed_now >= most:
             limit = f"{parameter('max_failures', 'adhesis run')} {most}"
-            return f"{self._counts.failed_now} tasks failed (the limit is {limit})"
+            return f"{counted(self._counts.failed_now, 'task')} failed (the limit is {limit})"
         return None
 
     def _time_left(self) -> float | None:

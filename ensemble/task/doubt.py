@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from adhesis.ensemble.quantities import percent, stress_text
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import (
     ANY_RANGE,
     DOUBTFUL_EXCESS,
@@ -51,6 +52,12 @@ def why_beyond(opens: bool) -> str:
         "work of adhesion of the largest contact, so that an interface of finite range would lose "
         "less (docs/zero-range.md)"
     )
+
+
+def doubtful_losses(count: int, why: str, of: int | None = None) -> str:
+    """Return "2 losses are doubtful: …", or "1 of 3 losses is doubtful, as …"."""
+    counts = counted(count, "loss") if of is None else f"{count} of {counted(of, 'loss')}"
+    return f"{counts} {'is' if count == 1 else 'are'} doubtful{why}"
 
 
 def errors_text(row: Mapping[str, Any]) -> str:
