@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -24,7 +23,7 @@ from adhesis.ensemble.aggregate.cells import (
     read_cells,
 )
 from adhesis.ensemble.campaign.tasks import WHOLE, Tasks
-from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.escape import one_line, printable, shell_word
 from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
@@ -246,7 +245,7 @@ def _failure_lines(failures: Sequence[Mapping[str, Any]], path: str, part: str |
     )
     refused = sum(error.startswith("PathError") for error in errors)  # by the solver: fail again
     if not refused:
-        options = f"--out {shlex.quote(path)}{f' --part {part}' if part else ''} --redo failed"
+        options = f"--out {shell_word(path)}{f' --part {part}' if part else ''} --redo failed"
         return [*lines, f"again: adhesis run CAMPAIGN.toml {options}"]
     which = "they" if refused == len(errors) else f"{refused} of them"
     fail, they_are = ("fails", "it is") if refused == 1 else ("fail", "they are")

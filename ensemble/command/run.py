@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError, WriteError, parameter
+from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import bar, log
 
@@ -211,7 +211,7 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) ->
     from adhesis.ensemble.task.doubt import doubtful_losses, why_beyond
     from adhesis.solver.checks import counted
 
-    status = f"adhesis status {shlex.quote(f'{path}')}"
+    status = f"adhesis status {shell_word(path)}"
     log(f"{path}: {summary}")
     if summary.failed:
         log(f"why they failed, and what to do: {status}")
@@ -229,6 +229,8 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) ->
     if summary.beyond_limit:
         why = why_beyond(campaign.material.opens)
         log(doubtful_losses(summary.beyond_limit, f": {why} ({status})"))
+    if summary.short_of_preload:
+        log(f"{counted(summary.short_of_preload, 'loop')} did not reach the preload ({status})")
     if summary.stopped:
         are = "is" if summary.pending == 1 else "are"
         left = f"{counted(summary.pending, 'task')} {are} left"

@@ -31,6 +31,7 @@ class Summary:
     # Losses of those computed now that are those of the zero-range limit alone
     # (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`)
     beyond_limit: int = 0
+    short_of_preload: int = 0  # loops of those that turned before their preload was reached
     seconds: float = 0.0
     stopped: str | None = None  # why it stopped before the last task
     # With ``[stop]``: name of every cell, and how well the mean of its quantity is known

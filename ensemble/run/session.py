@@ -222,7 +222,7 @@ class _Session:
         known = self.writer.write_result(task, outcome.result, rank)
         gamma = self.plan.tasks[task].work_of_adhesion
         row = {**outcome.result, "work_of_adhesion": gamma, CHECKSUM.name: known}
-        judged = (*OF_DOUBT, self.campaign.stop.quantity, CHECKSUM.name)
+        judged = (*OF_DOUBT, "preload_reached", self.campaign.stop.quantity, CHECKSUM.name)
         return replace(outcome, result={name: row[name] for name in judged})
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
@@ -237,6 +237,7 @@ class _Session:
             counts.computed += 1
             stiffness = self.campaign.at(self.plan.tasks[outcome.task]).cycle.stiffness
             counts.beyond_limit += bool(beyond_zero_range(row, stiffness))
+            counts.short_of_preload += bool(row["preload_reached"] == 0)
             if doubtful(row, self.campaign.solver.accuracy):
                 counts.doubtful += 1
                 progress.doubt(f"{what}: {errors_text(row)}")
