@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
 from adhesis.ensemble.errors import InputError, lack, quoted
+from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.checksum import empty_checksums, row_checksums
 from adhesis.ensemble.results.head import HEAD, check_head
@@ -83,7 +84,7 @@ class Results:
         held = sum(min(size, dataset.id.get_storage_size()) for dataset in rows)
         if size - held > _MOST_BESIDES + held:
             raise InputError(
-                f"{self.path} holds {(size - held) / 1e6:.0f} MB beside its rows, more than a "
+                f"{self.path} holds {bytes_text(size - held)} beside its rows, more than a "
                 "campaign can have there"
             )
 

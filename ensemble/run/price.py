@@ -18,7 +18,7 @@ from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
-from adhesis.ensemble.quantities import duration, percent
+from adhesis.ensemble.quantities import bytes_text, duration, percent
 from adhesis.ensemble.results.layout import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
@@ -86,7 +86,7 @@ class Price:
             if self.pilots
             else "the loops that are done"
         )
-        memory = f", about {self.rank_bytes / 1e6:.0f} MB of memory a rank" if self.left else ""
+        memory = f", about {bytes_text(self.rank_bytes)} of memory a rank" if self.left else ""
         lines = [
             f"{counted(self.left, 'task')} to do in {counted(len(self.cells), 'cell')}, "
             f"{self.done} done; nothing was written",
@@ -94,7 +94,7 @@ class Price:
             *([self._short()] if self.pilots_short else []),
             f"{self.seconds / 3600:.3g} core hours, by {tried}; "
             f"the longest task takes about {duration(self.longest)}",
-            f"results file {self.file_bytes / 1e6:.3g} MB{memory}",
+            f"results file {bytes_text(self.file_bytes)}{memory}",
         ]
         if self.left:
             lines.append(f"one process takes {duration(self.makespan(1))}")
