@@ -234,6 +234,8 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) ->
     if summary.stopped:
         are = "is" if summary.pending == 1 else "are"
         left = f"{counted(summary.pending, 'task')} {are} left"
+        if summary.precisions:  # further batches may follow
+            left = f"at least {left}"
         log(f"stopped early: {summary.stopped}; {left}, {again}")
 
 
