@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -167,10 +167,22 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines += ["", f"{many}: --json lists them, and adhesis report writes losses.csv"]
     if status["under_load"]:
         lines += ["", "losses under a weight: closed at the separation of its fall"]
-    if status["preload_not_reached"]:
-        lines += ["", f"{counted(status['preload_not_reached'], 'loop')} did not reach the preload"]
     if status["damaged"]:
         lines += ["", *damage_lines(status["damaged"])]
+    for sentence, rows, about in doubts(status):
+        lines += ["", sentence, *_listed(rows, about, ": ")]
+    if status["failures"]:
+        lines += ["", *_failure_lines(status["failures"], status["file"], status["part"])]
+    return printable("\n".join(lines))
+
+
+def doubts(status: Mapping[str, Any]) -> Iterator[tuple[str, Sequence[Any], Callable[..., str]]]:
+    """Return sentences on what is doubtful in a status: with rows, and what is to be said of each.
+
+    On loops short of their preload there is no list.
+    """
+    if short := status["preload_not_reached"]:
+        yield f"{counted(short, 'loop')} did not reach the preload", (), str
     by_own = "their" if len(status["doubtful"]) > 1 else "its"
     less = f"by {by_own} own account less accurate than asked for"
     for rows, why, about in (
@@ -178,11 +190,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         (status["beyond_limit"], doubt.why_beyond(status["opens"]), _range_of),
     ):
         if rows:
-            lines += ["", doubt.doubtful_losses(len(rows), f": {why}")]
-            lines += _listed(rows, about, ": ")
-    if status["failures"]:
-        lines += ["", *_failure_lines(status["failures"], status["file"], status["part"])]
-    return printable("\n".join(lines))
+            yield doubt.doubtful_losses(len(rows), f": {why}"), rows, about
 
 
 def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
