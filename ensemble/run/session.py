@@ -32,7 +32,7 @@ from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.task.compute import Runner, check_task
-from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, errors_text
+from adhesis.ensemble.task.doubt import OF_DOUBT, doubtful, errors_text
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
 from adhesis.solver.checks import counted
@@ -191,23 +191,25 @@ class _Session:
             return master.run()
 
     def summary(self, stopped: str | None, path: Path) -> Summary:
-        """Return the counts, and how the run has ended.
+        """Return the counts, what is doubtful in the file, and how the run has ended.
 
         What is finished is read once more: another program may have written to the file
         (InputError, WriteError), or have copied another one over it.
         """
         summary, known = self._counts, self.plan.known
-        if self.plan.rows or self.plan.batches is not None:
-            with Results(path) as results:
-                finished = np.isin(results.status(), (DONE, FAILED))
-                held = np.sum(finished & (results.column(CHECKSUM.name) == known))
-                if self.plan.batches is not None:
-                    summary.precisions = precisions(read_cells(results))
-            if held < (count := np.sum(known >= 0)):
-                raise WriteError(
-                    f"{path} holds {held} of {count} finished tasks: another program has "
-                    "changed it while a run wrote to it"
-                )
+        with Results(path) as results:
+            finished = np.isin(results.status(), (DONE, FAILED))
+            held = np.sum(finished & (results.column(CHECKSUM.name) == known))
+            cells = read_cells(results)
+        if held < (count := np.sum(known >= 0)):
+            raise WriteError(
+                f"{path} holds {held} of {count} finished tasks: another program has "
+                "changed it while a run wrote to it"
+            )
+        summary.precisions = precisions(cells)
+        summary.doubtful = sum(int(cell.doubtful.sum()) for cell in cells)
+        summary.beyond_limit = sum(int(cell.beyond_zero_range.sum()) for cell in cells)
+        summary.short_of_preload = sum(cell.short_of_preload for cell in cells)
         summary.seconds = time.monotonic() - self._started
         summary.stopped = stopped if summary.pending else None
         return summary
@@ -222,7 +224,7 @@ class _Session:
         known = self.writer.write_result(task, outcome.result, rank)
         gamma = self.plan.tasks[task].work_of_adhesion
         row = {**outcome.result, "work_of_adhesion": gamma, CHECKSUM.name: known}
-        judged = (*OF_DOUBT, "preload_reached", self.campaign.stop.quantity, CHECKSUM.name)
+        judged = (*OF_DOUBT, self.campaign.stop.quantity, CHECKSUM.name)
         return replace(outcome, result={name: row[name] for name in judged})
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
@@ -235,11 +237,7 @@ class _Session:
         else:
             counts.done += 1
             counts.computed += 1
-            stiffness = self.campaign.at(self.plan.tasks[outcome.task]).cycle.stiffness
-            counts.beyond_limit += bool(beyond_zero_range(row, stiffness))
-            counts.short_of_preload += bool(row["preload_reached"] == 0)
             if doubtful(row, self.campaign.solver.accuracy):
-                counts.doubtful += 1
                 progress.doubt(f"{what}: {errors_text(row)}")
         if self.plan.batches is not None:
             steered = self.campaign.stop.quantity

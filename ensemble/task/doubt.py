@@ -33,8 +33,8 @@ _OF_LIMIT = (
     *("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction"),
     *("opening_strength", "barrier", "edge_range", "touch_range", "turn_range", "gamma_open"),
 )
-OF_DOUBT = ("audit_residual", "loss_error", "pull_off_stress", *_OF_LIMIT)
-"""Numbers of a row from which its loss is judged."""
+OF_DOUBT = ("audit_residual", "loss_error", "loss", "work_of_adhesion")
+"""Numbers of a row from which :func:`doubtful` decides."""
 INSTEAD = "Rougher profiles, a stiffer material or a smaller preload let loops reach it"
 
 

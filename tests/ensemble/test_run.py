@@ -208,6 +208,8 @@ def test_a_doubtful_loss_is_said(tmp_path):
     assert "realisation 1" in text
     status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert [d["row"] for d in status["doubtful"]] == [1, 3]
+    again, _ = run(tmp_path)  # of a file that is finished, too
+    assert "2 losses are doubtful: by their own account they may be off" in again.stderr
 
 
 def test_what_there_is_one_of_is_said_in_the_singular_and_rounding_is_no_loss(tmp_path):
