@@ -51,10 +51,12 @@ class Selection:
             known = np.unique(tasks.column(name)).tolist()
             for value in chosen:
                 if value not in known:
-                    values = ", ".join(f"{v:g}" for v in known[:_MOST_SHOWN])
+                    is_alike = f"{value:g}" in {f"{v:g}" for v in known}
+                    spelt: Callable[[float], str] = repr if is_alike else "{:g}".format
+                    values = ", ".join(map(spelt, known[:_MOST_SHOWN]))
                     more = ", …" if len(known) > _MOST_SHOWN else ""
                     raise InputError(
-                        f"{parameter(name)} is {value:g}: this campaign has no such task, "
+                        f"{parameter(name)} is {spelt(value)}: this campaign has no such task, "
                         f"only {values}{more}"
                     )
 
