@@ -165,7 +165,7 @@ class Campaign:
         -------
         CampaignResults
             As :func:`adhesis.open` returns it. Failed tasks are counted in its ``repr``, and in a
-            warning with the first reason.
+            warning with the first reason; warnings also count losses that are doubtful.
 
         Raises
         ------
@@ -205,21 +205,24 @@ class Campaign:
                 f"{summary.total} tasks are left in {path}, and the same call goes on"
             )
         results = open_results(path)
-        _warn_of_failures(path)
+        _warn(path)
         return results
 
 
-def _warn_of_failures(path: Path) -> None:
-    """Warn with the number of failed tasks and the first reason."""
-    from adhesis.ensemble.aggregate.status import read_status
+def _warn(path: Path) -> None:
+    """Warn of failed tasks, with the first reason, and of doubtful losses."""
+    from adhesis.ensemble.aggregate.status import doubts, read_status
 
     status = read_status(path)
+    found = [sentence for sentence, *_ in doubts(status)]
     if status["failed"]:
-        warnings.warn(
-            f"{status['failed']} of {status['tasks']} tasks failed, and the averages leave them "
-            f"out; first reason: {status['failures'][0]['error']}",
-            stacklevel=3,
+        found.insert(
+            0,
+            f"{status['failed']} of {checks.counted(status['tasks'], 'task')} failed, and the "
+            f"averages leave them out; first reason: {status['failures'][0]['error']}",
         )
+    for sentence in found:
+        warnings.warn(sentence, stacklevel=3)
 
 
 def _toml(source: Mapping[str, Any]) -> str:

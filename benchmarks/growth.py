@@ -53,7 +53,7 @@ def measure(gamma: float, ratio: float, periods: float, given: argparse.Namespac
     seconds = process_time() - started
     counted = asdict(loop.method)
     solutions = counted["fields" if nodes is None else "solves"]
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
     return [
         f"{gamma:g}", f"{round(ratio * count)}", f"{periods:g}", f"{seconds:.3g}",
         f"{loop.patches.max()}", f"{len(loop.jumps)}", f"{solutions}",

@@ -35,7 +35,7 @@ def resident() -> tuple[float, float]:
             all_kb = int(words[1])
         if words[0] in ("Private_Clean:", "Private_Dirty:"):
             own_kb += int(words[1])
-    return all_kb / 1024, own_kb / 1024
+    return all_kb * 1024 / 1e6, own_kb * 1024 / 1e6
 
 
 def imported(*names: str) -> Callable[[], object]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Sequence
 
 
@@ -20,6 +21,12 @@ def printable(text: str) -> str:
 def one_line(text: str) -> str:
     """Join the lines of a text, and make it printable."""
     return printable(" ".join(text.split()))
+
+
+def shell_word(path: object) -> str:
+    """Quote a path for a command line; one that begins with "-" would be an option there."""
+    text = f"{path}"
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
 
 
 def markdown(text: str) -> str:

@@ -399,7 +399,9 @@ def rounded_percent(share: float, places: int = 1, sign: str = "") -> str:
 
 
 def bytes_text(size: float) -> str:
-    """Return a size in a unit that fits: "300 kB", "20 MB"."""
+    """Return a size in a unit that fits: "300 kB", "20 MB", "12.5 GB"."""
+    if size >= 1e10:
+        return f"{size / 1e9:.3g} GB"
     return f"{size / 1e6:.0f} MB" if size >= 1e7 else f"{size / 1e3:.0f} kB"
 
 

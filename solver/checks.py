@@ -172,8 +172,9 @@ def plain(number: float) -> str:
 
 
 def counted(number: int, name: str) -> str:
-    """Format a count with its noun: "1 jump", "2 jumps"."""
-    return f"{number} {name}{'' if number == 1 else 's'}"
+    """Format a count with its noun: "1 jump", "2 jumps", "3 losses"."""
+    plural = "es" if name.endswith(("s", "ch")) else "s"
+    return f"{number} {name}{'' if number == 1 else plural}"
 
 
 def shown(value: object) -> str:

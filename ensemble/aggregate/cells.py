@@ -174,13 +174,15 @@ def read_cells(results: Results) -> list[Cell]:
     """Read every cell by H, γ, further axes, ascending."""
     campaign, tasks, status = results.campaign, results.tasks(), results.status()
     seed = tasks.column("seed")
-    columns = {name: results.column(name) for name in _PER_TASK}
+    done = np.flatnonzero(status == DONE)
+    columns = {name: results.column(name)[done].astype(float) for name in _PER_TASK}
     cells = []
     for task, rows_of_cell in tasks.by_cell():
         of_cell = campaign.at(task)
         of_rows = status[rows_of_cell]
         rows = rows_of_cell[of_rows == DONE]
-        values = {name: column[rows].astype(float) for name, column in columns.items()}
+        mine = np.searchsorted(done, rows)
+        values = {name: column[mine] for name, column in columns.items()}
         drops = values["loss_small_scale"] + values["loss_large_scale"]
         values["small_scale_share"] = np.divide(
             values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0

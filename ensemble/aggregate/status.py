@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 import os
-import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from adhesis.ensemble.aggregate.cells import (
     read_cells,
 )
 from adhesis.ensemble.campaign.tasks import WHOLE, Tasks
-from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.escape import one_line, printable, shell_word
 from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
@@ -137,7 +136,7 @@ def _group(cell: Cell) -> dict[str, Any]:
 def as_text(status: dict[str, Any], pace: str = "") -> str:
     """Return a status as lines for people; ``pace`` is added to the first."""
     lines = [
-        f"{status['file']}: {status['tasks']} tasks, {status['done']} done, "
+        f"{status['file']}: {counted(status['tasks'], 'task')}, {status['done']} done, "
         f"{status['pending']} pending, {status['failed']} failed"
         + (f", {status['not_needed']} not needed" if status["not_needed"] else "")
         + (f", {len(status['damaged'])} damaged" if status["damaged"] else "")
@@ -168,28 +167,39 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines += ["", f"{many}: --json lists them, and adhesis report writes losses.csv"]
     if status["under_load"]:
         lines += ["", "losses under a weight: closed at the separation of its fall"]
-    if status["preload_not_reached"]:
-        lines += ["", f"{counted(status['preload_not_reached'], 'loop')} did not reach the preload"]
     if status["damaged"]:
         lines += ["", *damage_lines(status["damaged"])]
-    own = "by their own account less accurate than asked for"
-    for rows, why, about in (
-        (status["doubtful"], own, doubt.errors_text),
-        (status["beyond_limit"], doubt.why_beyond(status["opens"]), _range_of),
-    ):
-        if rows:
-            lines += ["", f"{len(rows)} losses are doubtful: {why}"]
-            lines += _listed(rows, about, ": ")
+    for sentence, rows, about in doubts(status):
+        lines += ["", sentence, *_listed(rows, about, ": ")]
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"], status["file"], status["part"])]
     return printable("\n".join(lines))
+
+
+def doubts(status: Mapping[str, Any]) -> Iterator[tuple[str, Sequence[Any], Callable[..., str]]]:
+    """Return sentences on what is doubtful in a status: with rows, and what is to be said of each.
+
+    On loops short of their preload there is no list.
+    """
+    if short := status["preload_not_reached"]:
+        yield f"{counted(short, 'loop')} did not reach the preload", (), str
+    by_own = "their" if len(status["doubtful"]) > 1 else "its"
+    less = f"by {by_own} own account less accurate than asked for"
+    for rows, why, about in (
+        (status["doubtful"], less, doubt.errors_text),
+        (status["beyond_limit"], doubt.why_beyond(status["opens"]), _range_of),
+    ):
+        if rows:
+            yield doubt.doubtful_losses(len(rows), f": {why}"), rows, about
 
 
 def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
     counts = f"{group['done']:8d} {group['pending']:8d} {group['failed']:7d}"
     mean, loss, error = group["mean_seconds"], group["loss"], group["loss_standard_error"]
     shown = ""
-    if loss is not None:
+    if loss is not None and not group["work_of_adhesion"]:  # nothing is lost: it is rounding
+        shown = "  0"
+    elif loss is not None:
         loss *= 1e3
         shown = f"  {loss:.4g}" if error is None else f"  {with_error(loss, 1e3 * error)}"
     return (
@@ -243,8 +253,11 @@ def _failure_lines(failures: Sequence[Mapping[str, Any]], path: str, part: str |
     )
     refused = sum(error.startswith("PathError") for error in errors)  # by the solver: fail again
     if not refused:
-        options = f"--out {shlex.quote(path)}{f' --part {part}' if part else ''} --redo failed"
+        options = f"--out {shell_word(path)}{f' --part {part}' if part else ''} --redo failed"
         return [*lines, f"again: adhesis run CAMPAIGN.toml {options}"]
-    which = "they fail" if refused == len(errors) else f"{refused} of them fail"
-    again = "again if they are computed again: follow the reason given, in a campaign with other"
-    return [*lines, f"{which} {again} values"]
+    which = "they" if refused == len(errors) else f"{refused} of them"
+    fail, they_are = ("fails", "it is") if refused == 1 else ("fail", "they are")
+    if len(errors) == 1:
+        which = "it"
+    again = f"again if {they_are} computed again: follow the reason given, in a campaign with other"
+    return [*lines, f"{which} {fail} {again} values"]

@@ -36,7 +36,7 @@ _GRID_ACCURACY = 1e-3
 _WARM_UP = {"grid": 8, "sharp": 1e-2}
 # CPU seconds for start and warm-up, before the limit of the run applies.
 _START_LIMIT = 300.0
-_MB = 2**20
+_MB = 1e6
 
 
 @dataclass(frozen=True)

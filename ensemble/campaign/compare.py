@@ -37,7 +37,8 @@ def growth(
         if _extends(key, was, value) and not missing:
             grown.append(key)
         else:
-            other.append(f"{key} is {shown(value)} here and {shown(was)} there")
+            here_there = ("not given" if v is None else shown(v) for v in (value, was))
+            other.append(f"{key} is {' here and '.join(here_there)} there")
     if other:
         raise InputError(
             f"{path} holds another campaign: {'; '.join(other)} (here: {here}, there: {path})"

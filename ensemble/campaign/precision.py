@@ -116,7 +116,7 @@ def precision_lines(cells: Sequence[tuple[str, Precision]]) -> list[str]:
     if not cells:
         return []
     met = sum(bool(known.met) for _, known in cells)
-    lines = [f"[stop]: {met} of {len(cells)} cells met the wanted precision"]
+    lines = [f"[stop]: {met} of {counted(len(cells), 'cell')} met the wanted precision"]
     listed = [entry for entry in cells if not entry[1].met] if len(cells) > MOST_LISTED else cells
     lines += [f"  {name}: {known}" for name, known in listed[:MOST_LISTED]]
     if len(listed) > MOST_LISTED:

@@ -26,7 +26,6 @@ def name_at(hurst: float, work_of_adhesion: float, others: Sequence[tuple[str, f
     return f"{name}, {place(others)}" if others else name
 
 
-@lru_cache(1 << 16)
 def task_seed(campaign_seed: int, realisation: int) -> int:
     """Return the seed of one realisation's phases.
 
@@ -36,6 +35,12 @@ def task_seed(campaign_seed: int, realisation: int) -> int:
     """
     sequence = np.random.SeedSequence(campaign_seed, spawn_key=(realisation,))
     return int(sequence.generate_state(1, np.uint64)[0] >> 11)
+
+
+@lru_cache(4)
+def _seeds(campaign_seed: int, realisations: int) -> NDArray[np.int64]:
+    """Return the seeds of all realisations, which every opened file of a campaign is checked by."""
+    return np.array([task_seed(campaign_seed, r) for r in range(realisations)], np.int64)
 
 
 @dataclass(frozen=True)
@@ -101,8 +106,7 @@ class Tasks:
         if name == "realisation":
             return realisation
         if name == "seed":
-            found, place = np.unique(realisation, return_inverse=True)
-            return np.array([task_seed(self.seed, r) for r in found.tolist()], np.int64)[place]
+            return _seeds(self.seed, self.realisations)[realisation]
         axis = ("hurst", "work_of_adhesion", *self.names).index(name)
         return np.array([cell[axis] for cell in self.cells])[self.cell_of()]
 

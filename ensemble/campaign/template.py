@@ -40,6 +40,15 @@ EXAMPLES = {
     "output.field_penetrations": "[0.3, 0.6, 0.9]",
     "stop.relative_error": "0.1",
 }
+_TITLES: dict[Table, str] = {
+    "profile": "the rough profile, by the spectral method",
+    "material": "the elastic half-space, and the strength of the interface",
+    "sweep": "one task for every H, γ (and what else is a list) and realisation",
+    "cycle": "the loading path",
+    "solver": "the method and its accuracy",
+    "output": "what is kept of a loop, besides losses and curves",
+    "stop": "realisations in batches until a mean of every cell is known well enough",
+}
 _HEAD = """\
 # A campaign of adhesis: one loop for every Hurst exponent, work of adhesion and realisation.
 #
@@ -61,11 +70,10 @@ def campaign_template() -> str:
 
 
 def _table(name: Table) -> str:
-    title = (TABLES[name].__doc__ or "").partition(": ")[2].rstrip(".")
     entries = [_entry(f"{name}.{entry.name}", entry) for entry in fields(TABLES[name])]
     # A table without a key may stay empty, but [stop] asks for one of its own.
     mark = "# " if name == "stop" else ""
-    return f"\n{mark}[{name}]  # {title}\n" + "".join(entries)
+    return f"\n{mark}[{name}]  # {_TITLES[name]}\n" + "".join(entries)
 
 
 def _entry(key: str, entry: Field[Any]) -> str:

@@ -46,9 +46,10 @@ def execute(args: argparse.Namespace) -> int:
             raise WriteError(f"{error}; the same command resumes") from error
     for doubt in merged.doubts:
         log(f"adhesis merge: {doubt}")
+    total = counted(merged.total, "task")
     failed = f", {merged.failed} failed" if merged.failed else ""
     print(
         f"{out}: {counted(merged.taken, 'row')} taken over from "
-        f"{counted(len(args.parts), 'file')}; {merged.done} of {merged.total} tasks done{failed}"
+        f"{counted(len(args.parts), 'file')}; {merged.done} of {total} done{failed}"
     )
     return 0

@@ -6,9 +6,9 @@ It lists every key with its meaning, its rule and its default. An existing file 
 from __future__ import annotations
 
 import argparse
-import shlex
 from pathlib import Path
 
+from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.outputs import check_ending, write_new
 
 EXAMPLES = (
@@ -32,6 +32,6 @@ def execute(args: argparse.Namespace) -> int:
         return campaign_template().encode()
 
     write_new("FILE.toml", args.file, content)
-    file = shlex.quote(f"{args.file}")
+    file = shell_word(args.file)
     print(f"next        adhesis run {file} --dry-run   (its cost; without --dry-run: the run)")
     return 0

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from adhesis.ensemble import exit_codes
 from adhesis.ensemble.command.parser import within
 from adhesis.ensemble.errors import InputError, WriteError, parameter
+from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
 from adhesis.ensemble.reporter import bar, log
 
@@ -208,24 +208,35 @@ def _again(args: argparse.Namespace) -> str:
 
 def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) -> None:
     from adhesis.ensemble.campaign.precision import precision_lines
-    from adhesis.ensemble.task.doubt import why_beyond
+    from adhesis.ensemble.task.doubt import doubtful_losses, why_beyond
+    from adhesis.solver.checks import counted
 
-    status = f"adhesis status {shlex.quote(f'{path}')}"
+    status = f"adhesis status {shell_word(path)}"
     log(f"{path}: {summary}")
     if summary.failed:
         log(f"why they failed, and what to do: {status}")
     for line in precision_lines(summary.precisions):
         log(line)
     if summary.doubtful:
+        they = "its own account it" if summary.doubtful == 1 else "their own account they"
         log(
-            f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
-            f"more than {100 * campaign.solver.accuracy:g} %, the accuracy asked for ({status})"
+            doubtful_losses(
+                summary.doubtful,
+                f": by {they} may be off by more than {100 * campaign.solver.accuracy:g} %, the "
+                f"accuracy asked for ({status})",
+            )
         )
     if summary.beyond_limit:
         why = why_beyond(campaign.material.opens)
-        log(f"{summary.beyond_limit} losses are doubtful: {why} ({status})")
+        log(doubtful_losses(summary.beyond_limit, f": {why} ({status})"))
+    if summary.short_of_preload:
+        log(f"{counted(summary.short_of_preload, 'loop')} did not reach the preload ({status})")
     if summary.stopped:
-        log(f"stopped early: {summary.stopped}; {summary.pending} tasks are left, {again}")
+        are = "is" if summary.pending == 1 else "are"
+        left = f"{counted(summary.pending, 'task')} {are} left"
+        if summary.precisions:  # further batches may follow
+            left = f"at least {left}"
+        log(f"stopped early: {summary.stopped}; {left}, {again}")
 
 
 def _price(campaign: Campaign, path: Path, part: Part, engine: Engine | None) -> int:

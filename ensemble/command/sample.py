@@ -6,9 +6,9 @@ It is synthetic: 1 mm in steps of 1 µm, rough down to 20 µm, with tilt, bow, n
 from __future__ import annotations
 
 import argparse
-import shlex
 from pathlib import Path
 
+from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.outputs import write_new
 
 EXAMPLES = (
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
     write_new("FILE", args.file, lambda: _sample().encode())
-    file = shlex.quote(f"{args.file}")
+    file = shell_word(args.file)
     print(
         f"next        adhesis trace {file} --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 "
         "--to out"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver.checks import Bounds, function, whole
+from adhesis.solver.checks import Bounds, counted, function, whole
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import ContactState, Method
@@ -142,11 +142,11 @@ def _drop(jumps: Sequence[Jump]) -> float:
 
 def _caption(result: LoopResult | PathResult, index: int, jumps: int) -> str:
     lost = _drop(result.jumps[:jumps])
-    patches = int(result.patches[index])
+    patches = counted(int(result.patches[index]), "patch")
     return (
         f"{result.branch[index]}: Δ/h_max {result.penetration[index]:.3f}, mean stress "
-        f"{result.mean_stress[index]:.4g} Pa, A/A0 {result.contact_fraction[index]:.3f}, {patches} "
-        f"{'patch' if patches == 1 else 'patches'}; {jumps} of {len(result.jumps)} jumps so far "
+        f"{result.mean_stress[index]:.4g} Pa, A/A0 {result.contact_fraction[index]:.3f}, "
+        f"{patches}; {jumps} of {counted(len(result.jumps), 'jump')} so far "
         f"lost {lost:.3g} J/m²"
     )
 

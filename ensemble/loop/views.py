@@ -13,6 +13,7 @@ from typing import Any
 
 from adhesis.ensemble.quantities import UNITS, drive_text, stress_text
 from adhesis.ensemble.reporter import bar
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.loading.path_record import Progress
@@ -115,7 +116,7 @@ def progress_bar(top: float, load: bool) -> Iterator[Progress]:
         def show(branch: Branch, drive: float, state: ContactState) -> None:
             text = (
                 f"{branch:<9} {drive_text(drive, load)} of {end}  A/A0 "
-                f"{state.contact_fraction:.4f}  {state.patches} patches"
+                f"{state.contact_fraction:.4f}  {counted(state.patches, 'patch')}"
             )
             share = drive / top if branch == "loading" else None if state.patches else 1.0
             shown(share, 1.0, text)

@@ -26,7 +26,14 @@ from adhesis.ensemble.report.further_axes import (
 )
 from adhesis.ensemble.report.tables.loss_tables import extreme, inside_interval, off_the_paper
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.task.doubt import INSTEAD, highest_stress, most_reached, why_beyond
+from adhesis.ensemble.task.doubt import (
+    INSTEAD,
+    doubtful_losses,
+    highest_stress,
+    most_reached,
+    why_beyond,
+)
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.equilibrium_path import STEEP
 from adhesis.solver.loading.zero_range import ANY_RANGE
 from adhesis.solver.method import BRANCHES
@@ -169,13 +176,14 @@ def missing(data: Aggregate) -> Iterator[str]:
     yield from (f"{doubt}." for doubt in data.doubts)
     if data.pending:
         yield (
-            f"The campaign is not finished: {data.pending} of {data.total} tasks are pending. All "
+            f"The campaign is not finished: {data.pending} of {counted(data.total, 'task')} "
+            f"{'is' if data.pending == 1 else 'are'} pending. All "
             f"averages are over the {data.done} finished ones."
         )
     if data.failed:
         yield (
-            f"{data.failed} of {data.total} tasks failed; the averages leave them out. First "
-            f"reason: {data.failures[0][1]}."
+            f"{data.failed} of {counted(data.total, 'task')} failed; the averages leave them out. "
+            f"First reason: {data.failures[0][1]}."
         )
     if empty := [cell.name for cell in data.cells if not cell.done and cell.pending]:
         yield f"No task is finished yet for {_listed(empty)}."
@@ -211,9 +219,10 @@ def quality(data: Aggregate) -> Iterator[str]:
     )
     if wrong := doubtful_loops(data.cells):
         rows = [f"row {c.rows[k]}, {c.name} ({percent(c.doubt[k])})" for c, k in wrong]
+        own = _their(len(wrong))
         yield (
-            f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
-            "their estimated error exceeds the accuracy asked for, "
+            f"WARNING: {doubtful_losses(len(wrong), '', data.done)}, as {own} audit residual or "
+            f"{own} estimated error exceeds the accuracy asked for, "
             f"{percent(data.campaign.solver.accuracy)} of the loss, or is no number: "
             f"{_listed(rows)}."
         )
@@ -229,16 +238,24 @@ def quality(data: Aggregate) -> Iterator[str]:
         )
     if truncated := sum(cell.jumps.truncated for cell in data.cells):
         yield (
-            f"{truncated} loops made more jumps than the catalogue holds: their smallest drops are "
+            f"{counted(truncated, 'loop')} made more jumps than the catalogue holds: "
+            f"{_their(truncated)} smallest drops are "
             "missing from the distribution and from the table of kinds, not from the losses."
         )
     ends = [float(cell.penetration["unloading"][-1]) for cell in data.cells]
     pull_off = [cell.values["pull_off_penetration"] for cell in data.cells]
     if cut := sum(int(np.sum(at < end - 1e-9)) for at, end in zip(pull_off, ends, strict=True)):
+        curves = "its curve is cut, its loss is complete"
+        if cut > 1:
+            curves = "their curves are cut, their losses are complete"
         yield (
-            f"{cut} loops detached below Δ/h_max = {from_to(ends)}, where the stored unloading "
-            "curve ends: their curves are cut, their losses are complete."
+            f"{counted(cut, 'loop')} detached below Δ/h_max = {from_to(ends)}, where the stored "
+            f"unloading curve ends: {curves}."
         )
+
+
+def _their(count: int) -> str:
+    return "its" if count == 1 else "their"
 
 
 def warnings(data: Aggregate) -> list[str]:
@@ -254,9 +271,10 @@ def _doubtful_companions(data: Aggregate) -> Iterator[str]:
             yield f"WARNING: {other.path.name}, beside this campaign, shares no loop with it."
         wrong = sum(int(np.sum(cell.doubtful | cell.beyond_zero_range)) for cell in other.cells)
         if wrong:
+            losses = f"{wrong} of {counted(sum(cell.done for cell in other.cells), 'loss')}"
             yield (
-                f"WARNING: {wrong} of {sum(cell.done for cell in other.cells)} losses of "
-                f"{other.path.name}, beside this campaign, are doubtful: adhesis status lists them."
+                f"WARNING: {losses} of {other.path.name}, beside this campaign, "
+                f"{'is' if wrong == 1 else 'are'} doubtful: adhesis status lists them."
             )
 
 
@@ -295,9 +313,10 @@ def _limit(data: Aggregate) -> Iterator[str]:
         )
     counts = [(cell.name, int(cell.beyond_zero_range.sum())) for cell in data.cells]
     if beyond := [name for name, count in counts if count]:
+        number = sum(count for _, count in counts)
         yield (
-            f"WARNING: {sum(count for _, count in counts)} of {data.done} losses are doubtful, for "
-            f"{why_beyond(opens)}: {_listed(beyond)}."
+            f"WARNING: {doubtful_losses(number, ', for', data.done)} {why_beyond(opens)}: "
+            f"{_listed(beyond)}."
         )
 
 

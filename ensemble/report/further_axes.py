@@ -9,6 +9,7 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.quantities import common_unit, gamma_text
+from adhesis.solver.checks import counted
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
@@ -121,9 +122,9 @@ def below(cells: Sequence[Cell], others: Sequence[tuple[str, float]]) -> str:
     drawn = [cell for cell in cells if cell.done]
     done, lost = sum(cell.done for cell in drawn), sum(cell.failed for cell in drawn)
     if lost:
-        parts.append(f"{lost} of {done + lost} loops failed, and are in no mean")
+        parts.append(f"{lost} of {counted(done + lost, 'loop')} failed, and are in no mean")
     if short := sum(cell.short_of_preload for cell in drawn):
-        parts.append(f"{short} of {done} loops did not reach their preload")
+        parts.append(f"{short} of {counted(done, 'loop')} did not reach their preload")
     return "\n".join(parts)
 
 

@@ -128,11 +128,11 @@ def _summary(data: Aggregate) -> str:
         counts = [cell.done for cell in data.cells]
         many = f"{from_to(counts)} realisations by `[stop]`"
     return (
-        f"{data.done} loops of {data.total} tasks: "
+        f"{counted(data.done, 'loop')} of {counted(data.total, 'task')}: "
         f"H = {in_one_unit('hurst', sweep.hurst)}; "
         f"γ = {in_one_unit('work_of_adhesion', sweep.work_of_adhesion)}; {further}"
         f"{many}. Each loop was loaded to {findings.turning_point(data)} "
-        f"in {cycle.load_steps} steps and unloaded until detached; "
+        f"in {counted(cycle.load_steps, 'step')} and unloaded until detached; "
         f"method `{data.campaign.solver.method}`. Numbers: `losses.csv`; curves: `curves.nc`."
     )
 

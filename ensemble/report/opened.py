@@ -6,6 +6,7 @@ run may go on writing to it.
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
@@ -77,7 +78,8 @@ class Plots:
         def draw(ax: object = None) -> Figure:
             return self._draw(item.of, ax)
 
-        draw.__name__, draw.__doc__ = name, item.draw.__doc__
+        _, _, further = (inspect.getdoc(item.draw) or "").partition("\n\n")
+        draw.__name__, draw.__doc__ = name, f"{item.title}.\n\n{item.caption}\n\n{further}".strip()
         return draw
 
     def _draw(self, function: Callable[[Aggregate], PublishedFigure], ax: object) -> Figure:

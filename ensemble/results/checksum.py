@@ -13,11 +13,12 @@ import zlib
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS
-from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS, STATUS
+from adhesis.ensemble.task.dataset import KEPT, Dataset
 
 _BLOCK_BYTES = 16 * 2**20
 
@@ -36,9 +37,14 @@ OF_KEPT = tuple(d for d in _ORDERED if d.dims[0] == KEPT)
 def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
     """Return the checksum of arrays as little-endian bytes, after ``start``, of those before."""
     for part in parts:
-        little = part.astype(part.dtype.newbyteorder("<"), copy=False)
-        start = zlib.crc32(np.ascontiguousarray(little).reshape(-1).view(np.uint8).data, start)
+        start = zlib.crc32(_bytes(part).data, start)
     return start
+
+
+def _bytes(rows: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return the little-endian bytes of rows, a line for each."""
+    little = rows.astype(rows.dtype.newbyteorder("<"), copy=False)
+    return np.ascontiguousarray(little).reshape(len(rows), -1).view(np.uint8)
 
 
 def row_checksums(read: Read, kept: NDArray[np.intp], rows: NDArray[np.intp]) -> NDArray[np.uint32]:
@@ -54,12 +60,25 @@ def row_checksums(read: Read, kept: NDArray[np.intp], rows: NDArray[np.intp]) ->
     while done < rows.size:
         first = int(rows[done])
         last = done + int(np.searchsorted(rows[done:], first + step))
-        block = [read(d.name, slice(first, int(rows[last - 1]) + 1)) for d in OF_TASKS]
+        stretch = slice(first, int(rows[last - 1]) + 1)
+        block = np.concatenate([_bytes(read(d.name, stretch)) for d in OF_TASKS], axis=1)
         for number, row in enumerate(rows[done:last].tolist(), done):
-            value = checksum(values[row - first : row - first + 1] for values in block)
+            value = zlib.crc32(block[row - first].data)
             if row in places:
                 here = slice(places[row], places[row] + 1)
                 value = checksum((read(d.name, here) for d in OF_KEPT), value)
             out[number] = value
         done = last
     return out
+
+
+def empty_checksums(file: h5py.File, status: int, rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+    """Return the checksums that rows have if they hold nothing but a status."""
+
+    def empty(dataset: Dataset) -> NDArray[Any]:
+        here, fill = file[dataset.name], status if dataset is STATUS else dataset.fill
+        return np.full((1, *here.shape[1:]), fill, here.dtype)
+
+    of_tasks = checksum(map(empty, OF_TASKS))
+    of_kept = checksum(map(empty, OF_KEPT), of_tasks)
+    return np.where(np.isin(rows, file[KEPT][:]), of_kept, of_tasks).astype(np.uint32)

@@ -180,12 +180,14 @@ def copy_rows(sources: Sequence[Source], file: h5py.File) -> None:
 def _copy_block(
     sources: Sequence[Source], there: h5py.Dataset, dataset: Dataset, start: int, stop: int
 ) -> None:
-    block = there[start:stop]
+    block: NDArray[Any] | None = None
     for source in sources:
         target, taken = source.places(dataset)
         low, high = np.searchsorted(target, (start, stop))
         chosen = taken[low:high]
         if np.any(chosen):
+            block = there[start:stop] if block is None else block
             values = source.results.column(dataset.name, slice(int(low), int(high)))
             block[target[low:high][chosen] - start] = values[chosen]
-    there[start:stop] = block
+    if block is not None:
+        there[start:stop] = block

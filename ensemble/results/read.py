@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
 from adhesis.ensemble.errors import InputError, lack, quoted
+from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.checksum import row_checksums
+from adhesis.ensemble.results.checksum import empty_checksums, row_checksums
 from adhesis.ensemble.results.head import HEAD, check_head
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.solver.checks import shown
@@ -83,7 +84,7 @@ class Results:
         held = sum(min(size, dataset.id.get_storage_size()) for dataset in rows)
         if size - held > _MOST_BESIDES + held:
             raise InputError(
-                f"{self.path} holds {(size - held) / 1e6:.0f} MB beside its rows, more than a "
+                f"{self.path} holds {bytes_text(size - held)} beside its rows, more than a "
                 "campaign can have there"
             )
 
@@ -254,9 +255,14 @@ class Results:
         return status
 
     def _differ(self, rows: NDArray[np.intp], status: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Whether rows that are not pending cannot be what was written."""
-        written = self.column(schema.CHECKSUM.name, rows)
-        held = row_checksums(self.column, self.column(KEPT), rows)
+        """Whether rows that are not pending cannot be what was written.
+
+        Of a row that is not needed, only the status is: what else it holds is not read.
+        """
+        written, spare = self.column(schema.CHECKSUM.name, rows), status == schema.NOT_NEEDED
+        held = np.zeros_like(written)
+        held[spare] = empty_checksums(self._file, schema.NOT_NEEDED, rows[spare])
+        held[~spare] = row_checksums(self.column, self.column(KEPT), rows[~spare])
         return np.asarray((status > schema.NOT_NEEDED) | (written != held))
 
     def tasks(self) -> Tasks:

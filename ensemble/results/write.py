@@ -5,6 +5,7 @@ So a row whose status is not "pending" is a whole one, and its checksum is that 
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
@@ -13,12 +14,13 @@ from typing import Any, Self
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from adhesis.ensemble.errors import WriteError, reason
 from adhesis.ensemble.results import schema
-from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
+from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum, empty_checksums
 from adhesis.ensemble.results.disk_file import DiskFile
+from adhesis.ensemble.results.read import stretches
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row
 from adhesis.solver.runtime.uninterrupted import signals_held
@@ -28,6 +30,7 @@ _NAMES = frozenset(d.name for d in RESULT_DATASETS)
 
 # Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
 _LONGEST_NAME = 200
+_BLOCK_BYTES = 16 * 2**20  # of rows that are emptied at once
 _DESCRIPTORS = Path("/proc/self/fd")  # of Linux
 
 
@@ -61,7 +64,8 @@ class Writer:
             except OSError as error:  # it was there when the run was prepared
                 raise WriteError(f"{self.path} could not be opened: {reason(error)}") from error
             self._datasets = {d.name: DatasetRows(self._file[d.name]) for d in schema.ROW_DATASETS}
-            self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
+            self._kept_rows = self._file[KEPT][:]
+            self._kept = {int(row): place for place, row in enumerate(self._kept_rows)}
         self._origin = origin
 
     def __enter__(self) -> Self:
@@ -102,13 +106,38 @@ class Writer:
         values = {"error": schema.encode_text(error), "wall_time": wall_time, "rank": rank}
         return self._write(row, values | self._origin_of(rank), schema.FAILED)
 
-    def reset(self, rows: Iterable[int], status: int = schema.PENDING) -> None:
-        """Empty rows, which are to be computed, or need not be; what they held is lost."""
-        for row in rows:
-            # First the status: a row that is being emptied must not be taken for a whole one.
-            with self._writing(row):
-                self._put(schema.STATUS, row, schema.PENDING)
-            self._write(row, {}, status)
+    def reset(self, rows: Iterable[int]) -> None:
+        """Empty rows (ascending), which are to be computed; what they held is lost."""
+        width = sum(rows_of.nbytes for rows_of in self._datasets.values())
+        most = max(1, _BLOCK_BYTES // width)
+        for stretch in stretches(np.fromiter(rows, np.intp)):
+            for first in range(stretch.start, stretch.stop, most):
+                last = min(first + most, stretch.stop)
+                with self._writing(first):
+                    # First the status: a row that is being emptied is not to be taken for whole.
+                    self._put(schema.STATUS, first, [schema.PENDING] * (last - first))
+                    kept = np.searchsorted(self._kept_rows, (first, last)).tolist()
+                    for dataset in (*OF_TASKS, *OF_KEPT):
+                        if dataset is not schema.STATUS:
+                            start, stop = kept if dataset.dims[0] == KEPT else (first, last)
+                            rows_of = self._datasets[dataset.name]
+                            shape = (stop - start, *rows_of.shape)
+                            rows_of.write(start, np.full(shape, dataset.fill, rows_of.dtype))
+                    self._put(schema.CHECKSUM, first, [schema.CHECKSUM.fill] * (last - first))
+
+    def mark(self, rows: Iterable[int], status: int) -> None:
+        """Mark rows (ascending) without a result as pending, or as not needed.
+
+        What else they hold is not touched: nothing, or what a run that was killed has left.
+        """
+        for stretch in stretches(np.fromiter(rows, np.intp)):
+            here = np.arange(stretch.start, stretch.stop)
+            with self._writing(stretch.start):
+                self._put(schema.STATUS, stretch.start, np.full(here.size, schema.PENDING))
+                if status == schema.NOT_NEEDED:
+                    covered = empty_checksums(self._file, status, here)
+                    self._put(schema.CHECKSUM, stretch.start, covered)
+                self._put(schema.STATUS, stretch.start, np.full(here.size, status))
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> int:
         """Write a row, its checksum (returned), and its status; what has no value is left empty.
@@ -125,15 +154,15 @@ class Writer:
                 blocks.append(rows_of.block(value))
                 if dataset is not schema.STATUS:
                     rows_of.write(place, blocks[-1])
-            covered = schema.CHECKSUM.fill if status == schema.PENDING else checksum(blocks)
-            self._put(schema.CHECKSUM, row, covered)
-            self._put(schema.STATUS, row, status)
+            covered = checksum(blocks)
+            self._put(schema.CHECKSUM, row, [covered])
+            self._put(schema.STATUS, row, [status])
         return covered
 
-    def _put(self, dataset: Dataset, row: int, value: int) -> None:
-        """Write one number of a row, and hand all that was written to the operating system."""
+    def _put(self, dataset: Dataset, first: int, values: ArrayLike) -> None:
+        """Write one number of successive rows, and hand all to the operating system."""
         rows_of = self._datasets[dataset.name]
-        rows_of.write(row, rows_of.block(value))
+        rows_of.write(first, np.asarray(values, rows_of.dtype))
         self.flush()
 
     def _origin_of(self, rank: int) -> dict[str, bytes]:
@@ -192,10 +221,14 @@ class DatasetRows:
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._id = dataset.id
         self.shape = dataset.shape[1:]
-        self._dtype = dataset.dtype
+        self.dtype = dataset.dtype
         self._space = self._id.get_space()
-        self._memory = h5py.h5s.create_simple((1, *self.shape))
         self._rest = (0,) * len(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of a row."""
+        return int(math.prod(self.shape) * self.dtype.itemsize)
 
     def block(self, value: Any) -> NDArray[Any]:
         """Return the bytes that a value of a row has in the file, shape (1, …)."""
@@ -203,13 +236,13 @@ class DatasetRows:
             raise ValueError(
                 f"{self._id.name!r} has rows of shape {self.shape}, not {np.shape(value)}"
             )
-        block = np.empty((1, *self.shape), self._dtype)
+        block = np.empty((1, *self.shape), self.dtype)
         block[0] = value
         return block
 
-    def write(self, row: int, block: NDArray[Any]) -> None:
-        """Write a row that :meth:`block` has made."""
+    def write(self, first: int, block: NDArray[Any]) -> None:
+        """Write successive rows, of the type that they have in the file."""
         if not block.size:
             return
-        self._space.select_hyperslab((row, *self._rest), (1, *self.shape))
-        self._id.write(self._memory, self._space, block)
+        self._space.select_hyperslab((first, *self._rest), block.shape)
+        self._id.write(h5py.h5s.create_simple(block.shape), self._space, block)

@@ -6,58 +6,62 @@ is complete, whatever the number of ranks and of restarts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from itertools import count
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.precision import enough, looks
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import Tasks
 
 
 @dataclass
 class _Cell:
-    rows: list[int]  # by realisation
-    values: dict[int, float] = field(default_factory=dict)  # by realisation; NaN if it failed
+    # By realisation: its row, the value of the quantity, and whether there is one
+    rows: NDArray[np.int64]
+    values: NDArray[np.float64]
+    known: NDArray[np.bool_]
+    # Of every value: 0 without adhesion, where nothing is lost and the value is rounding, or NaN
+    factor: float
     asked: int = 0
     full: bool = False
 
-    def missing(self, first: int, last: int) -> list[int]:
+    def missing(self, first: int, last: int | None = None) -> list[int]:
         """Return the rows without a value of some realisations."""
-        stretch = enumerate(self.rows[first:last], start=first)
-        return [row for realisation, row in stretch if realisation not in self.values]
+        found: list[int] = self.rows[first:last][~self.known[first:last]].tolist()
+        return found
 
 
 class Batches:
-    """The cells of a campaign with ``[stop]``.
+    """The cells of a whole campaign with ``[stop]``.
 
-    ``values`` holds the quantity that ``[stop]`` steers, of the rows that have been computed; NaN
-    of those that failed.
+    ``values`` holds the quantity that ``[stop]`` steers, of all rows, NaN of those that failed;
+    ``known`` which of them have been computed.
     """
 
-    def __init__(self, campaign: Campaign, tasks: Tasks, values: Mapping[int, float]) -> None:
+    def __init__(
+        self, campaign: Campaign, values: NDArray[np.float64], known: NDArray[np.bool_]
+    ) -> None:
         assert campaign.stop.relative_error is not None
         self._wanted = campaign.stop.relative_error
         self._looks = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
-        self._tasks = tasks
-        self._cells: dict[tuple[float, ...], _Cell] = {}
-        for row, task in enumerate(tasks):
-            self._cells.setdefault(task.cell, _Cell([])).rows.append(row)
-        for row, value in values.items():
-            self._keep(row, value)
-        for cell in self._cells.values():
+        self._realisations = campaign.realisations
+        self._cells = []
+        for task, rows in campaign.tasks().by_cell():
+            factor = float(task.work_of_adhesion > 0)
+            self._cells.append(_Cell(rows, factor * values[rows], known[rows], factor))
+        for cell in self._cells:
             self._advance(cell)
 
     @property
     def to_do(self) -> list[int]:
         """Rows of the batches that are not complete."""
-        return [row for cell in self._cells.values() for row in cell.missing(0, cell.asked)]
+        return [row for cell in self._cells for row in cell.missing(0, cell.asked)]
 
     @property
     def not_needed(self) -> list[int]:
         """Rows without a result of the cells that have enough."""
-        cells = (cell for cell in self._cells.values() if cell.full)
-        return [row for cell in cells for row in cell.missing(0, len(cell.rows))]
+        return [row for cell in self._cells if cell.full for row in cell.missing(0)]
 
     def finished(self, row: int, value: float) -> tuple[list[int], list[int]]:
         """Take in a row's value of the quantity, NaN if it failed.
@@ -65,25 +69,19 @@ class Batches:
         Returns the rows of the cell's next batch, if this row has completed one, and those that
         need not be computed, if the cell now has enough.
         """
-        cell = self._keep(row, value)  # of a batch that was not complete: the cell is not full
+        number, realisation = divmod(row, self._realisations)
+        cell = self._cells[number]  # of a batch that was not complete: the cell is not full
+        cell.values[realisation], cell.known[realisation] = cell.factor * value, True
         before = cell.asked
         self._advance(cell)
-        further = cell.missing(before, cell.asked)
-        return further, cell.missing(0, len(cell.rows)) if cell.full else []
-
-    def _keep(self, row: int, value: float) -> _Cell:
-        task = self._tasks[row]
-        cell = self._cells[task.cell]
-        # Without adhesion nothing is lost: the value is rounding, or NaN.
-        cell.values[task.realisation] = value if task.work_of_adhesion > 0 else 0.0 * value
-        return cell
+        return cell.missing(before, cell.asked), cell.missing(0) if cell.full else []
 
     def _advance(self, cell: _Cell) -> None:
         """Ask for batches until one is not complete, or the cell has enough."""
         if cell.missing(0, cell.asked):
             return
-        known = next(r for r in count() if r not in cell.values)
-        stop = enough([cell.values[r] for r in range(known)], self._looks, self._wanted)
+        known = int(np.append(cell.known, False).argmin())  # without a gap
+        stop = enough(cell.values[:known], self._looks, self._wanted)
         cell.full = stop is not None
         if stop is None:
             cell.asked = next(look for look in self._looks if look > known)

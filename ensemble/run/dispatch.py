@@ -49,6 +49,7 @@ from typing import Any, Protocol
 
 from adhesis.ensemble.run.interrupt import in_main_thread, raised_by_handler
 from adhesis.ensemble.run.schedule import Schedule
+from adhesis.solver.checks import counted
 
 # Called by a task now and then, perhaps with a note on how far it is; it raises to end the task.
 StopCheck = Callable[..., None]
@@ -197,7 +198,8 @@ class Master:
     def _consider_stopping(self) -> None:
         if self._halted is not None:
             if self.clock() - self._halted > self.limits.grace:
-                raise Unresponsive(f"{len(self.notes)} tasks did not stop in time ({self._reason})")
+                tasks = counted(len(self.notes), "task")
+                raise Unresponsive(f"{tasks} did not stop in time ({self._reason})")
         elif (reason := self.limits.stop()) is not None:
             self._halt(reason)
 

@@ -17,6 +17,7 @@ from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.results import schema
 from adhesis.ensemble.results.layout import Source, check_space, create
 from adhesis.ensemble.results.read import Results
@@ -31,6 +32,8 @@ Group = tuple[float, ...]
 """Cell of the tasks that take about the same time: of those that share a loading branch, without
 their turning point."""
 _MOST_SHOWN = 10
+# Bytes of a file that some disks take more than ten seconds for.
+_LONG_TO_LAY_OUT = 10**9
 _AGAIN = "; this run computes damaged rows again"
 
 
@@ -48,10 +51,12 @@ class Selection:
             known = np.unique(tasks.column(name)).tolist()
             for value in chosen:
                 if value not in known:
-                    values = ", ".join(f"{v:g}" for v in known[:_MOST_SHOWN])
+                    is_alike = f"{value:g}" in {f"{v:g}" for v in known}
+                    spelt: Callable[[float], str] = repr if is_alike else "{:g}".format
+                    values = ", ".join(map(spelt, known[:_MOST_SHOWN]))
                     more = ", …" if len(known) > _MOST_SHOWN else ""
                     raise InputError(
-                        f"{parameter(name)} is {value:g}: this campaign has no such task, "
+                        f"{parameter(name)} is {spelt(value)}: this campaign has no such task, "
                         f"only {values}{more}"
                     )
 
@@ -103,8 +108,8 @@ def tasks_of(campaign: Campaign, part: Part) -> Tasks:
         )
     if not tasks:
         raise InputError(
-            f"part is {part}: the campaign has {campaign.task_count} tasks and so at most as many "
-            "parts"
+            f"part is {part}: the campaign has {counted(campaign.task_count, 'task')} and so at "
+            "most as many parts"
         )
     return tasks
 
@@ -138,6 +143,8 @@ def prepare(
 
     def lay_out(sources: Sequence[Source] = (), **attributes: Any) -> None:
         check_space(path, campaign, part)
+        if (size := schema.file_size(campaign, part)) > _LONG_TO_LAY_OUT:
+            say(f"{path}: laying out {bytes_text(size)}")
         for task in tasks.of_cells():
             check_cell(task)
         created = versions() | attributes
@@ -148,7 +155,7 @@ def prepare(
     if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
         raise InputError(f"{path} cannot be written: permission denied")
     lock.acquire(size, options.patience)
-    grown = ""
+    new: NDArray[np.intp] | None = None  # rows that came when the file grew
     is_new = not os.path.exists(path)
     if is_new:
         lay_out()
@@ -156,9 +163,11 @@ def prepare(
         with Results(path) as old:
             grown_keys = _growth(path, old, campaign, part)
             if grown_keys:
-                source = Source(old, campaign, old.status() != schema.DAMAGED)
+                # Which rows are not needed is decided anew.
+                taken = np.isin(old.status(), (schema.DONE, schema.FAILED))
+                source = Source(old, campaign, taken)
                 lay_out([source], created=old.attributes.get("created"))
-                grown = f", {len(tasks) - len(old)} of them new"
+                new = np.setdiff1d(np.arange(len(tasks)), source.target)
                 if old.damaged().size:
                     say(f"{old.damage()}{_AGAIN}")
     with Results(path) as results:
@@ -179,18 +188,20 @@ def prepare(
         with Writer(path) as writer:
             writer.reset(again)
             if plan.batches is not None:
-                spare = plan.batches.not_needed
-                unneeded = [row for row in spare if status[row] == schema.PENDING]
-                writer.reset(unneeded, schema.NOT_NEEDED)
-                wanted = set(np.flatnonzero(status == schema.NOT_NEEDED).tolist()) - set(spare)
-                writer.reset(sorted(wanted))
+                spare = np.zeros(status.size, bool)
+                spare[plan.batches.not_needed] = True
+                is_marked = status == schema.NOT_NEEDED
+                writer.mark(np.flatnonzero(spare & ~is_marked), schema.NOT_NEEDED)
+                writer.mark(np.flatnonzero(is_marked & ~spare), schema.PENDING)
     if is_new:
-        say(f"{path}: {len(plan.rows)} tasks to do{' at first' if plan.batches else ''}")
+        at_first = " at first" if plan.batches else ""
+        say(f"{path}: {counted(len(plan.rows), 'task')} to do{at_first}")
         return plan
     again_by = parameter("redo", "adhesis run")
+    grown = "" if new is None else f", {np.isin(plan.rows, new).sum()} of them new"
     planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
     say(
-        f"{path}: {plan.done} of {planned} tasks done, {len(plan.rows)} to do{grown}"
+        f"{path}: {plan.done} of {counted(planned, 'task')} done, {len(plan.rows)} to do{grown}"
         + (f", {plan.failed} failed before (see {again_by} failed)" if plan.failed else "")
     )
     return plan
@@ -214,20 +225,20 @@ def _growth(path: Path, old: Results, campaign: Campaign, part: Part) -> tuple[s
 
 
 def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
-    tasks = results.tasks()
+    campaign, tasks = results.campaign, results.tasks()
     times: dict[Group, tuple[float, int]] = {}
-    seconds = results.column("wall_time").tolist()
-    for row in np.flatnonzero(status == schema.DONE).tolist():
-        group = results.campaign.branch_of(tasks[row]).cell
-        sum_before, count = times.get(group, (0.0, 0))
-        times[group] = (sum_before + seconds[row], count + 1)
+    seconds = results.column("wall_time")
+    for task, of_cell in tasks.by_cell():
+        done = of_cell[status[of_cell] == schema.DONE]
+        if done.size:
+            sum_before, count = times.get(group_of(campaign, task), (0.0, 0))
+            known = (sum_before + float(seconds[done].sum()), count + done.size)
+            times[group_of(campaign, task)] = known
     rows, batches = np.flatnonzero(status == schema.PENDING).tolist(), None
     is_known = np.isin(status, (schema.DONE, schema.FAILED))
-    if results.campaign.stop.relative_error is not None:
-        steered = results.column(results.campaign.stop.quantity)
-        values = np.where(status == schema.FAILED, np.nan, steered)
-        known = {row: float(values[row]) for row in np.flatnonzero(is_known).tolist()}
-        batches = Batches(results.campaign, tasks, known)
+    if campaign.stop.relative_error is not None:
+        steered = results.column(campaign.stop.quantity)
+        batches = Batches(campaign, np.where(status == schema.FAILED, np.nan, steered), is_known)
         rows = batches.to_do
     return Plan(
         tasks=tasks,
@@ -238,6 +249,11 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         known=np.where(is_known, results.column(schema.CHECKSUM.name).astype(np.int64), -1),
         times=times,
     )
+
+
+def group_of(campaign: Campaign, task: Task) -> Group:
+    """Return the group of a task; those of one group and realisation share a loading branch."""
+    return campaign.branch_of(task).cell
 
 
 def prior(task: Task) -> float:

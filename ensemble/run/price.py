@@ -18,7 +18,7 @@ from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
-from adhesis.ensemble.quantities import duration, percent
+from adhesis.ensemble.quantities import bytes_text, duration, percent
 from adhesis.ensemble.results.layout import rows_in
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
@@ -82,19 +82,19 @@ class Price:
     def __str__(self) -> str:
         """Return the lines of ``adhesis run --dry-run``."""
         tried = (
-            f"{self.pilots} pilot loops of {duration(self.pilot_seconds)} in all"
+            f"{counted(self.pilots, 'pilot loop')} of {duration(self.pilot_seconds)} in all"
             if self.pilots
             else "the loops that are done"
         )
-        memory = f", about {self.rank_bytes / 1e6:.0f} MB of memory a rank" if self.left else ""
+        memory = f", about {bytes_text(self.rank_bytes)} of memory a rank" if self.left else ""
         lines = [
-            f"{self.left} tasks to do in {len(self.cells)} cells, {self.done} done; "
-            "nothing was written",
+            f"{counted(self.left, 'task')} to do in {counted(len(self.cells), 'cell')}, "
+            f"{self.done} done; nothing was written",
             *([self.stop] if self.stop else []),
             *([self._short()] if self.pilots_short else []),
             f"{self.seconds / 3600:.3g} core hours, by {tried}; "
             f"the longest task takes about {duration(self.longest)}",
-            f"results file {self.file_bytes / 1e6:.3g} MB{memory}",
+            f"results file {bytes_text(self.file_bytes)}{memory}",
         ]
         if self.left:
             lines.append(f"one process takes {duration(self.makespan(1))}")
@@ -114,7 +114,8 @@ class Price:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        return f"<Price: {self.left} of {self.tasks} tasks to do, {duration(self.seconds)} of CPU>"
+        left = f"{self.left} of {counted(self.tasks, 'task')} to do"
+        return f"<Price: {left}, {duration(self.seconds)} of CPU>"
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
@@ -304,7 +305,7 @@ def _realisations(campaign: Campaign, known: Known) -> tuple[int, str]:
     count = fewest(at, (1.96 * spread / campaign.stop.relative_error) ** 2)
     return count, (
         f"[stop]: about {count} realisations a cell, as {campaign.stop.quantity} of "
-        f"{sum(of_cell.size for of_cell in values)} loops "
+        f"{counted(sum(of_cell.size for of_cell in values), 'loop')} "
         f"scatters by {percent(spread)} so far; at least {few}, at most {at[-1]}"
     )
 

@@ -9,6 +9,7 @@ from typing import TextIO
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.reporter import Display
+from adhesis.solver.checks import counted
 
 _MOST_FAILURES_SHOWN = 5
 
@@ -24,12 +25,12 @@ class Summary:
     # computed, failed_now: of these, by this run
     computed: int = 0
     failed_now: int = 0
-    # Losses of those computed now whose own checks say that they are wrong
-    # (:mod:`adhesis.ensemble.task.doubt`)
+    # At the end, of all tasks in the file: losses whose own checks say that they are wrong, losses
+    # of the zero-range limit alone (:mod:`adhesis.ensemble.task.doubt`), and loops that turned
+    # before their preload was reached
     doubtful: int = 0
-    # Losses of those computed now that are those of the zero-range limit alone
-    # (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`)
     beyond_limit: int = 0
+    short_of_preload: int = 0
     seconds: float = 0.0
     stopped: str | None = None  # why it stopped before the last task
     # With ``[stop]``: name of every cell, and how well the mean of its quantity is known
@@ -43,7 +44,7 @@ class Summary:
     def __str__(self) -> str:
         failed = f", {self.failed} failed" if self.failed else ""
         now = f"{self.computed} computed in {duration(self.seconds)}"
-        return f"{self.done} of {self.total} tasks done{failed}; {now}"
+        return f"{self.done} of {counted(self.total, 'task')} done{failed}; {now}"
 
 
 class ProgressLine(Display):
@@ -61,6 +62,7 @@ class ProgressLine(Display):
         super().__init__(self._line, stream, at_once=True)
         self._counts = counts
         self._time_left = time_left
+        self._doubtful = 0
 
     def failure(self, what: str, error: str) -> None:
         """Report a failed task that is counted: the first ones each, then only their number."""
@@ -70,13 +72,14 @@ class ProgressLine(Display):
             self.say("further failures are counted here and listed by `adhesis status`")
 
     def doubt(self, what: str) -> None:
-        """Report a loss that is counted as doubtful: the first ones each."""
-        if self._counts.doubtful <= _MOST_FAILURES_SHOWN:
+        """Report a doubtful loss: the first ones each."""
+        self._doubtful += 1
+        if self._doubtful <= _MOST_FAILURES_SHOWN:
             self.say(f"doubtful loss: {what}")
 
     def _line(self, seconds: float) -> str:
         c = self._counts
-        parts = [f"{c.done} of {c.total} tasks done"]
+        parts = [f"{c.done} of {counted(c.total, 'task')} done"]
         if c.failed_now:
             parts.append(f"{c.failed_now} failed")
         if c.computed:

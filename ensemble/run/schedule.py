@@ -5,13 +5,13 @@ realisations): a round is handed out before the next one begins, so that a run w
 leaves averages over about as many realisations in every cell. Within a round the longest go first,
 so that the ranks end together: a round is put into order when it begins. Before anything is known,
 a group's prior says how long its tasks take compared with the others; each measured time corrects
-it. Tasks that share work go out together, as one unit.
+it. Tasks of one group and round share work, and go out together, as one unit.
 """
 
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 Unit = tuple[int, ...]
@@ -30,21 +30,20 @@ class _Group:
 class Schedule:
     """Tasks that wait, ordered by round and estimated time.
 
-    The mappings also hold the tasks that are added later. ``priors`` are relative times of a task
-    of each group, positive. Tasks with the same value in ``key_of`` that are added at once are a
-    unit.
+    ``group_of`` and ``round_of`` also hold the tasks that are added later. ``priors`` are relative
+    times of a task of each group, positive. Tasks of one group and round that are added at once are
+    a unit.
     """
 
     def __init__(
         self,
         tasks: Iterable[int],
-        group_of: Mapping[int, Hashable],
+        group_of: Mapping[int, Hashable] | Sequence[Hashable],
         priors: Mapping[Hashable, float],
-        round_of: Mapping[int, int],
-        key_of: Mapping[int, Hashable] | None = None,
+        round_of: Mapping[int, int] | Sequence[int],
     ) -> None:
         self._groups = {name: _Group(prior) for name, prior in priors.items()}
-        self.group_of, self._round_of, self._key_of = group_of, round_of, key_of or {}
+        self.group_of, self._round_of = group_of, round_of
         self._rounds: dict[int, list[Unit]] = {}
         self._turns: list[int] = []  # these rounds, ascending
         self._ordered: set[int] = set()  # rounds whose units stand in order, the longest last
@@ -56,8 +55,8 @@ class Schedule:
         """Let further tasks wait."""
         units: dict[Hashable, list[int]] = {}
         for task in tasks:
-            key = self._key_of.get(task)
-            units.setdefault((task,) if key is None else key, []).append(task)
+            key = (self.group_of[task], self._round_of[task])
+            units.setdefault(key, []).append(task)
         for unit in units.values():
             turn = self._round_of[unit[0]]
             if turn not in self._rounds:

@@ -26,15 +26,16 @@ from adhesis.ensemble.run import dispatch
 from adhesis.ensemble.run.dispatch import Outcome, StopCheck
 from adhesis.ensemble.run.interrupt import GRACE, StopSignals
 from adhesis.ensemble.run.lock import RunLock
-from adhesis.ensemble.run.plan import Options, Plan, prepare, prior
+from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
 from adhesis.ensemble.run.processes import Processes
 from adhesis.ensemble.run.progress import ProgressLine, Summary
 from adhesis.ensemble.run.ranks import MpiChannel, OneRank, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.task.compute import Runner, check_task
-from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, errors_text
+from adhesis.ensemble.task.doubt import OF_DOUBT, doubtful, errors_text
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.path_record import Progress
 
 ComputeLoop = Callable[[Campaign, Task, Progress | None], Row]
@@ -190,23 +191,25 @@ class _Session:
             return master.run()
 
     def summary(self, stopped: str | None, path: Path) -> Summary:
-        """Return the counts, and how the run has ended.
+        """Return the counts, what is doubtful in the file, and how the run has ended.
 
         What is finished is read once more: another program may have written to the file
         (InputError, WriteError), or have copied another one over it.
         """
         summary, known = self._counts, self.plan.known
-        if self.plan.rows or self.plan.batches is not None:
-            with Results(path) as results:
-                finished = np.isin(results.status(), (DONE, FAILED))
-                held = np.sum(finished & (results.column(CHECKSUM.name) == known))
-                if self.plan.batches is not None:
-                    summary.precisions = precisions(read_cells(results))
-            if held < (count := np.sum(known >= 0)):
-                raise WriteError(
-                    f"{path} holds {held} of {count} finished tasks: another program has "
-                    "changed it while a run wrote to it"
-                )
+        with Results(path) as results:
+            finished = np.isin(results.status(), (DONE, FAILED))
+            held = np.sum(finished & (results.column(CHECKSUM.name) == known))
+            cells = read_cells(results)
+        if held < (count := np.sum(known >= 0)):
+            raise WriteError(
+                f"{path} holds {held} of {count} finished tasks: another program has "
+                "changed it while a run wrote to it"
+            )
+        summary.precisions = precisions(cells)
+        summary.doubtful = sum(int(cell.doubtful.sum()) for cell in cells)
+        summary.beyond_limit = sum(int(cell.beyond_zero_range.sum()) for cell in cells)
+        summary.short_of_preload = sum(cell.short_of_preload for cell in cells)
         summary.seconds = time.monotonic() - self._started
         summary.stopped = stopped if summary.pending else None
         return summary
@@ -234,27 +237,26 @@ class _Session:
         else:
             counts.done += 1
             counts.computed += 1
-            stiffness = self.campaign.at(self.plan.tasks[outcome.task]).cycle.stiffness
-            counts.beyond_limit += bool(beyond_zero_range(row, stiffness))
             if doubtful(row, self.campaign.solver.accuracy):
-                counts.doubtful += 1
                 progress.doubt(f"{what}: {errors_text(row)}")
         if self.plan.batches is not None:
             steered = self.campaign.stop.quantity
             value = math.nan if outcome.error is not None else float(row[steered])
             further, spare = self.plan.batches.finished(outcome.task, value)
             assert self.writer is not None
-            self.writer.reset(spare, NOT_NEEDED)
+            self.writer.mark(spare, NOT_NEEDED)
             self._counts.total += len(further)
             schedule.add(further)
 
     def _schedule(self) -> Schedule:
-        tasks = self.plan.tasks
-        branches = {row: self.campaign.branch_of(task) for row, task in enumerate(tasks)}
-        groups = {row: branch.cell for row, branch in branches.items()}
-        priors: dict[Hashable, float] = {groups[row]: prior(task) for row, task in enumerate(tasks)}
-        rounds = {row: task.realisation for row, task in enumerate(tasks)}
-        schedule = Schedule(self.plan.rows, groups, priors, rounds, branches)
+        groups: list[Group] = []  # of each task
+        priors: dict[Hashable, float] = {}
+        for task, rows in self.plan.tasks.by_cell():
+            group = group_of(self.campaign, task)
+            groups += [group] * rows.size
+            priors[group] = prior(task)
+        rounds = self.plan.tasks.column("realisation").tolist()
+        schedule = Schedule(self.plan.rows, groups, priors, rounds)
         for group, (seconds, count) in self.plan.times.items():
             schedule.measured(group, seconds, count)
         return schedule
@@ -269,7 +271,7 @@ class _Session:
         most = self.options.max_failures
         if most is not None and self._counts.failed_now >= most:
             limit = f"{parameter('max_failures', 'adhesis run')} {most}"
-            return f"{self._counts.failed_now} tasks failed (the limit is {limit})"
+            return f"{counted(self._counts.failed_now, 'task')} failed (the limit is {limit})"
         return None
 
     def _time_left(self) -> float | None:

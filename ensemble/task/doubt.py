@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from adhesis.ensemble.quantities import percent, stress_text
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import (
     ANY_RANGE,
     DOUBTFUL_EXCESS,
@@ -32,8 +33,8 @@ _OF_LIMIT = (
     *("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction"),
     *("opening_strength", "barrier", "edge_range", "touch_range", "turn_range", "gamma_open"),
 )
-OF_DOUBT = ("audit_residual", "loss_error", "pull_off_stress", *_OF_LIMIT)
-"""Numbers of a row from which its loss is judged."""
+OF_DOUBT = ("audit_residual", "loss_error", "loss", "work_of_adhesion")
+"""Numbers of a row from which :func:`doubtful` decides."""
 INSTEAD = "Rougher profiles, a stiffer material or a smaller preload let loops reach it"
 
 
@@ -51,6 +52,12 @@ def why_beyond(opens: bool) -> str:
         "work of adhesion of the largest contact, so that an interface of finite range would lose "
         "less (docs/zero-range.md)"
     )
+
+
+def doubtful_losses(count: int, why: str, of: int | None = None) -> str:
+    """Return "2 losses are doubtful: …", or "1 of 3 losses is doubtful, as …"."""
+    counts = counted(count, "loss") if of is None else f"{count} of {counted(of, 'loss')}"
+    return f"{counts} {'is' if count == 1 else 'are'} doubtful{why}"
 
 
 def errors_text(row: Mapping[str, Any]) -> str:

@@ -104,7 +104,7 @@ class SimulatedRanks(Scripted):
 
 
 def schedule_of(tasks, group_of, key_of=None):
-    """Return a schedule in which every group has one task, or unit, a round."""
+    """Return a schedule in which every group has one task, or those with one key, a round."""
     met: dict[object, list[object]] = {}
     rounds = {}
     for task in tasks:
@@ -112,7 +112,7 @@ def schedule_of(tasks, group_of, key_of=None):
         if key not in keys[-1:]:
             keys.append(key)
         rounds[task] = len(keys)
-    return Schedule(tasks, group_of, dict.fromkeys(met, 1.0), rounds, key_of)
+    return Schedule(tasks, group_of, dict.fromkeys(met, 1.0), rounds)
 
 
 def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **ranks):

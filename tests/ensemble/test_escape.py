@@ -10,7 +10,7 @@ import adhesis
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.escape import code_span, markdown, one_line, printable
+from adhesis.ensemble.escape import code_span, markdown, one_line, printable, shell_word
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
@@ -48,6 +48,11 @@ def test_a_text_from_a_file_is_shown_letter_by_letter(text, shown):
 
 def test_control_characters_are_spelled_out_and_letters_stay():
     assert printable("γ = 0.04 J/m² – «ok»\n\tnext") == "γ = 0.04 J/m² – «ok»\n\tnext"
+    assert [shell_word(name) for name in ("a b.h5", "-x.h5", "é.h5")] == [
+        "'a b.h5'",
+        "./-x.h5",
+        "'é.h5'",
+    ]
     assert printable("\x1b[31mred\x07 \x9b2J\r\u202e\udce9") == (
         r"\x1b[31mred\x07 \x9b2J\r\u202e\udce9"
     )

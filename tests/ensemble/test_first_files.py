@@ -13,7 +13,7 @@ from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
-from tests.support.campaign_support import ROOT
+from tests.support.campaign_support import ROOT, run_python
 from tests.support.processes import ran
 
 KEYS = [(name, entry.name) for name, table in TABLES.items() for entry in dataclasses.fields(table)]
@@ -37,6 +37,17 @@ def test_a_new_campaign_runs_as_it_is(tmp_path, monkeypatch, capsys):
     campaign = load_campaign("my.toml")
     assert campaign.task_count == 6
     assert campaign.profile.period == 2e-3
+
+
+def test_templates_and_captions_are_those_without_docstrings_too() -> None:
+    code = (
+        "from adhesis.ensemble.campaign.template import campaign_template\n"
+        "from adhesis.ensemble.report.figures.catalogue import ALL\n"
+        "print(campaign_template(), [(item.title, item.caption) for item in ALL])"
+    )
+    plain, stripped = run_python("-c", code), run_python("-OO", "-c", code)
+    assert "A caret at 0 marks an interval" in plain.stdout
+    assert stripped.stdout == plain.stdout
 
 
 def test_a_new_campaign_lists_every_key_of_the_page() -> None:

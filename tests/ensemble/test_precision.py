@@ -4,6 +4,7 @@ import csv
 import json
 import shutil
 
+import h5py
 import numpy as np
 import pytest
 
@@ -22,8 +23,10 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.interval import estimates, interval
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.write_report import write_report
+from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
+from adhesis.ensemble.results.write import DatasetRows
 from adhesis.ensemble.run.session import Options, run_campaign
 from benchmarks.precision_coverage import cells_of_the_study, of_the_study
 from tests.support import synthetic_results
@@ -232,6 +235,49 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity,
     again = adhesis_here("run", path, "--out", out, fake="")
     assert out.read_bytes() == before
     assert precision_lines(summary.precisions)[1] in again.stderr.splitlines()
+
+
+def test_rows_that_are_not_needed_are_marked_at_once_and_not_read(tmp_path, monkeypatch):
+    """What a run writes and readers read does not grow with the most that a cell may take."""
+    written, read = [], []
+    write, of_rows = DatasetRows.write, row_checksums
+
+    def writing(self, first, block):
+        written.append(first)
+        write(self, first, block)
+
+    def reading(column, kept, rows):
+        read.append(rows.size)
+        return of_rows(column, kept, rows)
+
+    monkeypatch.setattr(DatasetRows, "write", writing)
+    monkeypatch.setattr("adhesis.ensemble.results.read.row_checksums", reading)
+    counts = []
+    for most in (80, 8000):
+        path, out = tmp_path / f"{most}.toml", tmp_path / f"{most}.h5"
+        path.write_text(text(0.25, most))
+        written.clear()
+        done = run(path, out).done
+        read.clear()
+        assert read_status(out)["not_needed"] == 2 * most - done
+        assert read == [done]
+        counts.append((done, len(written)))
+    assert counts[0] == counts[1]
+    # A wish for more makes them pending, and nothing more is written of those.
+    path.write_text(text(0.24, 8000))
+    written.clear()
+    second = run(path, out)
+    assert len(written) < 100 * (1 + second.computed)
+
+
+def test_a_row_whose_status_turns_into_not_needed_is_damaged(tmp_path, finished):
+    out = shutil.copy(finished[0], tmp_path / "r.h5")
+    with h5py.File(out, "r+") as file:
+        for row in (0, 1):
+            file["status"][row] = NOT_NEEDED
+        file["status"][2] = PENDING
+    with Results(out) as results:
+        assert results.damaged().tolist() == [0, 1]
 
 
 def test_a_cell_without_adhesion_has_enough_with_the_least_number(tmp_path):

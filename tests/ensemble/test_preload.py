@@ -288,6 +288,9 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"
     file.write_text(text_of('preload = [100, "1 MPa"]', realisations="1"))
     assert main(["run", str(file), "--out", str(out)]) == 0
+    assert f"1 loop did not reach the preload (adhesis status {out})" in capsys.readouterr().err
+    with pytest.warns(UserWarning, match="^1 loop did not reach the preload$"):
+        adhesis.Campaign(file).run(out, progress=False)
     (sentence,) = (s for s in findings.quality(aggregate(out)) if "did not reach" in s)
     assert "WARNING: 1 of 2 loops did not reach their preload, and turned at the latest" in sentence
     with adhesis.open(out) as results:

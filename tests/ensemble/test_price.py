@@ -186,7 +186,7 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
     create(path, campaign)
     write_results(path, campaign, range(72), cpu_time=7.0)
     with Writer(path) as writer:
-        writer.reset(range(72, 200), NOT_NEEDED)
+        writer.mark(range(72, 200), NOT_NEEDED)
     reported = price(campaign, path, compute=compute, seconds=-1.0)
     assert reported.done == 72
     assert reported.cells[0].tasks == 0

@@ -147,4 +147,6 @@ def test_a_value_has_the_digits_of_its_error_and_its_interval_keeps_to_its_bound
 
 
 def test_a_small_size_is_not_zero() -> None:
-    assert [bytes_text(size) for size in (0, 345_678, 12_345_678)] == ["0 kB", "346 kB", "12 MB"]
+    assert [bytes_text(size) for size in (0, 345_678, 12_345_678, 65_600_000_000)] == [
+        *("0 kB", "346 kB", "12 MB", "65.6 GB")
+    ]

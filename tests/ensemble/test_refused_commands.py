@@ -55,6 +55,8 @@ run c.toml --hurst 0.7 -> --hurst needs --redo: it chooses the tasks to compute 
 run c.toml --redo all --hurst {{x,-1,nan}} -> --hurst is '{{}}'
 run c.toml --redo all --work-of-adhesion 40 ->
     --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
+run c.toml --out r.h5 --redo failed --hurst 0.70000000001 ->
+    --hurst is 0.70000000001: this campaign has no such task, only 0.7, 0.8
 run c.toml --out r.h5 --redo failed --hurst 0.75 ->
     --hurst is 0.75: this campaign has no such task
 run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5

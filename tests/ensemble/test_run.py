@@ -13,9 +13,12 @@ import numpy as np
 import pytest
 import xarray
 
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.report import findings
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.run import session
@@ -205,6 +208,26 @@ def test_a_doubtful_loss_is_said(tmp_path):
     assert "realisation 1" in text
     status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert [d["row"] for d in status["doubtful"]] == [1, 3]
+    again, _ = run(tmp_path)  # of a file that is finished, too
+    assert "2 losses are doubtful: by their own account they may be off" in again.stderr
+
+
+def test_what_there_is_one_of_is_said_in_the_singular_and_rounding_is_no_loss(tmp_path):
+    one = {"hurst": "[0.7]", "work_of_adhesion": "[0.01]", "realisations": "1"}
+    process, out = run(tmp_path, fake="doubt=*:*:*", **one)
+    assert "r.h5: 1 task to do\n" in process.stderr
+    assert "r.h5: 1 of 1 task done; 1 computed in" in process.stderr
+    assert "1 loss is doubtful: by its own account it may be off by more" in process.stderr
+    shown = as_text(read_status(out))
+    assert "r.h5: 1 task, 1 done" in shown
+    assert "1 loss is doubtful: by its own account less accurate" in shown
+    said = [*findings.quality(aggregate(out)), *findings.missing(aggregate(out))]
+    assert any("WARNING: 1 of 1 loss is doubtful, as its audit" in text for text in said)
+    without = {"loss": -5e-12, "loss_standard_error": 1e-11, "work_of_adhesion": 0.0}
+    status = read_status(out)
+    status["groups"][0] |= without
+    (line,) = (line for line in as_text(status).splitlines() if line.startswith("  0.7 "))
+    assert line.split()[-1] == "0"
 
 
 def test_too_many_failures_stop_the_run(tmp_path):

@@ -207,6 +207,8 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
     with Writer(path) as writer:
         writer.write_result(0, first)
         writer.write_failure(1, "ValueError: no", 2.5)
+        writer.reset([0])
+        writer.write_result(0, first)
         writer.reset([0, 1])
         writer.write_result(0, second)
         writer.write_result(1, fake_result(campaign, tasks[1]))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.campaign.tables import TURNING_POINTS, Axis
@@ -60,75 +59,148 @@ def _several(name: str) -> Callable[[Aggregate], bool]:
     return lambda data: len({getattr(cell, name) for cell in data.cells if cell.done}) > 1
 
 
-def _figure(
-    name: str, draw: Callable[[Aggregate], PublishedFigure], of_paper: str = "", **options: Any
-) -> Illustration:
-    """Return a figure: its title and caption are the docstring of its function, as far as a gap."""
-    title, caption, *_ = [*(draw.__doc__ or name).split("\n\n"), ""]
-    return Illustration(
-        name, title.rstrip("."), " ".join(caption.split()), draw, of_paper, **options
-    )
-
-
 _ENDS = (
     "Loops that turn at one mean stress turn at different penetrations: a curve ends where the "
     "first of its realisations turns, and its branches need not meet."
 )
 LOOPS = (
-    _figure("fig6_contact_against_stress", contact_against_stress, "Fig. 6", at_stress=_ENDS),
-    _figure("fig7_loop_against_penetration", loop_against_penetration, "Fig. 7", at_stress=_ENDS),
+    Illustration(
+        "fig6_contact_against_stress",
+        "Contact fraction against mean stress",
+        "Means over realisations, taken at equal penetration; σ~ = 2p̄/(E* q0 h_max) with each "
+        "realisation's own h_max, compression positive. Shading: one standard deviation of A/A0 "
+        "of a single realisation.",
+        contact_against_stress,
+        "Fig. 6",
+        at_stress=_ENDS,
+    ),
+    Illustration(
+        "fig7_loop_against_penetration",
+        "Mean stress and contact fraction against penetration",
+        "Lines: means over realisations; shading: one standard deviation of a single realisation. "
+        "A realisation that has detached counts with zero.",
+        loop_against_penetration,
+        "Fig. 7",
+        at_stress=_ENDS,
+    ),
 )
 LOSSES = (
-    _figure(
-        *("table1_losses", loss_figures.loss_against_hurst, "Table 1"),
+    Illustration(
+        "table1_losses",
+        "Loss of each H and work of adhesion",
+        "Means with 95 % intervals, a panel for each γ. A caret at 0 marks an interval that goes "
+        "on below.",
+        loss_figures.loss_against_hurst,
+        "Table 1",
         beside_paper="Stars: the paper's values, which have no error.",
         is_worth=_several("hurst"),
     ),
-    _figure(
-        *("loss_against_m2", loss_figures.loss_against_slope),
+    Illustration(
+        "loss_against_m2",
+        "Loss against mean square slope",
+        "Means with 95 % intervals, a panel for each γ, a point for each H. A caret at 0 marks an "
+        "interval that goes on below.",
+        loss_figures.loss_against_slope,
         beside_paper="Stars: the paper's values, at the m2 that it quotes.",
         is_worth=_several("hurst"),
     ),
 )
 # A figure of states of which fields are kept.
 _of_states = partial(
-    _figure,
+    Illustration,
     at_stress="Loops turn at a mean stress, and states are at parts of it instead of penetrations.",
     is_worth=lambda data: any(map(has_fields, data.cells)),
 )
 FIELDS = (
-    _figure(
-        *("fig3_shapes", fields.shapes, "Fig. 3"),
+    Illustration(
+        "fig3_shapes",
+        "Deformed shapes",
+        "The first realisation that kept its fields: rigid profile h, and the elastic surface "
+        "above it on both branches, at the same prescribed value. In contact the two coincide. "
+        "Right: one and a half of the longest waves around the highest point, carried on across "
+        "the end of the period where it lies near one.",
+        fields.shapes,
+        "Fig. 3",
         compared_with=paper.FIGURE_3,
         beside_paper="Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
         "h_rms = 1 µm, so the states here are those that the campaign kept.",
         is_worth=lambda data: bool(shown_penetrations(data, 1) and cells_with_shape(data)),
     ),
     _of_states(
-        *("fig4_spectra_of_branches", fields.spectra_of_branches, "Fig. 4"),
+        "fig4_spectra_of_branches",
+        "Spectral density on both branches",
+        "Two-sided, mean over the realisations in contact, at one penetration. Thin lines: slopes "
+        "of a self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the "
+        "profile's highest wave number only the edges of contact have power.",
+        fields.spectra_of_branches,
+        "Fig. 4",
         compared_with=paper.FIGURE_4,
     ),
     _of_states(
-        *("fig5a_spectra_loading", fields.spectra_on_loading, "Fig. 5(a)"),
+        "fig5a_spectra_loading",
+        "Spectral density on loading",
+        "As before, at several penetrations.",
+        fields.spectra_on_loading,
+        "Fig. 5(a)",
         compared_with=paper.FIGURE_5,
     ),
     _of_states(
-        *("fig5b_spectra_unloading", fields.spectra_on_unloading, "Fig. 5(b)"),
+        "fig5b_spectra_unloading",
+        "Spectral density on unloading",
+        "As on loading. At the largest penetration both branches are one state.",
+        fields.spectra_on_unloading,
+        "Fig. 5(b)",
         compared_with=paper.FIGURE_5,
     ),
-    _of_states("fig8_gap_density", fields.gap_density, "Fig. 8", compared_with=paper.FIGURE_8),
-    _figure(
-        *("fig9_height_density", fields.height_density, "Fig. 9"),
+    _of_states(
+        "fig8_gap_density",
+        "Probability density of the separation",
+        "Gap t outside contact, in units of each realisation's h_max; the integral is the "
+        "fraction out of contact. At the largest penetration both branches are one state. "
+        "Straight part: openings beside the edges of contact grow with the square root of the "
+        "distance, and their density with t. Peaks at small t: single gaps, over a crest that is "
+        "close to touching; above the least opening t0 there the density falls as (t - t0)^-1/2. "
+        "Gaps below the axis are not shown.",
+        fields.gap_density,
+        "Fig. 8",
+        compared_with=paper.FIGURE_8,
+    ),
+    Illustration(
+        "fig9_height_density",
+        "Probability density of the heights",
+        "Rigid profiles, mean over realisations, with the Gaussian of the same variance.",
+        fields.height_density,
+        "Fig. 9",
         beside_paper="The paper's figure is at H = 0.8, with heights in units of h_max.",
     ),
 )
 MECHANISMS = (
-    _figure("loss_by_mechanism", loss_figures.loss_by_mechanism),
-    _figure(
-        *("jump_energies", loss_figures.jump_energies),
+    Illustration(
+        "loss_by_mechanism",
+        "Loss by mechanism",
+        "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
+        "large scale: patches appear, merge, split, open, vanish or pull off. Above the bars: "
+        "share of the small scale. Error bars: 95 % interval of the mean of either part. A caret "
+        "at 0 marks an interval that goes on below.",
+        loss_figures.loss_by_mechanism,
+    ),
+    Illustration(
+        "jump_energies",
+        "Distribution of the energy drops",
+        "Jumps of one loop per decade of energy drop, mean over realisations. Drops more than "
+        "eight decades below the largest are not shown. Shading: n jumps in a bin are known to "
+        "sqrt(n).",
+        loss_figures.jump_energies,
         is_worth=lambda data: any(cell.jumps.histogram.any() for cell in data.cells),
     ),
-    _figure("pull_off_stress", loss_figures.pull_off, is_worth=_several("work_of_adhesion")),
+    Illustration(
+        "pull_off_stress",
+        "Pull-off stress",
+        "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
+        "a little.",
+        loss_figures.pull_off,
+        is_worth=_several("work_of_adhesion"),
+    ),
 )
 ALL = (*LOOPS, *LOSSES, *FIELDS, *MECHANISMS)
 

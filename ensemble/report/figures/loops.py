@@ -17,12 +17,7 @@ _MARKERS_PER_CURVE = 8
 
 
 def contact_against_stress(data: Aggregate) -> style.PublishedFigure:
-    """Contact fraction against mean stress.
-
-    Means over realisations, taken at equal penetration; σ~ = 2p̄/(E* q0 h_max) with each
-    realisation's own h_max, compression positive. Shading: one standard deviation of A/A0 of a
-    single realisation.
-    """
+    """Draw the figure "Contact fraction against mean stress"."""
     figure, rows = style.row_for_each_hurst(data, 1, 16, 46)
     for (axes,), hurst in rows:
         for k, cell in style.curves_of(data, hurst):
@@ -56,11 +51,7 @@ def _shade(axes: Axes, x: Array, low: Array, high: Array, k: int) -> None:
 
 
 def loop_against_penetration(data: Aggregate) -> style.PublishedFigure:
-    """Mean stress and contact fraction against penetration.
-
-    Lines: means over realisations; shading: one standard deviation of a single realisation. A
-    realisation that has detached counts with zero.
-    """
+    """Draw the figure "Mean stress and contact fraction against penetration"."""
     figure, rows = style.row_for_each_hurst(data, 2, 13, 46, sharey="col")
     for row, hurst in rows:
         for axes, name in zip(row, ("mean_stress_dimensionless", "contact_fraction"), strict=True):

@@ -50,11 +50,7 @@ def loss_label(data: Aggregate, what: str = "loss") -> str:
 
 
 def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
-    """Loss of each H and work of adhesion.
-
-    Means with 95 % intervals, a panel for each γ. A caret at 0 marks an interval that goes on
-    below.
-    """
+    """Draw the figure "Loss of each H and work of adhesion"."""
     shown, (name, label, unit) = style.shown_gammas(data), loss_quantity(data)
     columns = min(len(shown), _MOST_BESIDE)
     rows = -(-len(shown) // columns)
@@ -82,11 +78,7 @@ def loss_against_hurst(data: Aggregate) -> style.PublishedFigure:
 
 
 def loss_against_slope(data: Aggregate) -> style.PublishedFigure:
-    """Loss against mean square slope.
-
-    Means with 95 % intervals, a panel for each γ, a point for each H. A caret at 0 marks an
-    interval that goes on below.
-    """
+    """Draw the figure "Loss against mean square slope"."""
     shown, (name, label, unit) = style.shown_gammas(data), loss_quantity(data)
     figure = style.new_figure(
         len(shown), 1, style.ONE_COLUMN, (20 + 33 * len(shown)) * style.MM, sharex=True
@@ -122,13 +114,7 @@ def _star_handle(data: Aggregate) -> list[Line2D]:
 
 
 def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
-    """Loss by mechanism.
-
-    Sum of the energy drops of one loop. Small scale: edges run inside existing patches; large
-    scale: patches appear, merge, split, open, vanish or pull off. Above the bars: share of the
-    small scale. Error bars: 95 % interval of the mean of either part. A caret at 0 marks an
-    interval that goes on below.
-    """
+    """Draw the figure "Loss by mechanism"."""
     gammas = style.spread_out(data.works_of_adhesion, style.MOST_CURVES)
     cells = data.finished(style.spread_out(data.hursts, style.MOST_PANELS), gammas)
     width = style.ONE_COLUMN if len(cells) <= _MOST_BARS else style.TWO_COLUMNS
@@ -169,11 +155,7 @@ def loss_by_mechanism(data: Aggregate) -> style.PublishedFigure:
 
 
 def jump_energies(data: Aggregate) -> style.PublishedFigure:
-    """Distribution of the energy drops.
-
-    Jumps of one loop per decade of energy drop, mean over realisations. Drops more than eight
-    decades below the largest are not shown. Shading: n jumps in a bin are known to sqrt(n).
-    """
+    """Draw the figure "Distribution of the energy drops"."""
     figure, rows = style.row_for_each_hurst(data, 2, 13, 44, sharey=True)
     occupied = _occupied(data)
     for row, hurst in rows:
@@ -207,11 +189,7 @@ def _jump_density(axes: Axes, cell: AveragedCell, small: bool, k: int, part: sli
 
 
 def pull_off(data: Aggregate) -> style.PublishedFigure:
-    """Pull-off stress.
-
-    Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart a
-    little.
-    """
+    """Draw the figure "Pull-off stress"."""
     figure = style.new_figure(1, 1, style.ONE_COLUMN, 62 * style.MM)
     axes = figure.panels[0]
     hursts = style.spread_out(data.hursts, style.MOST_CURVES)

@@ -46,12 +46,7 @@ _SLOPE: Any = {"color": "0.3", "linewidth": 0.7}
 
 
 def shapes(data: Aggregate) -> style.PublishedFigure:
-    """Deformed shapes.
-
-    The first realisation that kept its fields: rigid profile h, and the elastic surface above it on
-    both branches, at the same prescribed value. In contact the two coincide. Right: one and a half
-    of the longest waves around the highest point, carried on across the end of the period where it
-    lies near one.
+    """Draw the figure "Deformed shapes".
 
     Heights are those of the profile: on a machine or under a load the two branches have different
     separations at one prescribed value. ValueError if no cell has kept its fields.
@@ -91,12 +86,7 @@ def shapes(data: Aggregate) -> style.PublishedFigure:
 
 
 def spectra_of_branches(data: Aggregate) -> style.PublishedFigure:
-    """Spectral density on both branches.
-
-    Two-sided, mean over the realisations in contact, at one penetration. Thin lines: slopes of a
-    self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the profile's highest
-    wave number only the edges of contact have power.
-    """
+    """Draw the figure "Spectral density on both branches"."""
     panels: list[Panel] = []
     for cell in nearest(data.cells, paper.FIGURE_4):
         k = state_of(cell.plan, paper.FIGURE_4)
@@ -106,30 +96,17 @@ def spectra_of_branches(data: Aggregate) -> style.PublishedFigure:
 
 
 def spectra_on_loading(data: Aggregate) -> style.PublishedFigure:
-    """Spectral density on loading.
-
-    As before, at several penetrations.
-    """
+    """Draw the figure "Spectral density on loading"."""
     return _spectra_of_branch(data, 0)
 
 
 def spectra_on_unloading(data: Aggregate) -> style.PublishedFigure:
-    """Spectral density on unloading.
-
-    As on loading. At the largest penetration both branches are one state.
-    """
+    """Draw the figure "Spectral density on unloading"."""
     return _spectra_of_branch(data, 1)
 
 
 def gap_density(data: Aggregate) -> style.PublishedFigure:
-    """Probability density of the separation.
-
-    Gap t outside contact, in units of each realisation's h_max; the integral is the fraction out of
-    contact. At the largest penetration both branches are one state. Straight part: openings beside
-    the edges of contact grow with the square root of the distance, and their density with t. Peaks
-    at small t: single gaps, over a crest that is close to touching; above the least opening t0
-    there the density falls as (t - t0)^-1/2. Gaps below the axis are not shown.
-    """
+    """Draw the figure "Probability density of the separation"."""
     figure, rows = style.row_for_each_hurst(data, 2, 16, 46, sharey=True)
     chosen = shown_penetrations(data, style.MOST_CURVES)
     for row, hurst in rows:
@@ -154,10 +131,7 @@ def gap_density(data: Aggregate) -> style.PublishedFigure:
 
 
 def height_density(data: Aggregate) -> style.PublishedFigure:
-    """Probability density of the heights.
-
-    Rigid profiles, mean over realisations, with the Gaussian of the same variance.
-    """
+    """Draw the figure "Probability density of the heights"."""
     figure = style.new_figure(1, 1, style.ONE_COLUMN, 62 * style.MM)
     axes = figure.panels[0]
     for k, hurst in enumerate(style.spread_out(data.hursts, style.MOST_CURVES)):
