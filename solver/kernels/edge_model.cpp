@@ -62,11 +62,13 @@ void EdgeModel::follow_lengths(const Vector& step) {
     const double later = length + (is_patch ? both : -both);
     const double first = coupling_(e, f), last = first * length / later;
     coupling_(e, f) = coupling_(f, e) = last;
-    const double by_length = (is_patch ? -first : first) / later;
+    const double sign = is_patch ? -1 : 1, by_length = sign * first / later;
+    const double by_own = (first * length + sign) / later;
+    const double of_one = by_own * one.own, of_two = by_own * two.own;
     one.own +=
-        (by_length * two.opening + first * last * one.opening) * (is_patch ? both : 0.5 * step[f]);
+        0.5 * (of_one * step[e] + (by_length * two.opening + first * last * one.opening) * step[f]);
     two.own +=
-        (by_length * one.opening + first * last * two.opening) * (is_patch ? both : 0.5 * step[e]);
+        0.5 * (of_two * step[f] + (by_length * one.opening + first * last * two.opening) * step[e]);
   }
   for (size_t e = 0; e < edges.size(); ++e)
     edges[e].theta += outwards(edges[e].edge) * 0.5 * step[e];

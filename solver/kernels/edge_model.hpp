@@ -11,9 +11,10 @@
 // across a narrow gap, and less across a patch, which bears less load when it shrinks. As
 // derivatives of C_e by n_e and by n_f may be exchanged,
 //
-//     ∂own_e/∂n_f = ∂(K C_f)/∂n_e = K' (∂l/∂n_e) C_f + K² C_e,
+//     ∂own_e/∂n_f = ∂(K C_f)/∂n_e = K' (∂l/∂n_e) C_f + K² C_e.
 //
-// and beside a patch own_e changes likewise by the motion of e itself.
+// Beside a narrow gap or patch C_e depends on l alone, as a power of it: l^-Kl across a gap, which
+// n makes narrower, and l^Kl across a patch. By its own motion own_e changes as this power's slope.
 #pragma once
 
 #include "condensed.hpp"

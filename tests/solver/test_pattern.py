@@ -14,6 +14,7 @@ from adhesis import (
     Problem,
     Profile,
     make_method,
+    run_loop,
     run_path,
     single_wave,
     stripes,
@@ -132,6 +133,16 @@ def test_two_works_and_a_pattern_share_their_variation_and_are_kept_in_a_file(tm
     assert again == path
     assert (again.problem, again.numbers()) == (problem, path.numbers())
     assert f"({problem.least_work_of_adhesion:.4g} to " in str(path)
+
+
+def test_the_last_gap_goes_its_way_along_a_pattern():
+    problem = Problem(rough(1, 5, 1, hurst=0.5), SOLID, 3e-4, pattern=stripes(2, 0.4))
+    shallow, deep = (
+        run_loop(make_method("sharp", problem), max_penetration=depth, load_steps=12)
+        for depth in (0.9999, 0.99999)  # between them a gap of some 1e-10 m leaves its place
+    )
+    assert deep.loss == pytest.approx(shallow.loss, abs=deep.loss_error + shallow.loss_error)
+    assert len(deep.jumps) == len(shallow.jumps)
 
 
 def test_both_methods_agree_on_a_pattern():
