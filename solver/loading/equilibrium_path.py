@@ -99,7 +99,7 @@ class EquilibriumPath(ByValue, ResultViews):
         also the friction of the edges between the jumps.
     edge_friction : array or None
         Energy in J/m, per period, that receding edges have dissipated on the way to each state;
-        None if there is none, as with one work of adhesion.
+        None with one work of adhesion.
     loss_error : float
         Estimated numerical error of the loss or work, in J/m² (docs/methods.md, "Error of the
         loss").
@@ -599,7 +599,7 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
         )
     jumps = tuple(record.jumps)
     columns: dict[str, Any] = {name: record.column(name) for name in _ENTERED}
-    if not columns["edge_friction"].any():
+    if problem.pinning == 0:
         columns["edge_friction"] = None
     ledger = Ledger.of(problem, jumps, **columns)
     fields = columns | {

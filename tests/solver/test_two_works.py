@@ -128,6 +128,17 @@ def test_no_jump_dissipates_more_by_friction_than_it_loses(control, turn):
     assert 0 < loop.friction < loop.loss
 
 
+def test_friction_is_known_of_every_state_where_no_edge_recedes_before_the_fall():
+    """The column was left out, as with one work of adhesion."""
+    problem = Problem(
+        single_wave(A, 1e-3), SOLID, 2e-4, Control(0.0), work_of_adhesion_open=60 * 2e-4
+    )
+    loop = loop_of(problem, max_stress=300.0, load_steps=10)
+    assert not loop.patches[-1]
+    assert loop.friction == 0.0
+    np.testing.assert_array_equal(loop.columns()["edge_friction"], np.zeros(len(loop.separation)))
+
+
 def test_edges_that_are_pinned_at_both_thresholds_at_once_are_at_rest():
     """By the response of the edges on the way they moved and were pinned by turns: a refusal."""
     scene = draw(8804, 20, "pattern", decades=1.28)
