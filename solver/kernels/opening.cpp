@@ -26,7 +26,7 @@ FineOpening fine_moments(const Gap& gap, const Circle& circle, const Panels& pan
 void refine(const Gap& gap, const Vector& modes, Candidate& minimum) {
   double width = 0.5 * minimum.width / 8, low = infinity, half = 0;
   int left = MINIMUM_REFINEMENTS;
-  for (int i = 0; i < MOST_PARABOLAS && left > 0; ++i) {
+  for (int i = 0; i < MOST_CORRECTIONS && left > 0; ++i) {
     const double theta = minimum.theta;
     const auto [before, here, after, same] =
         sum_modes(gap, {theta - width, theta, theta + width, theta}, modes);

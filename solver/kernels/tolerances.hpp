@@ -30,8 +30,9 @@ inline constexpr int FEWEST_SINE_NODES = 64;
 
 // ---------------------------------------------------------------- equilibrium of the edges
 
-// Corrections by Newton's iteration before an equilibrium counts as lost: many where edges with two
-// works of adhesion begin to move and are pinned on the way.
+// Corrections by Newton's iteration before an equilibrium counts as lost, many where edges with two
+// works of adhesion begin to move and are pinned on the way; and parabolas before a minimum is
+// taken as it is.
 inline constexpr int MOST_CORRECTIONS = 32;
 
 // Share of the last correction. An iteration that shrinks less is given up early. Corrections no
@@ -160,12 +161,10 @@ inline constexpr double NO_MINIMUM_WITHIN = 0.12;
 // So many estimated errors above zero a minimum is surely open; lower ones are located more finely.
 inline constexpr double MINIMUM_DOUBT = 3.0;
 
-// Parabolas by which a low minimum is located, each an eighth as wide as the one before.
+// Parabolas by which a low minimum is located, each an eighth as wide as the one before. Without
+// those of equal widths beside them one in eighty minima was too high, by up to 4e-4 h_max, where
+// the third derivative is large beside the curvature.
 inline constexpr int MINIMUM_REFINEMENTS = 3;
-
-// Parabolas at most, with those of equal widths. Without these one in eighty minima was too high, by
-// up to 4e-4 h_max, where the third derivative is large beside the curvature.
-inline constexpr int MOST_PARABOLAS = 24;
 
 // ---------------------------------------------------------------- continuation of a branch
 
