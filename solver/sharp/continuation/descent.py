@@ -181,7 +181,7 @@ class Descents:
                 )
                 if point is not None:
                     return point, raced
-                if not strict:
+                if not strict and edges.adhesion.pins:
                     edges.forget()  # that of the edges on the way may pin and release some by turns
                 ways = self.ways_off_saddle(gaps, prescribed, law)
                 if ways:
