@@ -132,6 +132,8 @@ class Writer:
         """
         for stretch in stretches(np.fromiter(rows, np.intp)):
             here = np.arange(stretch.start, stretch.stop)
+            if not here.size:  # most tasks that finish leave none over
+                continue
             with self._writing(stretch.start):
                 self._put(schema.STATUS, stretch.start, np.full(here.size, schema.PENDING))
                 if status == schema.NOT_NEEDED:

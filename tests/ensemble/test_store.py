@@ -179,6 +179,13 @@ def cuts(before: bytes, after: bytes):
 RECORDED = ("loss", "loading_energy", "wall_time", "error", "checksum", "status")
 
 
+def test_marking_no_rows_costs_nothing(path, monkeypatch):
+    """Most tasks that finish, of a campaign with [stop], leave no row over."""
+    with Writer(path) as writer:
+        monkeypatch.setattr("adhesis.ensemble.results.write.empty_checksums", None)
+        writer.mark([], schema.NOT_NEEDED)
+
+
 def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
     """A kill after each write, and within each flush, must not cost a row.
 
