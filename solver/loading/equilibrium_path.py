@@ -599,7 +599,8 @@ def path_fields(record: Record, started: float) -> tuple[dict[str, Any], Ledger]
         )
     jumps = tuple(record.jumps)
     columns: dict[str, Any] = {name: record.column(name) for name in _ENTERED}
-    if problem.pinning == 0:
+    # a law of one's own may pin edges, too
+    if problem.pinning == 0 and not columns["edge_friction"].any():
         columns["edge_friction"] = None
     ledger = Ledger.of(problem, jumps, **columns)
     fields = columns | {
