@@ -12,12 +12,9 @@ namespace {
 // among the gaps of the smallest run of the tree that is not stable.
 bool run_weakest(Flags& runs, const LinearResponse& response, const ResponseSolution& now) {
   std::array<int, 2> range = {0, response.gap_count() - 1};
-  for (const Run& run : response.tree.runs) {
-    if (run.count.negative > 0) {
+  for (const Run& run : response.tree.runs)
+    if (run.count.negative > 0 && run.range[1] - run.range[0] < range[1] - range[0])
       range = run.range;
-      break;
-    }
-  }
   int weakest = -1;
   double softest = -1;
   for (int e = 2 * range[0]; e < 2 * range[1] + 2; ++e) {

@@ -1,5 +1,7 @@
 #include "quadrature.hpp"
 
+#include <bit>
+
 namespace adhesis {
 
 GaussRule::GaussRule(int m)
@@ -28,9 +30,8 @@ GaussRule::GaussRule(int m)
 const std::vector<GaussRule>& gauss_rules() {
   static const std::vector<GaussRule> rules = [] {
     std::vector<GaussRule> all;
-    for (int count :
-         {4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128})
-      all.emplace_back(count);
+    for (unsigned count = 4; count <= 128; count += std::max(1u, std::bit_floor(count) / 8))
+      all.emplace_back(int(count));
     return all;
   }();
   return rules;

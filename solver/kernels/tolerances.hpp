@@ -14,11 +14,8 @@ namespace adhesis {
 // Radians of the highest Chebyshev mode over one panel: 8 to 14 Gauss nodes resolve half a wave.
 inline constexpr double PANEL_PHASE = 3.0;
 
-// Natural digits of a run's charges beyond those of the field: errors of several levels add up.
-inline constexpr double CHARGE_MARGIN = 1.0;
-
-// Charges of a run, at most, and more than the nodes of a gap: enough for patches of 3e-7 of their
-// run at an accuracy of 1e-14, and of 1e-17 at 1e-5.
+// Charges of a run, at most, and more than the nodes of a gap: enough for patches of 4e-10 of their
+// run at an accuracy of 1e-14.
 inline constexpr int MOST_CHARGES = 160;
 
 // Sine nodes per λ_min that bracket every local minimum of an opening.

@@ -7,7 +7,8 @@
 //
 // A run of neighbouring gaps is an interval between two patches, just as a gap is one: in its
 // coordinate all that lies outside is again on the line Im η = π/(2α), however narrow the patches
-// at its ends. So it acts on the outside like a few charges at the Chebyshev nodes of η.
+// at its ends. So it acts on the outside like a few charges at the Chebyshev nodes of a sine of η:
+// the fewer the wider these patches are, so the widest divide the gaps into runs.
 //
 // With R the response of a run, q = q° - R g, a pair of neighbours 1, 2 obeys
 //
@@ -34,7 +35,7 @@ struct NegativeCount {
 struct Run {
   std::array<int, 2> half = {-1, -1};  // of a gap none
   std::array<int, 2> range;            // first and last gap
-  Gap interval;                        // not used of a whole period
+  Gap interval = {};                   // not used of a whole period
   int rank = 0, room = 0;              // number of charges, and of those that there is room for
   std::array<int, 2> placed = {};      // ranks of its halves, for which it was placed
   NegativeCount count;                 // of its eigenvalues
@@ -51,7 +52,7 @@ struct Charges {
   explicit Charges(int size = 0) : isolated(size), potential_of_sibling(size) {}
 };
 
-// First the L gaps, then pairs of runs, the last one the whole.
+// First the L gaps, then pairs of runs, each behind its halves, the last one the whole.
 struct Tree {
   std::vector<Run> runs;
   int count = 0;          // of gaps
