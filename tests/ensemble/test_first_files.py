@@ -12,6 +12,7 @@ from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
+from adhesis.ensemble.report.figures.catalogue import ALL
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support.campaign_support import ROOT, run_python
 from tests.support.processes import ran
@@ -45,9 +46,9 @@ def test_templates_and_captions_are_those_without_docstrings_too() -> None:
         "from adhesis.ensemble.report.figures.catalogue import ALL\n"
         "print(campaign_template(), [(item.title, item.caption) for item in ALL])"
     )
-    plain, stripped = run_python("-c", code), run_python("-OO", "-c", code)
-    assert "A caret at 0 marks an interval" in plain.stdout
-    assert stripped.stdout == plain.stdout
+    plain = f"{campaign_template()} {[(item.title, item.caption) for item in ALL]}\n"
+    assert "A caret at 0 marks an interval" in plain
+    assert run_python("-OO", "-c", code).stdout == plain
 
 
 def test_a_new_campaign_lists_every_key_of_the_page() -> None:

@@ -74,7 +74,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "t.csv").write_text(text, encoding="latin-1")
     words = ["trace", str(folder / "t.csv"), *CONTACT, "--to", str(folder / "out"), "--quiet"]
     # each process costs more than these loops
-    words = [*words, "--processes", "1", "--load-steps", "20"]
+    words = [*words, "--processes", "1", "--load-steps", "10"]
     with few_figures("loop"):
         assert main(words) == 0
     return folder / "out"
