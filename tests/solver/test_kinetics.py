@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from adhesis import Control, Problem, Profile, run_loop, run_loops
+from adhesis import Control, Problem, Profile, run_loop
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.continuation.descent import leaving_step
 from adhesis.solver.sharp.continuation.jump import Jumps
@@ -283,11 +283,3 @@ def test_two_folds_within_one_step_are_taken_in_their_order_or_flagged():
     other = next((pair for pair in pairs if pair[0].kind != pair[1].kind), None)
     assert other is None or other[0].at_stake == pytest.approx(other[1].at_stake, rel=0.05)
     assert other is not None or len(found[0]) == len(found[1])
-
-
-def test_a_descent_that_goes_to_and_fro_beside_a_fold_ends():
-    """Without patience it did not, in a loop that turns on a branch shared with others."""
-    method = SharpMethod(Problem(of_paper(4342150509908855, 0.9), SOLID, 0.07))
-    loops = run_loops(method, max_penetration=[0.5, 0.7, 0.9], load_steps=40)
-    alone = run_loop(method, max_penetration=0.7, load_steps=40)
-    assert loops[1].loss == pytest.approx(alone.loss, rel=3e-5)
