@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
@@ -29,15 +29,6 @@ def listed(text: str) -> list[tuple[str, str]]:
         elif key := re.match(r"(?:# )?(\w+) = ", line):
             found.append((table, key[1]))
     return found
-
-
-def test_a_new_campaign_runs_as_it_is(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["new", "my.toml"]) == 0
-    assert capsys.readouterr().out.startswith("wrote       my.toml\n")
-    campaign = load_campaign("my.toml")
-    assert campaign.task_count == 6
-    assert campaign.profile.period == 2e-3
 
 
 def test_templates_and_captions_are_those_without_docstrings_too() -> None:

@@ -4,7 +4,6 @@ import csv
 import json
 import shutil
 
-import h5py
 import numpy as np
 import pytest
 
@@ -268,16 +267,6 @@ def test_rows_that_are_not_needed_are_marked_at_once_and_not_read(tmp_path, monk
     written.clear()
     second = run(path, out)
     assert len(written) < 100 * (1 + second.computed)
-
-
-def test_a_row_whose_status_turns_into_not_needed_is_damaged(tmp_path, finished):
-    out = shutil.copy(finished[0], tmp_path / "r.h5")
-    with h5py.File(out, "r+") as file:
-        for row in (0, 1):
-            file["status"][row] = NOT_NEEDED
-        file["status"][2] = PENDING
-    with Results(out) as results:
-        assert results.damaged().tolist() == [0, 1]
 
 
 def test_a_cell_without_adhesion_has_enough_with_the_least_number(tmp_path):
