@@ -271,15 +271,3 @@ def test_grid_leaves_equal_crests_as_sharp_does_and_a_coarse_one_tells_what_it_m
     reported = coarse.loss_error / coarse.loss
     assert abs(coarse.loss_dimensionless / exact - 1) < reported < 0.5
     assert any("numerical error of the loss" in text for text in coarse.warnings)
-
-
-def test_two_folds_within_one_step_are_taken_in_their_order_or_flagged():
-    """They are 4e-6 h_max apart, and the second does not come once the other was taken first."""
-    profile = rough(10, 79, 136711, hurst=0.833, amplitudes="rayleigh")
-    gamma = 0.4953283928122993 * SOLID.modulus * 1e-12 * profile.q0 * 10
-    problem = Problem(profile, SOLID, gamma)
-    found = [jumps_on_loading(problem, a, 0.884879261502729, 18) for a in (1e-3, 3e-4)]
-    pairs = zip(*found, strict=False)
-    other = next((pair for pair in pairs if pair[0].kind != pair[1].kind), None)
-    assert other is None or other[0].at_stake == pytest.approx(other[1].at_stake, rel=0.05)
-    assert other is not None or len(found[0]) == len(found[1])

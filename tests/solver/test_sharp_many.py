@@ -172,17 +172,6 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
 
 
-def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
-    """Newton's steps led 0.002 λ_min on, a window as far back, 100,000 times: an error."""
-    profile = of_paper(1, ratio=300)
-    method = SharpMethod(Problem(profile, HALF_SPACE, 0.005))
-    state = method.detached(profile.h_max)
-    for step in range(39):
-        state = method.follow(state, profile.h_max * (1 - 0.0225 * step)).states[-1]
-    assert method.report().descent_steps < 50_000
-    assert state.patches > 40
-
-
 @pytest.mark.parametrize("negative", range(4))
 def test_negative_eigenvalues_that_appear_together_are_counted(negative):
     """Of a pair of halves whose first one has none, and all directions of which are alike."""
