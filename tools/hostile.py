@@ -26,7 +26,7 @@ from adhesis.solver.model.profile import Amplitudes
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.registry import MethodName
 from adhesis.solver.sharp.method import SharpMethod
-from tests.support.explicit_solution import explicit_nodes, explicit_openings
+from tests.support.explicit_solution import between, explicit_nodes, explicit_openings
 
 TIGHT = 4  # every so many scenes are followed again, to 1e-5 or a hundred times as accurately
 GRID = 20
@@ -361,9 +361,7 @@ def independent_clearance(method: Method, state: ContactState) -> float:
     """
     profile = method.problem.profile
     edges = state.edges * profile.q0
-    left = edges[:, 1]
-    right = np.append(edges[1:, 0], edges[0, 0] + 2 * np.pi)
-    gaps = np.stack([left, right], axis=1)
+    gaps = between(edges)
     narrowest = min(float(np.diff(gaps, axis=1).min()), float(np.diff(edges, axis=1).min()))
     if len(gaps) * profile.highest_harmonic / np.sqrt(narrowest) > _MOST_BY_WIDTH:
         return 0.0

@@ -53,7 +53,7 @@ def test_a_run_that_fails_becomes_a_note():
 
 
 def test_a_run_that_takes_too_long_is_given_up():
-    assert measure(Run(SMALL_ROUGH, "grid", 4096, 20, 0.5)).note == "given up after 0.5 s"
+    assert measure(Run(SMALL_ROUGH, "grid", 4096, 20, 0.1)).note == "given up after 0.1 s"
 
 
 def fake_measure(run: Run) -> Measurement:

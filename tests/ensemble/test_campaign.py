@@ -217,7 +217,6 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
             campaign_text().replace("n0 =", "n0 = 3\nn0 ="),
             "in 'n0 = 1', whose key is given before, so remove one of the two",
         ),
-        ("[stop]\nmost = 3\nmost = 3", "in 'most = 3', whose key is given before"),
         ("[sweep]\nhurst = [0,7", "in 'hurst = [0,7', where values are as 0.5, [0.5, 0.6], or"),
         ("[sweep]\nzip = []\nzip = [\n]", "in 'zip = [', whose key is given before, so remove"),
         ("[cycle]\r\nload_steps = 20\r\n\f\r\n", "is not valid TOML: Invalid statement"),

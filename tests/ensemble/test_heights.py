@@ -138,11 +138,6 @@ def test_a_file_that_may_not_be_read_is_refused(read, tmp_path, monkeypatch):
 
 DOUBTFUL: dict[str, tuple[list[str], dict[str, Any], str]] = {
     "a unit that was damaged": (["z [æm]", *METRES], {}, r"is clear, with '\[æm\]' in .*give unit"),
-    "header against option": (
-        ["z [µm]", *NM],
-        {"unit": "nm"},
-        "unit is nm for the heights, and the hea",
-    ),
     "line of the header against option": (
         ["Unit: µm", *NM],
         {"unit": "nm"},

@@ -333,9 +333,6 @@ def test_several_turning_points_are_turns_of_one_document(tmp_path):
     for turn in document["turns"]:
         assert turn["work_spent"] - turn["work_gained"] == pytest.approx(turn["loss"])
     assert imread(figure).ndim == 3
-    alone, *_ = rough_loop(tmp_path, "--max-penetration", "0.8")
-    assert "turns" not in alone
-    assert alone["loss"] == pytest.approx(losses[-1], rel=1e-4)
 
 
 def test_a_path_tells_of_its_minor_loops(tmp_path):

@@ -4,7 +4,6 @@ import csv
 import json
 import shutil
 
-import h5py
 import numpy as np
 import pytest
 
@@ -28,7 +27,6 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
 from adhesis.ensemble.results.write import DatasetRows
 from adhesis.ensemble.run.session import Options, run_campaign
-from benchmarks.precision_coverage import cells_of_the_study, of_the_study
 from tests.support import synthetic_results
 from tests.support.campaign_support import (
     adhesis,
@@ -175,20 +173,6 @@ def test_intervals_at_the_stop_cover_the_mean(draw, wanted):
     assert np.median(counts) < 0.55 * most  # it is the rule that stops, not the end
 
 
-def test_intervals_of_real_losses_at_the_stop_cover_the_mean_and_are_as_narrow_as_wanted():
-    """Of W~ in a cell of the study; with the loss steered they are not narrow enough."""
-    loops = dict(cells_of_the_study())["γ = 0.07 J/m², Δ~max = 0.8"]
-    assert len(loops) == 200
-    rule = {"batch": 8, "most": 1000}
-    held, reach, count = of_the_study(loops, 0, 0.05, np.random.default_rng(17), 120, **rule)
-    assert held >= 0.9  # 93 %, but for the scatter of so few campaigns
-    assert reach <= 0.05
-    assert count < 300
-    _, reach, fewer = of_the_study(loops, 1, 0.05, np.random.default_rng(17), 10, **rule)
-    assert reach > 0.06
-    assert fewer < count
-
-
 @pytest.mark.parametrize("quantity", ["", "loss"])
 def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity, capsys):
     """By default that is the dimensionless loss, which has the interval of the table of losses."""
@@ -268,16 +252,6 @@ def test_rows_that_are_not_needed_are_marked_at_once_and_not_read(tmp_path, monk
     written.clear()
     second = run(path, out)
     assert len(written) < 100 * (1 + second.computed)
-
-
-def test_a_row_whose_status_turns_into_not_needed_is_damaged(tmp_path, finished):
-    out = shutil.copy(finished[0], tmp_path / "r.h5")
-    with h5py.File(out, "r+") as file:
-        for row in (0, 1):
-            file["status"][row] = NOT_NEEDED
-        file["status"][2] = PENDING
-    with Results(out) as results:
-        assert results.damaged().tolist() == [0, 1]
 
 
 def test_a_cell_without_adhesion_has_enough_with_the_least_number(tmp_path):

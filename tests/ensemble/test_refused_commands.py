@@ -50,15 +50,12 @@ run c.toml {{--patience=0,--dry-run}} --out p.h5 --part 9/9 -> the campaign has 
 run stop.toml {{--patience=0,--dry-run}} --out p.h5 --part 1/2 -> its batches are decided on whole
 run c.toml --redo some -> --redo is 'some'
 run c.toml --dry-run --redo all -> --redo and --dry-run cannot be given together
-run c.toml --dry-run --walltime x -> --walltime is 'x': it must
 run c.toml --hurst 0.7 -> --hurst needs --redo: it chooses the tasks to compute again
 run c.toml --redo all --hurst {{x,-1,nan}} -> --hurst is '{{}}'
 run c.toml --redo all --work-of-adhesion 40 ->
     --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
 run c.toml --out r.h5 --redo failed --hurst 0.70000000001 ->
     --hurst is 0.70000000001: this campaign has no such task, only 0.7, 0.8
-run c.toml --out r.h5 --redo failed --hurst 0.75 ->
-    --hurst is 0.75: this campaign has no such task
 run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5
 run c.toml --out r.h5 --redo all --work-of-adhesion 4 -> only 0.01, 0.04
 status {{text,empty.h5,other.h5}} -> is not a results file
@@ -79,7 +76,6 @@ doctor --in none -> --in is none: it must be a folder that can be written
 # options of any command
 LOOP {{--young,--measure,--seed,--json,--path}}=-- -> {{}} is '--'
 LOOP --seed 1 --seed={{1,2}} -> --seed is given twice: give it once
-LOOP --field-penetrations 0.1 --field-penetrations 0.2 0.3 -> --field-penetrations is given twice
 # the profile and the material of a loop
 loop -> no profile is given: give one of --hurst, --heights and --trace
 LOOP --h-rms 1e-6 --m2 1e-3 -> --h-rms and --m2 are given: give one of
@@ -90,10 +86,8 @@ LOOP --layer 0 -> --layer is 0.0: it must be a positive number
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
 {{LOOP,TRACE --plan --unit um}} --stripes 2 -> the amplitude of stripes of the work of adhesion is
-LOOP --stripe-phase 1.0 -> the number of stripes of the work of adhesion is missing
 LOOP --stripes 2 --stripe-amplitude 0.1 --strength 1e8 -> is given beside a strength
-loop --heights none.npy --period 1e-3 -> with --heights the material has to be given
-loop --heights wave.csv --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
+loop --heights none.npy --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
     --heights needs --period
 WAVE --heights nan.npy -> has no finite height at index 1: --heights needs every
@@ -172,7 +166,6 @@ TRACE --plan --work-of-adhesion {{0\,04,0.02\,0\,04,2\,5mJ/m2}} ->
 TRACE --plan --work-of-adhesion 1.0,1.0 -> is [1.0, 1.0]: its values must
 TRACE --plan --unit um --work-of-adhesion inf -> work-of-adhesion is inf: it must be 0 or a positive
 TRACE --plan --work-of-adhesion 20mJ -> --work-of-adhesion is '20mJ': it must be a number in J/m²
-TRACE --plan --unit um --work-of-adhesion=-1 -> --work-of-adhesion is -1
 TRACE --plan --unit um --exclude 0.1:0.2:0.3mm -> it must be two positions with a colon
 TRACE --plan --unit um --exclude 200:300um ->
     a position of it is 200, which would be 200 m: give its unit
@@ -181,8 +174,6 @@ TRACE --plan --unit um --exclude 0.3mm:0.2mm ->
 TRACE --unit um --to out --work-of-adhesion 0.04,0.02 --work-of-adhesion-open 0.1 ->
     beside 2 works of adhesion: give one of
 TRACE --unit um --to out --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' besi
-loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --seed 1 ->
-    --seed belongs to --hurst
 loop --trace t.txt --work-of-adhesion 1 --young 1e6 --poisson 0.5 --period 2mm ->
     --period belongs to --hurst and --heights
 trace ow/trace.md --work-of-adhesion 1 --young 1e6 --poisson 0.5 --unit um --to ow ->

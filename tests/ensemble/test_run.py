@@ -91,7 +91,7 @@ def whole(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("number", "name"),
-    [(signal.SIGUSR1, "SIGUSR1"), (signal.SIGINT, "Ctrl-C (SIGINT)"), (signal.SIGKILL, "")],
+    [(signal.SIGINT, "Ctrl-C (SIGINT)"), (signal.SIGKILL, "")],
 )
 def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, whole, number, name):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
@@ -342,8 +342,9 @@ COPIED_OVER = {
 }
 
 
-@pytest.mark.parametrize("how", COPIED_OVER)
-@pytest.mark.parametrize("stops", [False, True], ids=["the run ends", "the run is stopped"])
+@pytest.mark.parametrize(
+    ("how", "stops"), [*((how, False) for how in COPIED_OVER), ("rows of another run", True)]
+)
 def test_a_file_that_is_copied_over_meanwhile_is_no_finished_run(tmp_path, how, stops):
     """The run would have ended with 0, and rows that it counted be lost."""
     place, content, error, sentence = COPIED_OVER[how]

@@ -18,7 +18,7 @@ import pytest
 from markdown_it import MarkdownIt
 from matplotlib.image import imread
 
-from adhesis import Control, Problem, make_method, run_loop, self_affine_profile, stripes
+from adhesis import Control, self_affine_profile, stripes
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
@@ -74,7 +74,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "t.csv").write_text(text, encoding="latin-1")
     words = ["trace", str(folder / "t.csv"), *CONTACT, "--to", str(folder / "out"), "--quiet"]
     # each process costs more than these loops
-    words = [*words, "--processes", "1", "--load-steps", "20"]
+    words = [*words, "--processes", "1", "--load-steps", "10"]
     with few_figures("loop"):
         assert main(words) == 0
     return folder / "out"
@@ -84,21 +84,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def document(folder: Path) -> dict[str, Any]:
     found: dict[str, Any] = json.loads((folder / "trace.json").read_text())
     return found
-
-
-def test_the_interval_holds_the_loss_that_is_known(document: dict[str, Any]) -> None:
-    loop = run_loop(
-        make_method("auto", Problem(PROFILE, HALF_SPACE, 0.04)), max_penetration=0.9, load_steps=40
-    )
-    known = {
-        "loss": loop.loss,
-        "pull_off_stress": loop.pull_off_stress,
-        "contact_fraction": loop.contact_fraction.max(),
-    }
-    for name, value in known.items():
-        stated = document[name]
-        assert abs(stated["value"] - value) <= stated["uncertainty"], name
-        assert stated["uncertainty"] < 0.6 * stated["value"], name
 
 
 def test_the_interval_is_made_of_the_doubts(document: dict[str, Any]) -> None:
@@ -527,8 +512,9 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
 def test_known_losses_lie_within_their_intervals(tmp_path: Path) -> None:
     """A case of the benchmark with fewer waves; all of it: benchmarks/trace_coverage.py."""
     row = judged(case(1, waves=20), tmp_path)
-    assert row["loss"]["covered"], row
-    assert row.keys() >= set(answers.QUANTITIES)
+    for stated in (row[name] for name in QUANTITIES):
+        assert stated["covered"], row
+        assert stated["uncertainty"] < 0.6 * stated["stated"], row
 
 
 def test_loop_takes_a_trace_with_its_warnings(tmp_path, capsys):

@@ -13,7 +13,6 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support import instrument_files
-from tests.support.campaign_support import run_python
 
 pytestmark = pytest.mark.skipif(
     not instrument.available(), reason="the optional package SurfaceTopography is not installed"
@@ -93,17 +92,6 @@ def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(read, "available", lambda: False)
     with pytest.raises(InputError, match=r"python.* -m pip install 'SurfaceTopography>=1.27'"):
         read_trace(tmp_path / "a.qep")
-
-
-def test_reading_starts_no_mpi(tmp_path: Path) -> None:
-    instrument_files.sdf(tmp_path / "a.sdf", STEP, Z)
-    code = (
-        "import sys\nfrom adhesis.ensemble.trace.reading.measured_trace import read_trace\n"
-        f"read_trace({str(tmp_path / 'a.sdf')!r})\nassert 'mpi4py.MPI' not in sys.modules\n"
-        "assert 'SurfaceTopography' in sys.modules\nimport mpi4py"
-    )
-    done = run_python("-c", code)
-    assert done.returncode == 0, done.stderr
 
 
 def wsxm(path: Path, comments: int) -> Path:

@@ -32,7 +32,11 @@ STAND_INS = {
         fi
         [ "$1" = status ] && printf '{\\n "tasks": 9,\\n "pending": %s,\\n}\\n' "$PENDING"
         exit 0""",
-    "mpirun": 'shift 2; [ "$1" = -machinefile ] && shift 2; exec "$@"',
+    # Running as root or with more ranks than cores is for the owner of a cluster to allow.
+    "mpirun": """
+        batch=${SLURM_JOB_ID:-}${PBS_JOBID:-}
+        [ -n "$batch" ] && env | grep "RUN_AS_ROOT\\|OVERSUBSCRIBE" && exit 98
+        shift 2; [ "$1" = -machinefile ] && shift 2; exec "$@" """,
     "scontrol": """
         [ "$1" = requeue ] ||
         printf 'JobId=7\\n   JobState=%s Reason=None\\n   Command=%s\\n' "$STATE" "$COMMAND" """,

@@ -10,10 +10,12 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import adhesis
 from tests.support.campaign_support import ROOT, run_python
+from tests.support.instrument_files import sdf
 from tests.support.processes import ran
 from tests.support.synthetic_results import text_of, write
 from tools.readme_without_links import readme
@@ -125,7 +127,7 @@ assert checks.real("young", 1e6, checks.YOUNG) == 1e6
 assert ("numpy.ma" in sys.modules) == before, "checking a number loads masked arrays"
 import adhesis
 loaded("adhesis")
-campaign, results, report = sys.argv[1:]
+campaign, results, report, scan = sys.argv[1:]
 os.environ |= {"PMIX_MCA_gds": "hash", "PRTE_MCA_plm": "ssh", "HYDRA_LAUNCHER": "ssh"}
 for options in ([], ["--dry-run"], ["--redo", "failed"]):
     assert main(["run", campaign, "--out", results, *options]) == 0
@@ -136,6 +138,10 @@ import adhesis.ensemble.report.figures.style as style
 style.save = lambda *_, **__: None
 assert main(["report", results, "--to", report]) == 0
 loaded("report")
+from adhesis.ensemble.trace.reading import instrument
+if instrument.available():
+    adhesis.read_trace(scan)
+    loaded("scan")
 import mpi4py
 """
 
@@ -145,7 +151,9 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     one_cell = {"hurst": (0.8,), "gamma": (0.04,), "realisations": 2}
     results = write(tmp_path / "r.h5", text_of(**one_cell))
     (tmp_path / "c.toml").write_text(text_of(**one_cell))
-    done = run_python("-c", COMMANDS, tmp_path / "c.toml", results, tmp_path / "report")
+    sdf(tmp_path / "a.sdf", 1e-6, np.sin(np.arange(99)) * 1e-7)
+    made = (tmp_path / "report", tmp_path / "a.sdf")
+    done = run_python("-c", COMMANDS, tmp_path / "c.toml", results, *made)
     assert done.returncode == 0, done.stderr
     lines = (line.split() for line in done.stdout.splitlines() if line.startswith("loaded "))
     loaded = {stage: set(names) for _, stage, *names in lines}
@@ -156,16 +164,8 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     assert loaded["adhesis"] & (numeric | {"h5py", "xarray", "rich"}) == set()
     assert loaded["nothing_to_do"] & numeric == set()
     assert "matplotlib" in loaded["report"]
-    assert "mpi4py" not in loaded["report"]
-
-
-@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda p: p.stem)
-def test_what_a_benchmark_imports_is_there(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test runs most of them."""
-    monkeypatch.syspath_prepend(path.parent)
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module != "__future__":
-            exec(ast.unparse(node), {})  # raises ImportError
+    assert "mpi4py" not in loaded["report"] | loaded.get("scan", set())
+    assert "scan" not in loaded or "SurfaceTopography" in loaded["scan"]
 
 
 def test_the_types_of_the_kernels_are_those_of_the_module() -> None:

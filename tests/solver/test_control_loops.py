@@ -45,31 +45,6 @@ def turn_at(turn: float, problem: Problem) -> dict[str, float]:
     return {"max_penetration": turn}
 
 
-@pytest.mark.parametrize("relative", [np.inf, 3.0, 0.1, 0.0])
-def test_the_potential_falls_by_the_conjugate_along_an_equilibrium_branch(relative):
-    """dW/dx = -λ Y, on Johnson's branch."""
-    wave = wave_of(0.3)
-    control = Control(relative * wave.full_contact_stress / AMPLITUDE)
-    a = np.linspace(0.2, 0.3, 2001) * PERIOD
-    s, p, u = wave.separation(a), wave.mean_stress(a), wave.energy(a)
-    x = control.prescribed(s, p)
-    y = control.conjugate(s, p, AMPLITUDE)
-    w = [control.potential(*values, AMPLITUDE, PERIOD) for values in zip(u, s, p, strict=True)]
-    assert w[-1] - w[0] == pytest.approx(-PERIOD * np.trapezoid(y, x), rel=1e-6)
-    assert np.all(np.diff(x) < 0)  # the branch is stable, and loading is towards smaller x
-
-
-def test_far_side_moves_by_the_penetration_and_the_springs_shortening():
-    assert Control(2e9).displacement(1e-6, 500.0, 3e-6) == pytest.approx(2.25e-6)
-    assert Control().displacement(1e-6, 500.0, 3e-6) == pytest.approx(2e-6)
-
-
-def test_a_layer_without_room_to_spread():
-    """ν = 0: E/d. Towards ν = 0.5 it becomes rigid."""
-    assert HalfSpace(2e6, 0.0).layer_stiffness(1e-2) == pytest.approx(2e8)
-    assert HalfSpace(2e6, 0.4999).layer_stiffness(1e-2) > 1e11
-
-
 @pytest.mark.parametrize("relative", [np.inf, 100.0, 1.0, 0.1, 0.0])  # in p*/A
 def test_the_work_of_each_branch_of_a_wave_is_that_of_the_closed_form(relative):
     wave = wave_of(0.2)

@@ -178,13 +178,6 @@ def test_a_gap_is_as_wide_as_the_range_where_it_touches():
     assert touches >= 2
 
 
-def test_energy_falls_in_every_jump_at_a_range():
-    loop = rough_loop(2e-8)
-    assert all(jump.energy_drop > -jump.barrier for jump in loop.jumps)
-    assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
-    assert loop.loss < rough_loop(None).loss
-
-
 def test_a_touch_that_does_not_hold_is_tried_again_from_nearer_by(monkeypatch):
     reference, refused, has_gained = rough_loop(2e-8), [], Jumps.has_gained
 

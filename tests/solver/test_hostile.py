@@ -48,7 +48,7 @@ SIX_PARTS[6::6] = np.array([6.29675005e-7, 2.74081965e-7, 1.68488766e-7]) * np.e
 UNEVEN = rough(6, 2, 432018, hurst=0.269, h_rms=7.815913146729246e-5)
 
 
-def of_scene(scene: Scene, finer: float = 1e-2, **turn: float):
+def of_scene(scene: Scene, finer: float = 0.1, **turn: float):
     """Return problem, path, and the accuracies of a drawn loop and of a finer one."""
     problem = scene.problem()
     path = {"load_steps": scene.load_steps, **(turn or scene.turn(problem))}
@@ -69,7 +69,7 @@ def to_depth(problem: Problem, depth: float, load_steps: int, *accuracies: float
         of_scene(draw(308, 90)),  # the energy's trapezium misses the minimum of a lone edge
         of_scene(draw(5202, 90, "open")),  # an edge recedes by less than Newton's tolerance
         # an edge turns back within a step: a jump came 9e-5 h_max early
-        of_scene(replace(draw(5202, 32, "open"), accuracy=1e-4)),
+        of_scene(replace(draw(5202, 32, "open"), accuracy=1e-4), finer=1e-2),
         # edges at their memory but for rounding did not stay pinned: no rest was found
         to_depth(
             Problem(rough(4, 16, 6, hurst=0.5), HALF_SPACE, 0.01, work_of_adhesion_open=0.05),
@@ -106,8 +106,9 @@ def to_depth(problem: Problem, depth: float, load_steps: int, *accuracies: float
     ],
 )
 def test_the_error_covers_a_loop_that_is_followed_with_more_accuracy(problem, path, accuracies):
+    """Wherever the loss lies within the error of the finer loop."""
     loop, finer = loops_at(problem, *accuracies, **path)
-    assert abs(loop.loss - finer.loss_from_drops) < loop.loss_error
+    assert abs(loop.loss - finer.loss_from_drops) + finer.loss_error < loop.loss_error
     assert loop.loss_error < accuracies[0] * loop.loss
     if len(loop.jumps) < 100:  # of more a small one may be found as two
         assert [jump.kind for jump in loop.jumps] == [jump.kind for jump in finer.jumps]

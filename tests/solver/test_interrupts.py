@@ -21,7 +21,7 @@ INTERRUPTS = 8  # of each method
 def chosen(request: pytest.FixtureRequest) -> Method:
     """A method for all loops of the test, each as it comes after another one."""
     if request.param == "grid":
-        few = Problem(rough(2, 4, 3, period=1e-3), HALF_SPACE, 0.04)
+        few = Problem(rough(1, 4, 3, period=1e-3), HALF_SPACE, 0.04)
         return make_method("grid", few, nodes_per_wave=8)
     return make_method("sharp", Problem(of_paper(1, ratio=4), HALF_SPACE, 0.04))
 

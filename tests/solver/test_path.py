@@ -54,15 +54,6 @@ def test_nested_minor_loops_close_from_the_inside():
     assert abs(path.audit_residual) < 1e-4
 
 
-def test_the_single_wave_closes_every_minor_loop_without_loss():
-    """Between touch and fold its states lie on one branch."""
-    path = run_path(ExactWave(OF_WAVE), [0.5, 0.1, 0.4], load_steps=5)
-    (minor,) = path.minor_loops
-    assert minor.closes
-    assert abs(minor.loss) < 1e-6 * path.work
-    assert path.work == pytest.approx(WAVE.loop.loss, rel=1e-4)
-
-
 def test_doubt_of_a_path_is_said_as_that_of_a_loop():
     path = run_path(make_method("sharp", PROBLEM), [0.5], load_steps=5)
     assert path.warnings == ()

@@ -8,8 +8,6 @@ from adhesis import self_affine_profile, single_wave
 from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
 from adhesis.solver.references.parabola import parabola_load, parabola_pull_off
 from adhesis.solver.references.periodic_punch import pull_off_stress
-from adhesis.solver.references.single_wave import SingleWave
-from tests.support.dugdale_wave import DugdaleWave
 
 MODULUS = 1.3
 ROUGH = self_affine_profile(0.8, period=2.0, n0=2, ratio=6, seed=5, h_rms=0.01)
@@ -38,19 +36,6 @@ def test_full_contact_energy_is_half_the_work_and_adds_up_over_waves():
     assert full_contact_energy(ROUGH, MODULUS) == pytest.approx(work / 2 / 2.0, rel=1e-9)
     wave = single_wave(0.02, 2.0)
     assert full_contact_energy(wave, MODULUS) == pytest.approx(MODULUS * np.pi * 0.02**2 / 8)
-
-
-def test_full_contact_is_the_limit_of_johnsons_wave():
-    wave = SingleWave(0.02, 2.0, MODULUS, 1e-3)
-    profile = single_wave(0.02, 2.0)
-    a = 1.0 * (1 - 1e-5)
-    p, s = float(wave.mean_stress(a)), float(wave.separation(a))
-    energy = float(wave.elastic_energy_at(a, s)) / 2.0 + 0.5 * s * p
-    assert energy == pytest.approx(full_contact_energy(profile, MODULUS), rel=1e-5)
-    x = np.array([0.0, 0.3, 0.6])
-    assert wave.stress(x, a) - p == pytest.approx(
-        full_contact_stress(profile, MODULUS, x), rel=1e-5
-    )
 
 
 def punch_separation(a: float, period: float, mean_stress: float) -> float:
@@ -111,18 +96,3 @@ def test_parabola_load_solves_the_integral_equation(a):
     g = np.linalg.solve(np.vstack([rows, weights]), np.append(a * x / radius, edge))
     solved = np.sum(g) * np.pi / n * a
     assert float(parabola_load(a, radius, MODULUS, gamma)) == pytest.approx(solved, rel=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("alpha", "ratios"),
-    [
-        (0.1, [0.949, 0.550, 0.0, 0.0]),
-        (0.3, [0.982, 0.902, 0.784, 0.398]),
-        (0.5, [0.988, 0.938, 0.871, 0.722]),
-    ],
-)
-def test_losses_of_a_finite_range_are_those_of_another_computation(alpha, ratios):
-    """Loss over that of zero range at δ/A = 0.01, 0.05, 0.1 and 0.2, computed apart."""
-    wave = SingleWave.with_alpha(alpha, 1e-6, 1e-3, MODULUS)
-    losses = [DugdaleWave(wave, share * 1e-6).loss for share in (0.01, 0.05, 0.1, 0.2)]
-    np.testing.assert_allclose(np.array(losses) / wave.loop.loss, ratios, atol=2e-3)

@@ -13,7 +13,7 @@ from adhesis.solver._kernels import (
 )
 from adhesis.solver.sharp.continuation.descent import Descents
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.mechanics import FIXED_SEPARATION, EdgeMechanics, Point
+from adhesis.solver.sharp.mechanics import FIXED_SEPARATION, EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.dense import dense_residual, dense_tangent, solve_densely
 from tests.support.scenes import HALF_SPACE, of_paper
@@ -170,50 +170,6 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(many_gap
         again = edges.equilibrium(wanted, d, edges.wave)
         assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.field_error
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
-
-
-# Edges of 33 gaps next to a fold, in units of 1/q0, as a jump of the paper's campaign begins. No
-# force on an edge is above the field's error.
-# fmt: off
-GAPS = np.array([
-    4.649659252741613, 4.666059721264752, 4.70349523541193, 4.869789735639068,
-    5.230655829646166, 5.370114220928445, 5.404464592254164, 5.467525809373942,
-    5.762041476786634, 5.971861065059655, 6.1935543875974925, 6.219630712060296,
-    6.273322873034529, 6.392118225453868, 6.567821431305732, 6.602545279971375,
-    6.748156110657858, 6.868090386407455, 7.0574425911586935, 7.2532094871087205,
-    7.321303227939473, 7.345460987686999, 7.506075112716075, 7.549436142667217,
-    7.65336614704188, 7.658786537197449, 7.788477767317762, 7.880075867220304,
-    7.972451459327144, 8.001306267692087, 8.020916924966317, 8.038849707657278,
-    8.178665342904136, 8.239196863621299, 8.298445104382795, 8.333525353457455,
-    8.379182574837177, 8.457633731323126, 8.63051300592624, 8.675832569423132,
-    8.80434311766849, 8.828391743378079, 8.850911320480018, 8.882079072385196,
-    8.96214975831326, 8.976492010011556, 9.067046895922987, 9.135391032048915,
-    9.229248331291766, 9.318991174919756, 9.364829922881157, 9.419066314057522,
-    9.678584232609303, 9.70349930211783, 9.762996478806985, 9.861355046644285,
-    9.957394118403872, 10.11617711527037, 10.267002523506875, 10.27478394157774,
-    10.355995538256849, 10.515573131713523, 10.57347786920136, 10.576891696280073,
-    10.724337686253268, 10.76613207501552,
-]).reshape(-1, 2)
-# fmt: on
-
-
-def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
-    """Balanced to the field's error, and Newton's iteration finds nothing: it goes on."""
-    method = SharpMethod(Problem(of_paper(3437691806060119, 0.7), HALF_SPACE, 0.01))
-    found, _ = method.jumps.descents.relax(GAPS, 0.00032519568866348807)
-    assert isinstance(found, Point)
-    assert method.edges.count.fields < 2000
-
-
-def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
-    """Newton's steps led 0.002 λ_min on, a window as far back, 100,000 times: an error."""
-    profile = of_paper(1, ratio=300)
-    method = SharpMethod(Problem(profile, HALF_SPACE, 0.005))
-    state = method.detached(profile.h_max)
-    for step in range(39):
-        state = method.follow(state, profile.h_max * (1 - 0.0225 * step)).states[-1]
-    assert method.report().descent_steps < 50_000
-    assert state.patches > 40
 
 
 @pytest.mark.parametrize("negative", range(4))

@@ -176,7 +176,7 @@ def test_a_slope_of_37_ends_in_a_loss_and_a_warning():
 
 
 def test_the_error_told_covers_the_error_made_on_random_scenes():
-    """Against a run at a hundredth of the accuracy; and it is not ten times too large."""
+    """Against a run at a tenth of the accuracy; and it is not ten times too large."""
     rng = np.random.default_rng(11)
     ratios = []
     for _ in range(4):
@@ -187,7 +187,7 @@ def test_the_error_told_covers_the_error_made_on_random_scenes():
         depth = rng.uniform(0.3, 0.95)
         result, tight = (
             loop(profile, gamma, max_penetration=depth, load_steps=8, accuracy=accuracy)
-            for accuracy in (1e-3, 1e-5)
+            for accuracy in (1e-3, 1e-4)
         )
         error = abs(result.loss - tight.loss_from_drops)
         assert error < result.loss_error

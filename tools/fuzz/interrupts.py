@@ -39,7 +39,6 @@ from tools.isolated import Isolated
 
 KINDS = ("strong", "weak", "grid", "first", "trace", "pool", "campaign")
 LOAD_STEPS = 40
-WAVES = 10  # the longest ones in a period
 LIMIT = 300.0  # s of CPU time of one interrupt, its set-up included
 
 
@@ -48,15 +47,10 @@ LIMIT = 300.0  # s of CPU time of one interrupt, its set-up included
 
 def make(method: str, work_of_adhesion: float, ratio: int) -> Any:
     """Return a method for the paper's profile, up to ``ratio`` times its longest wave."""
-    from adhesis.solver.model.half_space import HalfSpace
-    from adhesis.solver.model.problem import Problem
-    from adhesis.solver.model.profile import self_affine_profile
-    from adhesis.solver.registry import make_method
+    from adhesis import Problem, make_method
+    from tests.support.scenes import HALF_SPACE, of_paper
 
-    profile = self_affine_profile(
-        0.8, period=2e-3 * np.pi, n0=WAVES, ratio=ratio, seed=1, h_rms=1e-6
-    )
-    problem = Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
+    problem = Problem(of_paper(1, ratio=ratio), HALF_SPACE, work_of_adhesion)
     options: dict[str, Any] = {"nodes_per_wave": 8} if method == "grid" else {}
     return make_method(method, problem, **options)  # type: ignore[arg-type]
 
