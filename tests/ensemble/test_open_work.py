@@ -10,7 +10,7 @@ import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.report.findings import verdict
+from adhesis.ensemble.report.findings import law, verdict
 from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import beyond_zero_range
@@ -156,3 +156,9 @@ def test_the_report_says_which_part_is_friction(both):
     share = values["small_scale_share"] / (1 - values["small_scale_share"])
     assert share == pytest.approx(values["loss_small_scale"] / values["loss_large_scale"])
     assert "friction" not in one
+    said = [list(law(data)) for data in both]
+    assert said == [
+        ["Edges advance at γ, and recede at a work of adhesion of 0.05 to 0.08 J/m²."],
+        [],
+    ]
+    assert "friction and instability: parts of the loss, in mJ/m²; " in losses(both[0]).notes()
