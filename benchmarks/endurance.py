@@ -102,7 +102,6 @@ def measured(times: Times, pretend: float | None) -> Engine:
 
 def do_nothing(seconds: float) -> Callable[..., Row]:
     """Return a task that takes ``seconds`` without work and has a row of zeros."""
-
     rows: dict[bool, Row] = {}  # of one campaign, by whether the task keeps its fields
 
     def row(campaign: Campaign, keep: bool) -> Row:

@@ -544,22 +544,27 @@ class EquilibriumPath(ByValue, ResultViews):
 
 
 def friction_text(
-    work_of_adhesion_open: float, lost: float, friction: float, *, varies: bool = False
+    work_of_adhesion_open: float,
+    lost: float,
+    friction: float,
+    *,
+    varies: bool = False,
+    digits: int = 6,
 ) -> str:
     """Return in one line which part of a loss is friction of edges; values in J/m².
 
-    ``varies``: whether the works of adhesion vary along the profile.
+    ``varies``: whether the works of adhesion vary along the profile; ``digits``: of both parts.
     """
     mean = " in the mean" if varies else ""
     return (
-        f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²{mean}; "
-        f"{lost - friction:.6g} J/m² lost by instability"
+        f"{friction:.{digits}g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} "
+        f"J/m²{mean}; {lost - friction:.{digits}g} J/m² lost by instability"
     )
 
 
-def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
+def in_works_of_adhesion(loss: float, work_of_adhesion: float, digits: int = 4) -> str:
     """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
-    return f", {loss / work_of_adhesion:.4g} γ" if work_of_adhesion > 0 else ""
+    return f", {loss / work_of_adhesion:.{digits}g} γ" if work_of_adhesion > 0 else ""
 
 
 def sticking_text(

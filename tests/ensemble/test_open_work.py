@@ -86,6 +86,9 @@ def test_the_answer_of_a_trace_has_its_friction():
     assert answer.main["work_of_adhesion_open"] == 0.02
     assert "\nfriction    " in str(answer)
     assert "which recede at 0.02 J/m²" in str(answer)
+    loss, friction = answer.loss.value, answer.main["friction"]
+    assert f"friction    {friction:.3g} J/m² at edges" in str(answer)  # it is known to 2 % at best
+    assert f", {loss / answer.cycle.works_of_adhesion[0]:.3g} γ" in str(answer)
 
 
 def test_a_row_has_its_friction():
