@@ -22,6 +22,7 @@ from adhesis.solver.loading.zero_range import (
     InteriorTension,
     interior_tension,
     least_range,
+    length_text,
     limit_text,
     narrowest_length,
     outside_text,
@@ -472,12 +473,12 @@ class EquilibriumPath(ByValue, ResultViews):
             largest = 0.0 if interior is None else interior.tension
             zones = 100 * self.zone_error / (abs(self.lost) or 1.0)
             return (
-                f"adhesion of a range of {self.problem.attraction_range:.3g} m: surfaces jump "
-                f"together from there on, and patches open from inside at {strength:.3g} Pa, "
-                f"{counted(self.openings, 'opening')} with barriers of "
-                f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; "
+                f"adhesion of a range of {length_text(self.problem.attraction_range)}: surfaces "
+                f"jump together from there on, and patches open from inside at "
+                f"{stress_text(strength)}, {counted(self.openings, 'opening')} with barriers of "
+                f"{self.barrier:.2g} J/m²; largest tension inside patches {stress_text(largest)}; "
                 f"{outside_text(*self.outer_ranges)}; zones at edges, left out, change the loss by "
-                f"about {zones:.1g} %"
+                f"about {float(f'{zones:.1g}'):g} %"
             )
         inside = "no tension inside patches"
         if interior is not None:
