@@ -111,7 +111,7 @@ h_rms = [1e-6, "1 m"] -> [profile] h_rms is 1.0 with period 0.001, so the rms sl
 ratio = 50000; h_rms = 1e-9; nodes_per_wave = 100000 ->
     [solver] nodes_per_wave is 100000: with 50000 waves it must be at most 1342
 # numbers that can hardly be meant without a unit
-period = 1000 -> period is 1000, which would be 1000 m: give its unit, as in 1000um (1000m, if
+period = 1000 -> period is 1000, which would be 1000 m: give its unit, as in "1000um" ("1000m", if
 period = [1e-3, 2.5] -> period is 2.5, which would be 2.5 m
 work_of_adhesion = [0.04, 40] -> work_of_adhesion is 40, which would be 40 J/m²: give its unit, as
 # keys that are missing or do not go together
