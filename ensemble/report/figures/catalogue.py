@@ -196,8 +196,8 @@ MECHANISMS = (
     Illustration(
         "pull_off_stress",
         "Pull-off stress",
-        "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
-        "a little.",
+        "Largest mean tension on unloading, means with 95 % intervals. A caret at 0 marks an "
+        "interval that goes on below. The marks are moved apart a little.",
         loss_figures.pull_off,
         is_worth=_several("work_of_adhesion"),
     ),
