@@ -23,7 +23,6 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +32,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DONE, file_size
+from adhesis.ensemble.results.schema import DONE, FAILED, file_size
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.dispatch import Master, Worker
 from adhesis.ensemble.run.launch import ONE_THREAD, launch_environment, launcher
@@ -103,8 +102,8 @@ def measured(times: Times, pretend: float | None) -> Engine:
 
 def do_nothing(seconds: float) -> Callable[..., Row]:
     """Return a task that takes ``seconds`` without work and has a row of zeros."""
+    rows: dict[bool, Row] = {}  # of one campaign, by whether the task keeps its fields
 
-    @cache
     def row(campaign: Campaign, keep: bool) -> Row:
         sizes = sizes_of(row_scales(campaign))
         values: Row = {}
@@ -117,7 +116,10 @@ def do_nothing(seconds: float) -> Callable[..., Row]:
     def compute(campaign: Campaign, task: Task, progress: Any = None) -> Row:
         if seconds:
             time.sleep(seconds)
-        return row(campaign, task.realisation < campaign.output.field_realisations)
+        keep = task.realisation < campaign.output.field_realisations
+        if keep not in rows:
+            rows[keep] = row(campaign, keep)
+        return rows[keep]
 
     return compute
 
@@ -155,6 +157,9 @@ def launch(
     )
     if process.returncode != 0:
         sys.exit(f"mpirun ended with {process.returncode}: {process.stderr or 'see above'}")
+    with Results(out) as results:
+        if failed := results.errors(np.flatnonzero(results.status() == FAILED)):
+            sys.exit(f"{len(failed)} tasks failed, as: {failed[0]}")
     cards = []
     for place in range(workers + 1):
         card = Path(f"{out}.{place}.json")

@@ -118,7 +118,15 @@ def at_a_number(losses: Losses, n: int, ensembles: int) -> tuple[float, float, f
 def cells_of_the_study() -> Iterator[tuple[str, Array]]:
     """Name of each turning point and γ, and W~ and loss of one H there, each over its mean."""
     cells: dict[tuple[str, ...], list[tuple[float, float]]] = {}
-    names = ("work_of_adhesion", "max_penetration", "hurst", "campaign", "ratio", "stiffness")
+    names = (
+        "work_of_adhesion",
+        "max_penetration",
+        "hurst",
+        "campaign",
+        "ratio",
+        "stiffness",
+        "h_rms",
+    )
     with STUDY.open(encoding="utf-8") as stream:
         for row in csv.DictReader(stream):
             if row["status"] == "done" and row["max_penetration"]:

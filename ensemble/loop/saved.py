@@ -176,7 +176,7 @@ def load(path: str | os.PathLike[str]) -> Result:
     Raises
     ------
     InputError
-        If the file is missing, damaged, changed, or no such file.
+        If the file is missing, damaged, changed, or none that ``save`` has written.
     TypeError
         If ``path`` is no path.
 

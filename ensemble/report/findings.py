@@ -86,18 +86,38 @@ def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
     return f"; friction of receding edges is {_from_to(share)} of the loss" if share else ""
 
 
-def pattern(data: Aggregate) -> Iterator[str]:
-    """Report how γ varies along the profile; none where it does not."""
-    if data.campaign.material.stripes is None:
-        return
-    count, amplitude, phase = (
-        from_to([getattr(cell.campaign.material, name) for cell in data.cells])
-        for name in ("stripes", "stripe_amplitude", "stripe_phase")
-    )
-    yield (
-        f"The work of adhesion varies along the profile, {count} times in its period and by "
-        f"{amplitude} of γ (phase {phase} rad); γ is its mean."
-    )
+def law(data: Aggregate) -> Iterator[str]:
+    """Report the law of adhesion; none where it is one γ of zero range."""
+    material = data.campaign.material
+
+    def of_cells(name: str) -> list[float]:
+        return [getattr(cell.campaign.material, name) for cell in data.cells]
+
+    def shown(name: str) -> str:
+        found = of_cells(name)
+        return in_one_unit(name, sorted({min(found), max(found)}), " to ")
+
+    if material.stripes is not None:
+        count, amplitude, phase = (
+            from_to(of_cells(name)) for name in ("stripes", "stripe_amplitude", "stripe_phase")
+        )
+        yield (
+            f"The work of adhesion varies along the profile, {count} times in its period and by "
+            f"{amplitude} of γ (phase {phase} rad); γ is its mean."
+        )
+    if material.work_of_adhesion_open is not None:
+        opened = shown("work_of_adhesion_open")
+        yield f"Edges advance at γ, and recede at a work of adhesion of {opened}."
+    if material.adhesion_range is not None:
+        yield (
+            f"Adhesion has a range of {shown('adhesion_range')}: surfaces touch at that gap, and "
+            "patches open from inside at the strength of γ over it."
+        )
+    elif material.opens:
+        yield (
+            f"Adhesion has a strength of {shown('strength')}: patches open from inside there, and "
+            "surfaces touch at a gap of γ over it."
+        )
 
 
 def _from_to(shares: Sequence[float]) -> str:
@@ -167,7 +187,8 @@ def precision(data: Aggregate) -> Iterator[str]:
     yield (
         f"The 95 % interval of the mean {wanted.quantity} was to reach at most "
         f"{percent(wanted.wanted, digits=3)} from it ([stop]): {len(found) - len(rest)} of "
-        f"{len(found)} cells met that{f'; the others: {_listed(rest)}' if rest else ''}."
+        f"{counted(len(found), 'cell')} met that"
+        f"{f'; the others: {_listed(rest)}' if rest else ''}."
     )
 
 

@@ -35,7 +35,7 @@ def write_page(data: Aggregate, figures: Mapping[str, Sequence[Illustration]]) -
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
         _bullets(
-            *findings.pattern(data),
+            *findings.law(data),
             *findings.precision(data),
             *findings.missing(data),
             *(f"WARNING: {sentence}" for sentence in findings.warnings(data)),
@@ -117,7 +117,7 @@ def _table(heading: str, table: Table, text: str = "") -> list[str]:
 
 
 def _summary(data: Aggregate) -> str:
-    sweep, cycle = data.campaign.sweep, data.campaign.cycle
+    sweep = data.campaign.sweep
     further = "".join(
         f"{axis.name} = {in_one_unit(axis.name, axis.values)}; "
         for axis in data.further
@@ -132,9 +132,20 @@ def _summary(data: Aggregate) -> str:
         f"H = {in_one_unit('hurst', sweep.hurst)}; "
         f"γ = {in_one_unit('work_of_adhesion', sweep.work_of_adhesion)}; {further}"
         f"{many}. Each loop was loaded to {findings.turning_point(data)} "
-        f"in {counted(cycle.load_steps, 'step')} and unloaded until detached; "
+        f"in {_load_steps(data)} and unloaded until detached; "
         f"method `{data.campaign.solver.method}`. Numbers: `losses.csv`; curves: `curves.nc`."
     )
+
+
+def _load_steps(data: Aggregate) -> str:
+    """Return "20 steps", or to where so many lead where a loop takes the first of them."""
+    campaign, cycle = data.campaign, data.campaign.cycle
+    if cycle.preload is not None:
+        far = "Δ/h_max" if cycle.stiffness is None else "u_tot/h_max"
+        return f"steps of which {cycle.load_steps} would lead to {far} = {cycle.deepest:g}"
+    if len(campaign.sharing(campaign.tasks()[0])) > 1:
+        return f"steps of which {cycle.load_steps} lead to the largest"
+    return counted(cycle.load_steps, "step")
 
 
 def _origin(data: Aggregate) -> str:

@@ -96,7 +96,7 @@ def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
             print(file=stream)
     for sentence in (
         *findings.verdict(data),
-        *findings.pattern(data),
+        *findings.law(data),
         *findings.precision(data),
         *findings.missing(data),
         *findings.quality(data),

@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact.add_argument(
         "--young", type=STRESS.option, required=True, metavar="E", help="in Pa, or 1MPa"
     )
-    contact.add_argument("--poisson", type=float, required=True, metavar="NU")
+    contact.add_argument(
+        "--poisson", type=float, required=True, metavar="NU", help="0.5: incompressible"
+    )
     add_cycle_arguments(contact)
     add_method_arguments(contact, "of each loop (default 1e-3)")
     add_reading_arguments(parser)

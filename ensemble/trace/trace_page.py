@@ -42,6 +42,8 @@ from adhesis.solver.loading.equilibrium_path import (
 )
 from adhesis.solver.loading.zero_range import RANGES, limit_text
 
+_DIGITS = 3  # of a loss whose interval is 2 % at least
+
 
 def summary(answer: Answer) -> str:
     """The answer in a few lines for the terminal."""
@@ -58,15 +60,15 @@ def _findings(answer: Answer) -> list[tuple[str, str]]:
     opened = cycle.work_of_adhesion_open
     friction = []
     if opened is not None and opened != cycle.works_of_adhesion[0]:
-        varies = cycle.pattern is not None
-        text = friction_text(opened, loop["loss"], loop["friction"], varies=varies)
+        parts = opened, loop["loss"], loop["friction"]
+        text = friction_text(*parts, varies=cycle.pattern is not None, digits=_DIGITS)
         friction = [("friction", text)]
     doubts = (f"{name} {rounded_percent(share)}" for name, share in answer.loss.doubts.items())
     found = [
         (
             "loss",
             f"{_value(answer.loss, 1e3, 'mJ/m²')}"
-            f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}{note}",
+            f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0], _DIGITS)}{note}",
         ),
         ("pull-off", f"{_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension"),
         (

@@ -22,6 +22,7 @@ from adhesis.solver.loading.zero_range import (
     InteriorTension,
     interior_tension,
     least_range,
+    length_text,
     limit_text,
     narrowest_length,
     outside_text,
@@ -472,12 +473,12 @@ class EquilibriumPath(ByValue, ResultViews):
             largest = 0.0 if interior is None else interior.tension
             zones = 100 * self.zone_error / (abs(self.lost) or 1.0)
             return (
-                f"adhesion of a range of {self.problem.attraction_range:.3g} m: surfaces jump "
-                f"together from there on, and patches open from inside at {strength:.3g} Pa, "
-                f"{counted(self.openings, 'opening')} with barriers of "
-                f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; "
+                f"adhesion of a range of {length_text(self.problem.attraction_range)}: surfaces "
+                f"jump together from there on, and patches open from inside at "
+                f"{stress_text(strength)}, {counted(self.openings, 'opening')} with barriers of "
+                f"{self.barrier:.2g} J/m²; largest tension inside patches {stress_text(largest)}; "
                 f"{outside_text(*self.outer_ranges)}; zones at edges, left out, change the loss by "
-                f"about {zones:.1g} %"
+                f"about {float(f'{zones:.1g}'):g} %"
             )
         inside = "no tension inside patches"
         if interior is not None:
@@ -544,22 +545,27 @@ class EquilibriumPath(ByValue, ResultViews):
 
 
 def friction_text(
-    work_of_adhesion_open: float, lost: float, friction: float, *, varies: bool = False
+    work_of_adhesion_open: float,
+    lost: float,
+    friction: float,
+    *,
+    varies: bool = False,
+    digits: int = 6,
 ) -> str:
     """Return in one line which part of a loss is friction of edges; values in J/m².
 
-    ``varies``: whether the works of adhesion vary along the profile.
+    ``varies``: whether the works of adhesion vary along the profile; ``digits``: of both parts.
     """
     mean = " in the mean" if varies else ""
     return (
-        f"{friction:.6g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} J/m²{mean}; "
-        f"{lost - friction:.6g} J/m² lost by instability"
+        f"{friction:.{digits}g} J/m² at edges, which recede at {work_of_adhesion_open:.4g} "
+        f"J/m²{mean}; {lost - friction:.{digits}g} J/m² lost by instability"
     )
 
 
-def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
+def in_works_of_adhesion(loss: float, work_of_adhesion: float, digits: int = 4) -> str:
     """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
-    return f", {loss / work_of_adhesion:.4g} γ" if work_of_adhesion > 0 else ""
+    return f", {loss / work_of_adhesion:.{digits}g} γ" if work_of_adhesion > 0 else ""
 
 
 def sticking_text(

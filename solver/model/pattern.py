@@ -169,9 +169,9 @@ def stripes_of(
     if count is None and amplitude is None and not phase:
         return None
     if count is None or amplitude is None:
-        missing = "number" if count is None else "amplitude"
+        missing = "stripes" if count is None else "stripe_amplitude"
         raise ValueError(
-            f"the {missing} of stripes of the work of adhesion is missing: give stripes and "
-            "stripe_amplitude together, and stripe_phase with both, or none of them"
+            f"{missing} is missing: a work of adhesion that varies has a number of stripes and an "
+            "amplitude, and a phase beside both if need be"
         )
     return stripes(count, amplitude, phase or 0.0)

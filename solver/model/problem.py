@@ -49,7 +49,7 @@ def check_slope(rms_slope: float) -> None:
     ValueError
         If the rms slope lies outside :data:`adhesis.solver.checks.RMS_SLOPE`.
     """
-    if not RMS_SLOPE.holds(rms_slope):
+    if not RMS_SLOPE.holds(float(f"{rms_slope:.12g}")):  # the root of m2 is right to some bits
         shown = f"{rms_slope:,.4g}" if 1 < rms_slope < 1e6 else plain(float(f"{rms_slope:.4g}"))
         raise ValueError(f"rms slope is {shown}: it must be {RMS_SLOPE.text}")
 

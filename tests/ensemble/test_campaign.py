@@ -111,7 +111,7 @@ h_rms = [1e-6, "1 m"] -> [profile] h_rms is 1.0 with period 0.001, so the rms sl
 ratio = 50000; h_rms = 1e-9; nodes_per_wave = 100000 ->
     [solver] nodes_per_wave is 100000: with 50000 waves it must be at most 1342
 # numbers that can hardly be meant without a unit
-period = 1000 -> period is 1000, which would be 1000 m: give its unit, as in 1000um (1000m, if
+period = 1000 -> period is 1000, which would be 1000 m: give its unit, as in "1000um" ("1000m", if
 period = [1e-3, 2.5] -> period is 2.5, which would be 2.5 m
 work_of_adhesion = [0.04, 40] -> work_of_adhesion is 40, which would be 40 J/m²: give its unit, as
 # keys that are missing or do not go together
@@ -140,8 +140,8 @@ work_of_adhesion_open = 0.08; strength = 3e9 -> _open and a range or strength: a
 work_of_adhesion_open = 0.08; method = "grid" ->
     [solver] method is 'grid' beside a work_of_adhesion_open
 strength = 3e6 -> [solver] method is 'grid' beside a range or strength
-stripes = 2 -> the amplitude of stripes of the work of adhesion is missing
-stripe_phase = 1.0 -> the number of stripes of the work of adhesion is missing
+stripes = 2 -> [material] stripe_amplitude is missing: a work of adhesion that varies
+stripe_phase = 1.0 -> [material] stripes is missing: a work of adhesion that varies
 stripes = 2; stripe_amplitude = 0.1; strength = 1e8; method =; nodes_per_wave = ->
     is given beside a strength
 # rules that hold in every cell

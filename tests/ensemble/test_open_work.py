@@ -10,7 +10,7 @@ import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import main
-from adhesis.ensemble.report.findings import verdict
+from adhesis.ensemble.report.findings import law, verdict
 from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.doubt import beyond_zero_range
@@ -86,6 +86,9 @@ def test_the_answer_of_a_trace_has_its_friction():
     assert answer.main["work_of_adhesion_open"] == 0.02
     assert "\nfriction    " in str(answer)
     assert "which recede at 0.02 J/m²" in str(answer)
+    loss, friction = answer.loss.value, answer.main["friction"]
+    assert f"friction    {friction:.3g} J/m² at edges" in str(answer)  # it is known to 2 % at best
+    assert f", {loss / answer.cycle.works_of_adhesion[0]:.3g} γ" in str(answer)
 
 
 def test_a_row_has_its_friction():
@@ -156,3 +159,9 @@ def test_the_report_says_which_part_is_friction(both):
     share = values["small_scale_share"] / (1 - values["small_scale_share"])
     assert share == pytest.approx(values["loss_small_scale"] / values["loss_large_scale"])
     assert "friction" not in one
+    said = [list(law(data)) for data in both]
+    assert said == [
+        ["Edges advance at γ, and recede at a work of adhesion of 0.05 to 0.08 J/m²."],
+        [],
+    ]
+    assert "friction and instability: parts of the loss, in mJ/m²; " in losses(both[0]).notes()

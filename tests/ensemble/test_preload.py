@@ -309,7 +309,8 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
     assert " | short | " in text
     turn = "0.0001 … 1 MPa (1 of 2 loops turned before they reached it)"
     assert text.split("\n\n")[1].startswith(f"A loop to a preload of {turn} and back until")
-    assert f" Each loop was loaded to a preload of {turn} in " in text
+    steps = "in steps of which 10 would lead to Δ/h_max = 0.999 and unloaded"
+    assert f" Each loop was loaded to a preload of {turn} {steps} until detached; " in text
     assert "short: loops that turned before their preload was reached" in text
     assert text.count("turn at different penetrations") == 2
     with adhesis.open(out) as results:

@@ -690,6 +690,11 @@ def test_a_report_compares_and_doubts_no_loss_without_adhesion(tmp_path):
     assert not any("WARNING" in text or "below 0 nm" in text for text in findings.quality(data))
     known = [np.isfinite(cell.estimates["loss"].low) for cell in data.cells]
     assert known == [False, True]
+    table = loss_tables.losses(data)
+    shown = table.markdown().splitlines()[2].split("|")
+    assert "0.000" in shown[4]  # rounding is no loss
+    place = [column.name for column in table.columns].index("loss_mean [J/m^2]")
+    assert table.rows[0][place] == 0
     values["status"][~none] = 0
     values["jump_kind"][none] = -1
     data = aggregate(write(tmp_path / "none.h5", plan, values))
@@ -755,6 +760,12 @@ def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
     (place,) = (k for k, column in enumerate(table.columns) if column.heading == "± zones")
     assert table.columns[place].name == "zone_error_mean [J/m^2]"
     assert table.rows[0][place] == pytest.approx(2.5e-6)
+    assert (
+        "± zones: mean change of the loss by cohesive zones at edges, in mJ/m²; " in table.notes()
+    )
+    assert "to be set beside the range of adhesion that is given" in table.notes()
+    (sentence,) = findings.law(aggregate(path))
+    assert sentence.startswith("Adhesion has a strength of 1 GPa: patches open from inside there")
     status = read_status(path)
     assert [row["row"] for row in status["beyond_limit"]] == [1, 2, 3]
     assert "3 losses are doubtful: the tension inside patches exceeds" in as_text(status)

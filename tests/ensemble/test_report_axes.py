@@ -119,6 +119,7 @@ def test_tables_curves_and_page_have_every_axis(file, data, tmp_path, quick_figu
     page = (directory / "report.md").read_text(encoding="utf-8")
     assert "show the cells at ratio = 100, max_penetration = 0.9" in page
     assert "Along max_penetration from 0.5 to 0.9 the mean loss in J/m²" in page
+    assert f"in steps of which {data.campaign.cycle.load_steps} lead to the largest and" in page
 
 
 def test_figures_along_an_axis_hold_the_means_there(data):

@@ -16,6 +16,7 @@ import xarray
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.report import findings
@@ -212,7 +213,9 @@ def test_a_doubtful_loss_is_said(tmp_path):
     assert "2 losses are doubtful: by their own account they may be off" in again.stderr
 
 
-def test_what_there_is_one_of_is_said_in_the_singular_and_rounding_is_no_loss(tmp_path):
+def test_what_there_is_one_of_is_said_in_the_singular_and_rounding_is_no_loss(
+    tmp_path, monkeypatch
+):
     one = {"hurst": "[0.7]", "work_of_adhesion": "[0.01]", "realisations": "1"}
     process, out = run(tmp_path, fake="doubt=*:*:*", **one)
     assert "r.h5: 1 task to do\n" in process.stderr
@@ -223,6 +226,10 @@ def test_what_there_is_one_of_is_said_in_the_singular_and_rounding_is_no_loss(tm
     assert "1 loss is doubtful: by its own account less accurate" in shown
     said = [*findings.quality(aggregate(out)), *findings.missing(aggregate(out))]
     assert any("WARNING: 1 of 1 loss is doubtful, as its audit" in text for text in said)
+    known = precision([1.0, 1.1, 0.9], 0.5, "loss")
+    monkeypatch.setattr(findings, "precisions", lambda cells: [("H = 0.7", known)])
+    (sentence,) = findings.precision(aggregate(out))
+    assert "([stop]): 0 of 1 cell met that; the others: H = 0.7: loss" in sentence
     without = {"loss": -5e-12, "loss_standard_error": 1e-11, "work_of_adhesion": 0.0}
     status = read_status(out)
     status["groups"][0] |= without
@@ -243,6 +250,9 @@ def test_a_task_that_hangs_meets_the_time_limit_and_the_limit_may_change(tmp_pat
     assert process.returncode == 1
     failure = json.loads(adhesis_here("status", out, "--json").stdout)["failures"][0]
     assert failure["error"] == "longer than the time limit of 0.6 s"
+    again = f"again: adhesis run CAMPAIGN.toml --out {out} --redo failed"
+    shown = adhesis_here("status", out).stdout
+    assert f"{again}, with a longer time_limit in [solver]\n" in shown
     assert failure["seconds"] > 0.5
     process, _ = run(tmp_path, "--redo", "failed", method='"grid"\ntime_limit = 60')
     assert process.returncode == 0

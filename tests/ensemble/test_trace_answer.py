@@ -579,7 +579,7 @@ def test_a_range_of_a_trace_is_said_with_what_zones_at_edges_change() -> None:
     assert found["zone_error"] > 0
     share = found["zone_error"] / found["loss"]["value"]
     assert answer.loss.doubts["zones"] == pytest.approx(share)
-    assert "\nrange       adhesion of a range of 2e-07 m" in str(answer)
+    assert "\nrange       adhesion of a range of 200 nm: " in str(answer)
 
 
 @pytest.mark.usefixtures("quick_figures")

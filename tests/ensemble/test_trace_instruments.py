@@ -128,3 +128,13 @@ def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> 
         InputError, match=r"a\.h5 states no lengths or no unit .* give step and unit"
     ):
         read_trace(tmp_path / "a.h5")
+
+
+def test_a_file_of_no_reader_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    """One of the readers logs the bytes that it cannot use."""
+    (tmp_path / "a.bin").write_bytes(bytes(range(256)) * 20)
+    words = ("trace", tmp_path / "a.bin", "--plan", "--work-of-adhesion", 0.01)
+    process = run_python("-m", "adhesis", *words, "--young", 1e6, "--poisson", 0.5)
+    (sentence,) = process.stderr.splitlines()
+    assert sentence.startswith("adhesis trace: ")
+    assert "is neither text nor an instrument format" in sentence

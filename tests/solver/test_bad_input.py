@@ -453,6 +453,8 @@ def test_bad_input_is_refused_in_one_sentence(call: str, end: str) -> None:
 
 def test_the_steepest_profiles_that_methods_are_tested_with_are_not_refused() -> None:
     Problem(spectral(h_rms=None, m2=99.99**2), SOLID, 0.04)
+    for period in (1e-3, 2e-3, 3e-3, 7e-3):  # whose slopes are 100 but for rounding
+        Problem(spectral(h_rms=None, m2=1e4, period=period), SOLID, 0.04)
     with pytest.raises(ValueError, match=r"rms slope is 100\.1: it must be"):
         Problem(spectral(h_rms=None, m2=99.99**2).scaled(1.001), SOLID, 0.04)
 

@@ -122,6 +122,7 @@ def test_a_loop_says_what_zones_at_its_edges_change(alpha, share, doubtful):
     wave, loop = wave_of(alpha), loop_at(alpha, share)
     left_out = 100 * (loop.loss - dugdale_loss(alpha, share)) / wave.loop.loss
     said = re.search(r"edges, left out, change the loss by about (\S+) %", loop.range_summary())
+    assert "e" not in said[1]
     assert 0.6 < float(said[1]) / left_out < 1.6
     assert 0.6 < 100 * loop.zone_error / wave.loop.loss / left_out < 1.6
     assert any("0.67 of edge_range" in text for text in loop.warnings) == doubtful

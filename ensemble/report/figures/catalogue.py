@@ -196,8 +196,8 @@ MECHANISMS = (
     Illustration(
         "pull_off_stress",
         "Pull-off stress",
-        "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
-        "a little.",
+        "Largest mean tension on unloading, means with 95 % intervals. A caret at 0 marks an "
+        "interval that goes on below. The marks are moved apart a little.",
         loss_figures.pull_off,
         is_worth=_several("work_of_adhesion"),
     ),
@@ -226,11 +226,12 @@ def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
     further = {other.name for other in data.further} - {*with_it, axis.name}
     caption = (
         "Means with 95 % intervals. The profiles have the same phases in every cell (paired): "
-        "differences between cells are as a rule known better than overlapping bars suggest."
+        "differences between cells are as a rule known better than overlapping bars suggest. A "
+        "caret at 0 marks an interval that goes on below."
     )
     if further or len(data.works_of_adhesion) > 1:
         of_each = "each value of the other axis" if further else "each γ"
-        caption += f" Marks of one look belong to {of_each}, and are moved aside a little."
+        caption += f" The marks of {of_each} are moved aside a little."
     if len(axis.values) >= FEWEST_FOR_A_LINE:
         caption += " Lines join them to guide the eye."
     if hollow_handle(data.cells):

@@ -23,6 +23,7 @@ from adhesis.solver.values import finite
 
 _ALL, _DIFFERENCE = "mean std sem ci_low ci_high", "value sem ci_low ci_high"
 _MILLI: Any = {"unit": " [J/m^2]", "size": 1e-3}
+_FROM_ZERO = ("loss_dimensionless", "loss")  # of which no end of an interval below 0 is shown
 
 
 def losses(data: Aggregate) -> Table:
@@ -77,10 +78,12 @@ def losses(data: Aggregate) -> Table:
         *estimated("loss", _ALL, "loss (mJ/m²)", **_MILLI, least=True),
     ]
     if material.work_of_adhesion_open is not None:
-        columns += estimated("friction", "mean", "friction", **_MILLI)
+        parts = "friction and instability: parts of the loss, in mJ/m²"
+        columns += estimated("friction", "mean", "friction", **_MILLI, note=parts)
         columns += estimated("instability", "mean", "instability", **_MILLI)
     if material.opens:
-        columns += estimated("zone_error", "mean", "± zones", **_MILLI)
+        zones = "± zones: mean change of the loss by cohesive zones at edges, in mJ/m²"
+        columns += estimated("zone_error", "mean", "± zones", number(1, 1e-3), **_MILLI, note=zones)
     columns += [
         TableColumn(
             *("loss_over_work_of_adhesion", _over_gamma, "W/γ", number(3)),
@@ -113,8 +116,7 @@ def losses(data: Aggregate) -> Table:
             lambda cell: extreme(np.min, cell.least_range) if cell.work_of_adhesion else None,
             *("range (nm)", number(unit=1e-9)),
             only_if_any=True,
-            note="range: range of adhesion below which the zero-range limit holds (the least of "
-            f"{ANY_RANGE} of all loops)",
+            note=_note_on_ranges(material.opens),
         ),
         *(TableColumn(f"{name}_least [m]", _of_loops(name, np.min)) for name in RANGES),
         TableColumn("largest_interior_tension [Pa]", _of_loops("largest_interior_tension", np.max)),
@@ -143,12 +145,22 @@ def _note(data: Aggregate) -> str:
     interval = f"; 95 % interval of the mean {both if 'transformed' in methods else student}"
     if len(methods) > 1:
         interval += f", for fewer than {FEWEST_FOR_SKEWNESS} realisations {student}"
+    if any(cell.estimates[name].low < 0 for cell in data.cells for name in _FROM_ZERO):
+        interval += ", an end below 0 shown as 0"
     weight = "; under a weight: closed at the separation of its fall"
     return (
         "W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max) and Δ~ = Δ/h_max, each realisation with its own "
         f"h_max; s.e.: standard error of the mean{interval if methods else ''}"
         f"{weight if data.campaign.cycle.under_load else ''}"
     )
+
+
+def _note_on_ranges(is_given: bool) -> str:
+    """Return what the column of ranges is; ``is_given``: beside a range of adhesion, or without."""
+    least = f"the least of {ANY_RANGE} of all loops"
+    if is_given:
+        return f"range: {least}, to be set beside the range of adhesion that is given"
+    return f"range: range of adhesion below which the zero-range limit holds ({least})"
 
 
 def _note_on_load_steps(data: Aggregate) -> str:

@@ -9,6 +9,8 @@ first to last point. So the step is always computed from its positions.
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import ModuleType
 from typing import Any, NoReturn
 
@@ -43,10 +45,7 @@ def read_scan(
     length or unit, it holds a map and no row is chosen, or the chosen channel or row is not there.
     """
     io = _library()
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # they concern the readers, not the file
+    with _without_a_word():
         try:
             reader = io.open_topography(source.name if source.content is None else source.open())
             channels = list(reader.channels)
@@ -75,6 +74,22 @@ def read_scan(
     metres = LENGTH.units[LENGTH.unit_named(str(topography.unit))]
     label = f"{_name(reader)}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
     return positions * metres, heights * metres, label, _tip_radius(topography)
+
+
+@contextmanager
+def _without_a_word() -> Iterator[None]:
+    """Silence warnings and logs of the readers: of a file of none of them many have some."""
+    import logging
+    import warnings
+
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(before)
 
 
 def _refuse(source: Source, sentence: str) -> NoReturn:
