@@ -80,7 +80,7 @@ class Steps:
         self.states.append(before)
         position = self.profile.crests().position
         if self.adhesion_scale:
-            position = position[self.profile.first_of_equal(position, self.problem.equal_parts)]
+            position = position[self.problem.first_of_equal(position, self.problem.equal_parts)]
         crests = np.rint(position / self.lattice.dx).astype(np.intp)
         contact.mask[crests % self.lattice.n] = True
         self.solver.solve(contact, self.relaxation.tight)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import InitVar, dataclass, field
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -23,7 +24,7 @@ from adhesis.solver.model.control import Control, Value
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.pattern import AdhesionPattern
-from adhesis.solver.model.profile import Array, Profile
+from adhesis.solver.model.profile import Array, Integers, Profile, first_of_equal
 from adhesis.solver.values import ByValue
 
 Measure = Literal["arc", "flat"]
@@ -31,6 +32,9 @@ Measure = Literal["arc", "flat"]
 
 LONGEST_GRIFFITH_CRACK = 0.25
 """Length of the longest Griffith crack that may open a patch, in shortest waves."""
+
+# Of the shortest wave: places in equal parts of the period that differ by less are copies.
+_SAME_PLACE = 1e-3
 
 # Rounding of a separation over h_max: smaller penetrations count as 0.
 _ROUNDING = 8 * float(np.finfo(float).eps)
@@ -301,6 +305,25 @@ class Problem(ByValue):
         For much larger γ contact runs into full contact spontaneously.
         """
         return 0.25 * self.half_space.modulus * self.profile.moment(1)
+
+    @cached_property
+    def first_crest(self) -> float:
+        """Position in m of the highest crest; of equal ones, of that with the largest γ(x).
+
+        That one attracts first, however short the range of adhesion is.
+        """
+        if self.pattern is None:
+            return self.profile.highest_point[0]
+        x = self.profile.crests().position % self.profile.period
+        return float(x[np.argmax(self.pattern.at(self.profile.q0 * x))])
+
+    def first_of_equal(self, position: Array, equal_parts: int) -> Integers:
+        """Choose, of places in m where contact may begin alike, those where it does begin.
+
+        See :func:`first_of_equal`; of so many equal parts the period consists.
+        """
+        period, near = self.profile.period, _SAME_PLACE * self.profile.shortest_wavelength
+        return first_of_equal(position, self.first_crest, period / equal_parts, period, near)
 
     def separation(self, penetration: float) -> float:
         """Compute the separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""
