@@ -192,6 +192,24 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
     assert reported.cells[0].tasks == 0
 
 
+def test_rounding_of_loops_without_adhesion_is_no_spread():
+    """Of W~ about 1e-12 it was 890 %, and every cell was said to take as many as it may."""
+    stop = "[stop]\nrelative_error = 0.1\nmost = 200\n"
+    text = campaign_text(realisations="8", work_of_adhesion="[0.0, 0.04]") + stop
+    rng = np.random.default_rng(1)
+
+    def compute(campaign, task):
+        mean = 3.0 if task.work_of_adhesion else 1e-12
+        spread = 0.4 if task.work_of_adhesion else 9.0
+        return {
+            "cpu_time": 1.0,
+            "loss_dimensionless": mean * (1 + spread * rng.standard_normal()),
+        }
+
+    reported = str(price(parse_campaign(text), compute=compute))
+    assert "loss_dimensionless of 400 loops scatters by 40 % so far" in reported
+
+
 def test_a_part_costs_its_share():
     campaign = parse_campaign(campaign_text(realisations="10"))
     shares = [price(campaign, None, Part(k, 4), compute=compute).seconds for k in range(1, 5)]
