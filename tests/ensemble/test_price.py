@@ -113,8 +113,8 @@ def test_pilot_loops_short_of_their_preload_are_reported():
     (warning,) = (s for s in str(price(campaign, compute=falls_short)).splitlines() if "WARN" in s)
     assert warning == (
         "WARNING: 2 of 4 pilot loops do not reach the preload, and turn at the latest turning "
-        "point: at load steps the mean stress is at most 1.2 kPa. Rougher profiles, a stiffer "
-        "material or a smaller preload let loops reach it."
+        "point: at load steps the mean stress is at most 1.2 kPa. Rougher profiles or a stiffer "
+        "material let loops reach it, or a smaller preload where the stress is no tension."
     )
 
     def pulls(campaign, task):
