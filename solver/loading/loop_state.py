@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver.checks import at_least, at_most
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath
 from adhesis.solver.loading.mean_stress_event import REACHED, locate
 from adhesis.solver.method import ContactState, Fields, Method, Opening
@@ -108,7 +109,7 @@ def state_at_stress(
     if least > 0 or most < 0:
         raise ValueError(
             f"stress is {stress:g} Pa: on the {branch} branch the mean stress in contact lies "
-            f"between {stress + least:.6g} and {stress + most:.6g} Pa"
+            f"between {at_least(stress + least, 6)} and {at_most(stress + most, 6)} Pa"
         )
     at = [i for i, difference in found.items() if difference == 0]
     passing = [i for i in found if i - 1 in found and found[i - 1] * found[i] < 0]

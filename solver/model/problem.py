@@ -14,6 +14,8 @@ from adhesis.solver.checks import (
     RMS_SLOPE,
     STRENGTH,
     WORK_OF_ADHESION,
+    at_least,
+    at_most,
     choice,
     instance,
     plain,
@@ -177,7 +179,8 @@ class Problem(ByValue):
         gamma = self.work_of_adhesion
         found = real("work_of_adhesion_open", self.work_of_adhesion_open, WORK_OF_ADHESION)
         if found < gamma or gamma == 0 < found:
-            rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
+            least = f"at least the work of adhesion, {at_least(gamma, 6)}"
+            rule = least if gamma else "left out, as γ is 0"
             raise ValueError(f"work_of_adhesion_open is {found:g} J/m²: it must be {rule}")
         if found > gamma and math.isfinite(self.strength):
             raise ValueError(
@@ -244,10 +247,10 @@ class Problem(ByValue):
             return
         least = math.sqrt(4 * self.half_space.modulus * self.work_of_adhesion / (math.pi * most))
         if adhesion_range is None:
-            given, rule = f"strength is {self.strength:g} Pa", f"at least {least:.3g} Pa"
+            given, rule = f"strength is {self.strength:g} Pa", f"at least {at_least(least, 3)} Pa"
         else:
             given = f"adhesion_range is {adhesion_range:g} m"
-            rule = f"at most {self.work_of_adhesion / least:.3g} m"
+            rule = f"at most {at_most(self.work_of_adhesion / least, 3)} m"
         raise ValueError(
             f"{given}: it must be {rule} for this profile, or the crack that opens a patch, "
             f"{self.critical_crack:.3g} m long, exceeds a quarter of the shortest wave, and edges "
