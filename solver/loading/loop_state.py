@@ -107,9 +107,11 @@ def state_at_stress(
     found = {i: 0.0 if abs(difference) <= near else difference for i, difference in found.items()}
     least, most = min(found.values()), max(found.values())
     if least > 0 or most < 0:
+        low, high = stress + least, stress + most
+        low, high = low - REACHED * abs(low), high + REACHED * abs(high)
         raise ValueError(
             f"stress is {stress:g} Pa: on the {branch} branch the mean stress in contact lies "
-            f"between {at_least(stress + least, 6)} and {at_most(stress + most, 6)} Pa"
+            f"between {at_least(low, 6)} and {at_most(high, 6)} Pa"
         )
     at = [i for i, difference in found.items() if difference == 0]
     passing = [i for i in found if i - 1 in found and found[i - 1] * found[i] < 0]
