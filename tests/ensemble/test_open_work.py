@@ -1,6 +1,5 @@
 """The work of adhesion of receding edges in commands, campaigns, results files and reports."""
 
-import csv
 import json
 
 import numpy as np
@@ -19,7 +18,7 @@ from adhesis.ensemble.trace.answer import make_cycle
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.ensemble.trace.variants import make_plan
-from tests.support.campaign_support import campaign_text
+from tests.support.campaign_support import campaign_text, table_of
 from tests.support.scenes import HALF_SPACE
 from tests.support.synthetic_results import rows, text_of, write
 
@@ -137,14 +136,12 @@ def test_the_table_of_losses_has_both_parts_where_the_key_is_given(both, tmp_pat
     tables = []
     for data in both:
         losses(data).write_csv(tmp_path / "losses.csv")
-        with (tmp_path / "losses.csv").open(newline="") as stream:
-            tables.append(list(csv.reader(stream)))
-    (head, *lines), (one, *_) = tables
+        tables.append(table_of(tmp_path / "losses.csv"))
+    opened, (one, *_) = tables
     new = ["friction_mean [J/m^2]", "instability_mean [J/m^2]"]
-    assert [name for name in head if name in new] == new
-    assert "work_of_adhesion_open [J/m^2]" in head
-    for line in lines:
-        row = dict(zip(head, line, strict=True))
+    assert [name for name in opened[0] if name in new] == new
+    assert "work_of_adhesion_open [J/m^2]" in opened[0]
+    for row in opened:
         loss = float(row["loss_mean [J/m^2]"])
         assert float(row[new[0]]) == pytest.approx(0.25 * loss)
         assert float(row[new[1]]) == pytest.approx(0.75 * loss)

@@ -1,6 +1,5 @@
 """Realisations in batches until the mean is known well enough: the rule, and its runs."""
 
-import csv
 import json
 import shutil
 
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 
 from adhesis.ensemble.aggregate.status import as_text, read_status
+from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.precision import (
     LEAST,
@@ -32,11 +32,12 @@ from tests.support.campaign_support import (
     adhesis,
     adhesis_here,
     campaign_text,
-    compare,
     differences,
+    differing,
     done_rows,
     kill_all,
     start,
+    table_of,
     wait_until,
 )
 from tests.support.fake_run import fake_engine
@@ -291,10 +292,8 @@ def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
     for figures in ("FIELDS", "LOOPS", "LOSSES", "MECHANISMS"):
         monkeypatch.setattr(f"adhesis.ensemble.report.figures.catalogue.{figures}", ())
     data = write_report(out, tmp_path / "report")
-    with (tmp_path / "report" / "precision.csv").open(encoding="utf-8") as stream:
-        known = list(csv.DictReader(stream))
-    with (tmp_path / "report" / "losses.csv").open(encoding="utf-8") as stream:
-        printed = list(csv.DictReader(stream))
+    known = table_of(tmp_path / "report" / "precision.csv")
+    printed = table_of(tmp_path / "report" / "losses.csv")
     unit = " [J/m^2]" if quantity == "loss" else ""
     for mine, table, group in zip(known, printed, read_status(out)["groups"], strict=True):
         assert mine["quantity"] == group["quantity"] == quantity
@@ -340,10 +339,10 @@ def test_ranks_and_kills_change_no_bit_of_a_precision_campaign(tmp_path, finishe
 
 def test_what_a_stop_may_be():
     old, new = parse_campaign(text()), parse_campaign(text(0.1, 100))
-    assert set(compare(old, new).grown) == {"stop.relative_error", "stop.most"}
-    assert len(compare(new, old).other) == 2
-    assert compare(parse_campaign(campaign_text(realisations="8")), old).other
+    assert set(growth("f", old, new)) == {"stop.relative_error", "stop.most"}
+    assert len(differing(new, old)) == 2
+    assert differing(parse_campaign(campaign_text(realisations="8")), old)
     spelt = parse_campaign(text(quantity="loss_dimensionless"))
-    assert compare(old, spelt) == ((), ())
-    (phrase,) = compare(old, parse_campaign(text(quantity="loss"))).other
+    assert growth("f", old, spelt) == ()
+    (phrase,) = differing(old, parse_campaign(text(quantity="loss")))
     assert phrase == "stop.quantity is 'loss' here and 'loss_dimensionless' there"

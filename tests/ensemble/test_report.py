@@ -1,7 +1,6 @@
 """The report: what the tables say, what the figures draw, what the page shows."""
 
 import base64
-import csv
 import io
 import re
 from dataclasses import replace
@@ -36,7 +35,7 @@ from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import GAP_BINS
 from tests.support.browser import needs_browser, seen_by_browser
-from tests.support.campaign_support import ROOT
+from tests.support.campaign_support import ROOT, table_of
 from tests.support.figures import few_figures
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
@@ -62,7 +61,7 @@ SAVED = "loss_by_mechanism"
 def made(file) -> tuple[Path, dict[str, Figure]]:
     """The report, and its figures by name."""
     with few_figures(SAVED) as figures:
-        write_report(file, file.parent / "report", io.StringIO())
+        write_report(file, file.parent / "report")
     return file.parent / "report", figures
 
 
@@ -98,8 +97,7 @@ def lines_of(axes) -> dict[str, np.ndarray]:
 
 
 def test_losses_csv_holds_the_averages_with_units(report, data):
-    with (report / "losses.csv").open(encoding="utf-8") as stream:
-        table = list(csv.DictReader(stream))
+    table = table_of(report / "losses.csv")
     assert [(float(r["hurst"]), float(r["work_of_adhesion [J/m^2]"])) for r in table] == [
         (h, g) for h in (0.7, 0.8) for g in GAMMAS
     ]
@@ -154,7 +152,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
         assert not of_paper(parse_campaign(text.replace(old, new))), new
     plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=3, ratio=20)
     path = write(tmp_path / "r.h5", plan)
-    data = write_report(path, tmp_path / "out", io.StringIO())
+    data = write_report(path, tmp_path / "out")
     page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "19.36" not in page
     assert "aper" not in page.replace("paper.h5", "")
@@ -319,7 +317,7 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
         text = text_of(**PLAN | {"realisations": 2}).replace("field_nodes = 256", listed)
         path = write(tmp_path / f"{len(kept)}.h5", text)
         undrawn += ["fig3_shapes", "fig4_spectra_of_branches"]
-        data = write_report(path, tmp_path / str(len(kept)), io.StringIO())
+        data = write_report(path, tmp_path / str(len(kept)))
         page = (tmp_path / str(len(kept)) / "report.md").read_text(encoding="utf-8")
         caption = dict(re.findall(r"\*\*.*\(paper's (.*)\)\.\*\* (.*) \(\[PDF", page))
         shapes, both = (quick_figures[name] for name in undrawn[-2:])
@@ -375,7 +373,7 @@ def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, undrawn, quick_fi
     for count, said in ((5, ""), (8, "6 of 8 γ")):
         plan = campaign(hurst=(0.7,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
         path = write(tmp_path / f"{count}.h5", plan)
-        write_report(path, tmp_path / str(count), io.StringIO())
+        write_report(path, tmp_path / str(count))
         axes = quick_figures["fig7_loop_against_penetration"].axes[0]
         assert len([k for k in lines_of(axes) if "unloading" in k]) == min(count, 6)
         page = (tmp_path / str(count) / "report.md").read_text(encoding="utf-8")
@@ -455,7 +453,7 @@ def test_the_page_embeds_every_figure_that_exists(report):
 def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, undrawn):
     undrawn.append(SAVED)
     with few_figures(SAVED):
-        write_report(file, tmp_path, io.StringIO())
+        write_report(file, tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert {"losses.csv", "curves.nc", "report.html", "loss_by_mechanism.pdf"} < names
     for name in names:
@@ -486,7 +484,7 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(
 def test_one_finished_task_of_one_cell_is_enough(tmp_path, quick_figures):
     path = write(tmp_path / "r.h5", campaign(hurst=(0.8,), gamma=(0.04,), realisations=1))
     parts: list[str] = []
-    data = write_report(path, tmp_path / "out", io.StringIO(), progress=parts.append)
+    data = write_report(path, tmp_path / "out", progress=parts.append)
     assert data.done == 1
     # losses against H, m2 and γ would be single points
     assert not {"table1_losses", "loss_against_m2", "pull_off_stress"} & set(quick_figures)
@@ -625,10 +623,10 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
 def test_another_largest_penetration_is_compared_with(file, tmp_path):
     depths = "max_penetration = 0.9", "max_penetration = 0.6"
     lower = companion(tmp_path, "lower.h5", 0.5, *depths)
-    data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
+    data = write_report(file, tmp_path / "out", beside=[lower])
     assert "cycle.max_penetration = 0.6" in write_page(data, {})
     assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
-    write_report(file, tmp_path / "out", io.StringIO())
+    write_report(file, tmp_path / "out")
     assert not (tmp_path / "out" / "beside.csv").exists()
 
 
