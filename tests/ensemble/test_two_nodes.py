@@ -26,7 +26,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.processes import ran
+from tests.support.processes import executable, ran
 
 pytestmark = pytest.mark.mpi
 NETWORK = "10.77.0.0/24"
@@ -83,14 +83,13 @@ def nodes(tmp_path: Path) -> Iterator[Nodes]:
         "127.0.0.1 localhost\n"
         + "".join(f"{a} {n}\n" for a, n in zip(ADDRESSES, NAMES, strict=True))
     )
-    agent = tmp_path / "agent"
-    agent.write_text(
+    executable(
+        tmp_path / "agent",
         "#!/bin/bash\nhost=$1\nshift\n"
         f'exec ip netns exec "adhesis-$host-{os.getpid()}" unshare --uts --ipc --mount bash -c '
         f'\'mount --bind {tmp_path}/hosts /etc/hosts && hostname "$0" && exec bash -c "$1"\' '
-        '"$host" "$*"\n'
+        '"$host" "$*"\n',
     )
-    agent.chmod(0o755)
     links = tuple(f"adh{os.getpid() % 100000}{end}" for end in "ab")
     steps = [f"ip netns add {space}" for space in spaces]
     steps.append(f"ip link add {links[0]} type veth peer name {links[1]}")

@@ -30,7 +30,7 @@ from tests.support.campaign_support import (
     environment,
     wait_until,
 )
-from tests.support.processes import ran
+from tests.support.processes import executable, ran
 
 JOBS = Path(__file__).parent.parent.parent / "jobs"
 ROWS = 30
@@ -125,10 +125,8 @@ class Site:
 @contextmanager
 def site(folder: Path) -> Iterator[Site]:
     """Make a site; what still runs in the end is ended."""
-    (folder / "bin").mkdir(parents=True)
     for name, text in {"adhesis": ADHESIS, "scontrol": SCONTROL}.items():
-        (folder / "bin" / name).write_text(text)
-        (folder / "bin" / name).chmod(0o755)
+        executable(folder / "bin" / name, text)
     made = Site(folder)
     try:
         yield made
