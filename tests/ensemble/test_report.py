@@ -175,13 +175,9 @@ def test_tables_print_as_plain_lines(data, monkeypatch):
 
 
 def test_jumps_by_kind_add_up_to_all_drops(data):
-    table = mechanism_tables.jumps(data)
-    shares = np.zeros(len(data.cells))
-    for row in table.rows:
-        shares[[(c.hurst, c.work_of_adhesion) for c in data.cells].index(row[:2])] += row[-1]
-    np.testing.assert_allclose(shares, 1)
+    """Those of all jumps: test_opened.py."""
     glance = mechanism_tables.shares_by_kind(data)
-    place = {(row[0], row[1], row[2]): row[-1] for row in table.rows}
+    place = {row[:3]: row[-1] for row in mechanism_tables.jumps(data).rows}
     for row in glance.rows:
         assert sum(row[2:]) == pytest.approx(1)
         for column, share in zip(glance.columns[2:], row[2:], strict=True):

@@ -50,12 +50,6 @@ class Nodes:
     spaces: tuple[str, str]
     folder: Path
 
-    def words(self, words: list[str]) -> list[str]:
-        enter = 'mount --bind "$0" /etc/hosts && hostname nodea && exec "$@"'
-        unshare = ["unshare", "--uts", "--ipc", "--mount", "bash", "-c", enter]
-        inside = ["ip", "netns", "exec", self.spaces[0], *unshare]
-        return [*inside, str(self.folder / "hosts"), *words]
-
     def launch(self, *words: object, fake: str) -> subprocess.Popen[str]:
         options = {
             "plm": "rsh",
@@ -67,7 +61,10 @@ class Nodes:
         mca = [word for name, value in options.items() for word in ("--mca", name, value)]
         start = [MPIRUN, "--allow-run-as-root", *mca, "--host", "nodea:2,nodeb:2", "-n", "4"]
         program = command(words, ranks=4, fake=fake)[3:]  # without the launcher
-        return started(self.words([*start, *program]))
+        enter = 'mount --bind "$0" /etc/hosts && hostname nodea && exec "$@"'
+        unshare = ["unshare", "--uts", "--ipc", "--mount", "bash", "-c", enter]
+        inside = ["ip", "netns", "exec", self.spaces[0], *unshare, str(self.folder / "hosts")]
+        return started([*inside, *start, *program])
 
     def kill(self, node: int) -> None:
         for pid in ran("ip", "netns", "pids", self.spaces[node], check=True).stdout.split():
