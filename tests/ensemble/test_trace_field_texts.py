@@ -318,6 +318,7 @@ SMD = [
 ]  # fmt: skip
 SDF = ["NumPoints = 400", "Xscale = 5e-07", "Zscale = 1e-6", "*", *ZS, "*", "UserComment = x", "*"]
 BLOCK = ["Roughness profile (um)", *ZS]
+APART = "the first on line 401: write NaN where"
 # A text, options if it has some, and words of the refusal.
 REFUSED: dict[str, tuple[Any, ...]] = {
     "two steps": (["Step: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], "9 nm and 500 nm: give"),
@@ -537,6 +538,9 @@ REFUSED: dict[str, tuple[Any, ...]] = {
         "heights alone: give unit X,Z, .*, or step if the first column counts the points",
     ),
     "figures below heights": (["z (um)", *ZS, "", *ZS[:2]], Z_UM, "1 place, .* 402: write NaN"),
+    "an empty line between": ([*ZS, "", *ZS[::-1]], Z_UM, APART),
+    "two of them": ([*ZS, "", "", *ZS[::-1]], Z_UM, APART),
+    "three columns": ([*ZS, "", *ZS[::-1], "", *ZS], Z_UM, APART),
     "equal parts between dashes": (
         [*ZS[:99], "--", *ZS[:99], "--", *ZS[:99]],
         Z_UM,
