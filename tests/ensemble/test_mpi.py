@@ -27,6 +27,7 @@ from tests.support.campaign_support import (
     kill_all,
     ranks_of,
     start,
+    stat_of,
     wait_until,
     write_campaign,
 )
@@ -269,9 +270,7 @@ def test_waiting_costs_the_master_next_to_nothing(tmp_path):
     master = ranks_of(process.pid)[0]
 
     def cpu() -> float:
-        with open(f"/proc/{master}/stat") as stat:
-            fields = stat.read().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        return sum(map(int, stat_of(master)[11:13])) / os.sysconf("SC_CLK_TCK")
 
     before, since = cpu(), time.monotonic()
     wait_until(lambda: begun() == 4)  # the master has waited for two tasks of four load steps

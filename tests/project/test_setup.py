@@ -15,7 +15,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from tests.project.test_package import PROJECT
-from tests.support.campaign_support import ROOT, started, wait_until
+from tests.support.campaign_support import ROOT, has_ended, started, wait_until
 from tests.support.processes import executable, ran
 
 # Distribution names that differ from what is imported, and what other packages need to find.
@@ -124,15 +124,8 @@ def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: P
     done = ran("bash", "-c", script, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (3, "")
     assert re.fullmatch(r"setup: what fails: \d+ s, failed", done.stdout.splitlines()[-1])
-    child = (tmp_path / "child").read_text().strip()
-
-    def is_alive() -> bool:
-        try:
-            return "sleep" in Path(f"/proc/{child}/cmdline").read_text()
-        except OSError:
-            return False
-
-    wait_until(lambda: not is_alive(), 20)  # by itself it would end later
+    child = int((tmp_path / "child").read_text())
+    wait_until(lambda: has_ended(child), 20)  # by itself it would end later
 
 
 def test_local_script_asks_for_a_campaign() -> None:

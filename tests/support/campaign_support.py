@@ -152,23 +152,20 @@ def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]
 
 def ranks_of(launcher: int) -> list[int]:
     """Return the process ids of the ranks that a launcher has started."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == launcher:
-            found.append(int(stat.parent.name))
-    return sorted(found)
+    pids = (int(path.name) for path in Path("/proc").glob("[0-9]*"))
+    return sorted(pid for pid in pids if stat_of(pid)[1:2] == [str(launcher)])
+
+
+def stat_of(pid: int) -> list[str]:
+    """Return the fields of /proc/PID/stat from the state on; none of a process that is gone."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return []
 
 
 def has_ended(pid: int) -> bool:
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return True
-    return stat.rpartition(")")[2].split()[0] == "Z"
+    return stat_of(pid)[:1] in ([], ["Z"])
 
 
 def hung_launchers() -> list[int]:
