@@ -74,12 +74,6 @@ def archive(name: str) -> bytes:
     return stream.getvalue()
 
 
-def saved(*arrays: Array) -> bytes:
-    stream = io.BytesIO()
-    np.savez(stream, *arrays)
-    return stream.getvalue()
-
-
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
 # What neither --heights nor adhesis trace takes: name, content, sentence.
 FOREIGN: dict[str, tuple[str, bytes, str]] = {
@@ -91,7 +85,7 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "xls": ("x.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "is a workbook"),
     "xlsx as csv": ("x.csv", archive("xl/workbook.xml"), "is a workbook: save its columns as text"),
     "zip as dat": ("x.dat", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
-    "npz": ("x.npz", saved(WAVE), r"archive of arrays: save the one of the heights as \.npy"),
+    "npz": ("x.npz", archive("z.npy"), r"archive of arrays: save the one of the heights as \.npy"),
     "pdf": ("x.pdf", b"%PDF-1.7\n", "is a PDF: export the heights as text"),
     "png": ("x.png", PNG, r"is a picture \(PNG\)"),
     "jpeg": ("x.jpg", b"\xff\xd8\xff\xe0" + bytes(40), r"is a picture \(JPEG\)"),
