@@ -26,7 +26,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures import catalogue, loops, loss_figures, shapes_and_spectra
-from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
+from adhesis.ensemble.report.figures.style import save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import loss_tables
@@ -75,23 +75,6 @@ def drawn(made) -> dict[str, Figure]:
     return made[1]
 
 
-@pytest.fixture
-def undrawn(monkeypatch) -> list[str]:
-    """Draw no figure but those of the list, for tests that read tables and the page alone."""
-    wanted: list[str] = []
-
-    def unless_wanted(item):
-        def draw(data):
-            return item.draw(data) if item.name in wanted else PublishedFigure()
-
-        return replace(item, draw=draw)
-
-    for name in ("LOOPS", "LOSSES", "MECHANISMS", "FIELDS"):
-        items = tuple(map(unless_wanted, getattr(catalogue, name)))
-        monkeypatch.setattr(catalogue, name, items)
-    return wanted
-
-
 def lines_of(axes) -> dict[str, np.ndarray]:
     return {line.get_label(): line.get_xydata() for line in axes.lines}
 
@@ -129,7 +112,7 @@ def of_paper(of: Campaign) -> bool:
     return paper.is_reading(of, of.sweep.hurst)
 
 
-@pytest.mark.usefixtures("undrawn", "quick_figures")
+@pytest.mark.usefixtures("quick_figures")
 def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
     for name in ("paper", "beside/ratio-200", "beside/equal-c0", "beside/penetration-0.93"):
         assert of_paper(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
@@ -293,7 +276,7 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data, drawn):
 
 
 def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
-    tmp_path, undrawn, quick_figures
+    tmp_path, quick_figures
 ):
     """The paper's captions: Fig. 3 γ = 0.01, Fig. 4 Δ~ = 0.4, Fig. 8 H = 0.7 and Δ~ = 0.7."""
     for kept, drawn_at, said in (
@@ -303,11 +286,10 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
         listed = f"field_nodes = 256\nfield_penetrations = {list(kept)}"
         text = text_of(**PLAN | {"realisations": 2}).replace("field_nodes = 256", listed)
         path = write(tmp_path / f"{len(kept)}.h5", text)
-        undrawn += ["fig3_shapes", "fig4_spectra_of_branches"]
         data = write_report(path, tmp_path / str(len(kept)))
         page = (tmp_path / str(len(kept)) / "report.md").read_text(encoding="utf-8")
         caption = dict(re.findall(r"\*\*.*\(paper's (.*)\)\.\*\* (.*) \(\[PDF", page))
-        shapes, both = (quick_figures[name] for name in undrawn[-2:])
+        shapes, both = (quick_figures[n] for n in ("fig3_shapes", "fig4_spectra_of_branches"))
         assert "H = 0.8, $\\gamma$ = 0.01 J/m²" in shapes.axes[0].get_title(loc="left")
         assert "is at H = 0.8, γ = 0.01 J/m². Its separations" in caption["Fig. 3"]
         for axes, gamma in zip(both.axes, (0.01, 0.04), strict=True):
@@ -355,8 +337,7 @@ def test_shapes_show_the_surface_above_the_profile(data, drawn):
     assert len(detail) < len(lines["rigid"]) / 3
 
 
-def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, undrawn, quick_figures):
-    undrawn.append("fig7_loop_against_penetration")
+def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, quick_figures):
     for count, said in ((5, ""), (8, "6 of 8 γ")):
         plan = campaign(hurst=(0.7,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
         path = write(tmp_path / f"{count}.h5", plan)
@@ -437,8 +418,7 @@ def test_the_page_embeds_every_figure_that_exists(report):
     assert "nan" not in page.replace("nano", "")
 
 
-def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, undrawn):
-    undrawn.append(SAVED)
+def test_the_same_file_gives_the_same_bytes(file, report, tmp_path):
     with few_figures(SAVED):
         write_report(file, tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
@@ -606,7 +586,7 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     )
 
 
-@pytest.mark.usefixtures("undrawn", "quick_figures")
+@pytest.mark.usefixtures("quick_figures")
 def test_another_largest_penetration_is_compared_with(file, tmp_path):
     depths = "max_penetration = 0.9", "max_penetration = 0.6"
     lower = companion(tmp_path, "lower.h5", 0.5, *depths)
