@@ -1,6 +1,5 @@
 """The benchmark: runs in processes of their own, tables, figure, command."""
 
-import csv
 import math
 from dataclasses import replace
 
@@ -14,6 +13,7 @@ from adhesis.ensemble.bench.measure import Measurement, Run, measure
 from adhesis.ensemble.bench.scenes import ONE_WAVE, SMALL_ROUGH, TWO_WAVES
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.run.launch import peak_bytes
+from tests.support.campaign_support import table_of
 
 REFERENCE = Reference(1.0, "made up")
 
@@ -114,8 +114,7 @@ def test_command_writes_table_records_and_figure(tmp_path, capsys, monkeypatch):
     assert main(["bench", "--quick", "--to", str(tmp_path / "new")]) == 0
     written = {path.name for path in (tmp_path / "new").iterdir()}
     assert written == {"benchmark.csv", "benchmark.md", "benchmark.png", "benchmark.pdf"}
-    with (tmp_path / "new" / "benchmark.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = table_of(tmp_path / "new" / "benchmark.csv")
     assert {row["scene"] for row in rows} == {"one-wave", "two-waves", "rough-32"}
     assert float(rows[0]["error"]) == pytest.approx(1 / 64)
     assert "adhesis bench --quick" in (tmp_path / "new" / "benchmark.md").read_text()

@@ -218,14 +218,12 @@ def test_a_link_is_refused_before_it_is_followed(path, name, kind, tmp_path):
 ATTRIBUTES = {
     "another seed": lambda file: file.attrs.modify("seed", 77),
     "a seed of several numbers": lambda file: file.attrs.create("seed", [5, 5]),
-    "another convention": lambda file: file.attrs.modify("Conventions", "none"),
     "a part": lambda file: file.attrs.create("part", "1/1 "),
     "no part": lambda file: file.attrs.create("part", "3/2"),
     "another unit": lambda file: file["loss"].attrs.modify("units", "mJ m-2"),
     "the unit of an axis": lambda file: file["unloading_penetration"].attrs.modify("units", "m"),
     "no unit": lambda file: file["loss"].attrs.pop("units"),
     "a factor": lambda file: file["loss"].attrs.create("scale_factor", 2.0),
-    "a fill value": lambda file: file["loss"].attrs.create("_FillValue", 1.0),
     "other names of flags": lambda file: file["status"].attrs.modify("flag_meanings", "a b c d"),
     "other flags": lambda file: file["status"].attrs.modify(
         "flag_values", np.arange(1, 5, 1, "u1")

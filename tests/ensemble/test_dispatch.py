@@ -47,20 +47,19 @@ class Scripted:
         return None
 
 
+MESSAGE_TIME = 20e-6  # s
+
+
 class SimulatedRanks(Scripted):
     """A channel whose workers take simulated time; also the clock and the sleep of the master."""
 
-    def __init__(self, workers, seconds, *, halts=True, signal_at=None, message_time=20e-6):
+    def __init__(self, workers, seconds, *, halts=True):
         super().__init__(workers)
         self._seconds = seconds
         self._halts = halts
-        self._message_time = message_time
         self.busy = 0.0
         self._queue = {rank: [] for rank in range(1, workers + 1)}
         self._ends: list[tuple[float, int, tuple]] = []
-        self._halted = False
-        if signal_at is not None:
-            heapq.heappush(self._ends, (signal_at, 1, ("stop", "SIGUSR1 received")))
         for rank in self._queue:
             self._report_later(rank)
 
@@ -69,13 +68,12 @@ class SimulatedRanks(Scripted):
         heapq.heappush(self._ends, (at, rank, ("alive", None, None)))
 
     def send(self, to, message, *, urgent=False):
-        self.now += self._message_time
+        self.now += MESSAGE_TIME
         if message[0] == "dismissed":
             self._ends = [e for e in self._ends if (e[1], e[2][0]) != (to, "alive")]
             heapq.heapify(self._ends)
             heapq.heappush(self._ends, (self.now, to, ("goodbye",)))
         elif message[0] == "halt":
-            self._halted = True
             if self._halts:  # what is in flight is given up at the next load step
                 mine = [e for e in self._ends if e[1] == to and e[2][0] == "outcome"]
                 for entry in mine:
@@ -96,17 +94,18 @@ class SimulatedRanks(Scripted):
         self.now += 1e-6
         if self._ends and self._ends[0][0] <= self.now:
             _, rank, message = heapq.heappop(self._ends)
-            self.now += self._message_time
+            self.now += MESSAGE_TIME
             if message[0] == "alive":
                 self._report_later(rank)
             return rank, message
         return None
 
 
-def schedule_of(tasks, group_of, key_of=None):
+def schedule_of(tasks, group_of=None, key_of=None):
     """Return a schedule in which every group has one task, or those with one key, a round."""
     met: dict[object, list[object]] = {}
     rounds = {}
+    group_of = group_of or dict.fromkeys(tasks, 0)
     for task in tasks:
         key, keys = (key_of or {}).get(task, task), met.setdefault(group_of[task], [])
         if key not in keys[-1:]:
@@ -115,21 +114,19 @@ def schedule_of(tasks, group_of, key_of=None):
     return Schedule(tasks, group_of, dict.fromkeys(met, 1.0), rounds)
 
 
+def hand_out(channel, schedule, limits=None, collected=None):
+    """Return the outcomes of the workers of a channel, whose clock counts, and why it ended."""
+    collected = [] if collected is None else collected
+    is_scripted = isinstance(channel, Scripted)
+    clock = {"clock": channel.clock, "sleep": channel.sleep} if is_scripted else {}
+    reason = Master(channel, schedule, collected.append, limits or Limits(), **clock).run()
+    return collected, reason
+
+
 def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **ranks):
-    tasks = list(range(len(seconds)))
-    group_of = groups or dict.fromkeys(tasks, 0)
-    schedule = schedule_of(tasks, group_of)
     channel = kind(workers, seconds, **ranks)
-    collected: list[Outcome] = []
-    master = master_of(channel, schedule, collected, limits(channel) if limits else Limits())
-    reason = master.run()
-    return channel, collected, reason, schedule
-
-
-def master_of(channel, schedule, collected, limits):
-    """Make a master that goes by the clock of its channel."""
-    clock = {"clock": channel.clock, "sleep": channel.sleep}
-    return Master(channel, schedule, collected.append, limits, **clock)
+    schedule = schedule_of(range(len(seconds)), groups)
+    return channel, *hand_out(channel, schedule, limits(channel) if limits else None)
 
 
 def test_a_thousand_workers_are_kept_busy():
@@ -137,14 +134,14 @@ def test_a_thousand_workers_are_kept_busy():
     random.seed(3)
     groups = {i: i % 9 for i in range(3_000)}
     seconds = [(1 + 4 * groups[i]) * random.uniform(0.5, 1.5) for i in range(3_000)]
-    channel, collected, _, _ = simulate(1000, seconds, groups)
+    channel, collected, _ = simulate(1000, seconds, groups)
     assert len(collected) == 3_000
     assert channel.now <= 1.05 * channel.busy / 1000 + max(seconds)
 
 
 @pytest.mark.parametrize(("workers", "seconds"), [(4, 2e-3), (2, 0.3e-3)])
 def test_short_tasks_are_queued_ahead_and_do_not_wait_for_the_sleeping_master(workers, seconds):
-    channel, collected, _, _ = simulate(workers, [seconds] * 4000)
+    channel, collected, _ = simulate(workers, [seconds] * 4000)
     assert sorted(o.task for o in collected) == list(range(4000))
     assert channel.now <= 1.15 * channel.busy / workers
 
@@ -186,7 +183,7 @@ class StopsAtTheDoor(SimulatedRanks):
 
 
 def test_a_stop_that_arrives_while_workers_are_dismissed_is_told():
-    _, collected, reason, _ = simulate(
+    _, collected, reason = simulate(
         *(2, [10.0] * 20),
         limits=lambda c: Limits(time_left=lambda: 25 - c.now),
         kind=StopsAtTheDoor,
@@ -196,7 +193,7 @@ def test_a_stop_that_arrives_while_workers_are_dismissed_is_told():
 
 
 def test_a_stop_that_arrives_when_all_is_done_stops_nothing():
-    _, collected, reason, _ = simulate(2, [10.0] * 20, kind=StopsAtTheDoor)
+    _, collected, reason = simulate(2, [10.0] * 20, kind=StopsAtTheDoor)
     assert len(collected) == 20
     assert reason is None
 
@@ -211,10 +208,7 @@ def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
         )
 
 
-def scripted_master(channel, tasks, collected=None):
-    schedule = schedule_of(tasks, dict.fromkeys(tasks, 0))
-    collected = [] if collected is None else collected
-    return master_of(channel, schedule, collected, Limits(silence=120))
+PATIENT = Limits(silence=120)
 
 
 def done(task, rank):
@@ -231,7 +225,7 @@ def test_a_worker_that_is_silent_for_too_long_ends_the_run():
     script = [*alive(1, 1000), *alive(2, 320), (300.0, 1, done(0, 1))]
     channel = Scripted(2, script)
     with pytest.raises(Unresponsive, match="rank 2 has not answered for 120 s"):
-        scripted_master(channel, range(4), collected).run()
+        hand_out(channel, schedule_of(range(4)), PATIENT, collected)
     assert [outcome.task for outcome in collected] == [0]
     assert 310 + 120 < channel.now < 310 + 135
 
@@ -245,10 +239,9 @@ def test_a_master_that_was_held_up_takes_nobody_for_lost():
         def sleep(self, seconds):
             self.now += seconds if not 50 < self.now < 3000 else 3600
 
-    collected = []
     channel = HeldUp(2, alive(1, 50) + alive(2, 50) + late + last)
-    assert scripted_master(channel, range(2), collected).run() is None
-    assert len(collected) == 2
+    collected, reason = hand_out(channel, schedule_of(range(2)), PATIENT)
+    assert (len(collected), reason) == (2, None)
 
 
 def test_a_worker_that_does_not_answer_its_dismissal_ends_the_run():
@@ -257,7 +250,7 @@ def test_a_worker_that_does_not_answer_its_dismissal_ends_the_run():
     script = [(1.0, 1, done(0, 1)), (2.0, 2, done(1, 2)), (2.1, 1, ("goodbye",))]
     channel = Scripted(2, script)
     with pytest.raises(Unresponsive, match="rank 2 did not answer at the end"):
-        scripted_master(channel, range(2), collected).run()
+        hand_out(channel, schedule_of(range(2)), PATIENT, collected)
     assert len(collected) == 2
     assert channel.now == pytest.approx(2 + Limits().grace, abs=0.1)
 
@@ -286,14 +279,6 @@ def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
     assert [message[0] for message in sent[-2:]] == ["outcome", "goodbye"]
 
 
-def hand_out(channel, tasks, limits=None):
-    group_of = dict.fromkeys(range(tasks), 0)
-    outcomes: list[Outcome] = []
-    schedule = schedule_of(range(tasks), group_of)
-    reason = Master(channel, schedule, outcomes.append, limits or Limits()).run()
-    return outcomes, reason
-
-
 def half(task, check):
     """Compute in a process: something that is done, fails, or never ends."""
     if task == 3:
@@ -306,7 +291,7 @@ def half(task, check):
 
 def test_processes_are_workers_like_any_other():
     with Processes(2, half, Limits()) as channel:
-        outcomes, reason = hand_out(channel, 20)
+        outcomes, reason = hand_out(channel, schedule_of(range(20)))
     assert reason is None
     found = {outcome.task: outcome.error or outcome.result for outcome in outcomes}
     assert found == {k: "ValueError: three" if k == 3 else k / 2 for k in range(20)}
@@ -332,7 +317,7 @@ def test_processes_that_do_not_answer_are_not_waited_for(monkeypatch):
 
 def alone(compute, tasks=3, limits=None):
     limits = limits or Limits()
-    return hand_out(OwnWorker(compute, limits), tasks, limits)
+    return hand_out(OwnWorker(compute, limits), schedule_of(range(tasks)), limits)
 
 
 def test_a_task_in_a_kernel_meets_its_time_limit():
@@ -383,12 +368,10 @@ def test_a_task_cannot_swallow_the_end_of_its_time():
 
 def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
     seconds = [0.2 + 0.01 * task for task in range(30)]
-    group_of = dict.fromkeys(range(30), 0)
     together = {task: task // 3 for task in range(30)}
-    schedule = schedule_of([t for t in range(30) if t != 4], group_of, together)
-    collected: list[Outcome] = []
-    master = master_of(SimulatedRanks(4, seconds), schedule, collected, Limits())
-    assert master.run() is None
+    schedule = schedule_of([t for t in range(30) if t != 4], key_of=together)
+    collected, reason = hand_out(SimulatedRanks(4, seconds), schedule)
+    assert reason is None
     done = sorted(outcome.task for outcome in collected)
     assert done == [task for task in range(30) if task != 4]
     ranks = {(outcome.task // 3, outcome.rank) for outcome in collected}

@@ -10,6 +10,7 @@ import pytest
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.doctor import examine as doctor
 from tests.support.campaign_support import run_python, wait_until
+from tests.support.processes import executable
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +52,7 @@ def test_text_names_the_writer_and_every_library(findings, monkeypatch, capsys):
 @pytest.mark.mpi
 def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path, monkeypatch, capsys):
     # As the other MPI's mpirun does to these ranks: two processes, each alone in its world.
-    wrong = tmp_path / "mpirun"
-    wrong.write_text('#!/bin/sh\nshift 2\n"$@" & "$@"\nwait\n')
-    wrong.chmod(0o755)
+    wrong = executable(tmp_path / "mpirun", '#!/bin/sh\nshift 2\n"$@" & "$@"\nwait\n')
     monkeypatch.setenv("MPIRUN", str(wrong))
     assert main(["doctor", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
@@ -67,12 +66,12 @@ def test_a_launcher_that_hangs_is_given_up_and_may_end_its_ranks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It has its time limit as soon as it hangs, and all else the one of the product."""
-    hanging, begun, ended = (tmp_path / name for name in ("mpirun", "begun", "ended"))
-    hanging.write_text(
+    begun, ended = tmp_path / "begun", tmp_path / "ended"
+    hanging = executable(
+        tmp_path / "mpirun",
         '#!/bin/sh\n[ "$1" = --version ] && exit\n'
-        f'trap \'echo > "{ended}"; kill $!; exit 1\' TERM\nsleep 600 & echo > "{begun}"; wait\n'
+        f'trap \'echo > "{ended}"; kill $!; exit 1\' TERM\nsleep 600 & echo > "{begun}"; wait\n',
     )
-    hanging.chmod(0o755)
     communicate = subprocess.Popen.communicate
 
     def at_once(process, input=None, timeout=None):

@@ -15,9 +15,9 @@ from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.lock import RunLock
+from adhesis.ensemble.run.lock import RunLock, described, holder
 from adhesis.ensemble.run.session import run_campaign
-from tests.support.campaign_support import campaign_text, run_python
+from tests.support.campaign_support import campaign_text
 from tests.support.fake_run import fake_engine, write_results
 
 HOSTILE = [
@@ -67,12 +67,7 @@ def test_status_prints_no_control_characters(tmp_path, capsys, monkeypatch):
     with RunLock(path) as lock:
         monkeypatch.setattr("socket.gethostname", lambda: "node\x1b[2J")
         lock.acquire(1, 0.0)
-        code = (
-            "import sys; from adhesis.ensemble.run.lock import described, holder; "
-            "print(described(holder(sys.argv[1])))"
-        )
-        reported = run_python("-c", code, path)
-    assert reported.stdout.startswith(r"host node\x1b[2J, process ")
+        assert described(holder(path)).startswith(r"host node\x1b[2J, process ")
     for words in ([], ["--json"]):
         assert main(["status", str(path), *words]) == 0
         shown = capsys.readouterr().out

@@ -74,17 +74,10 @@ def archive(name: str) -> bytes:
     return stream.getvalue()
 
 
-def saved(*arrays: Array) -> bytes:
-    stream = io.BytesIO()
-    np.savez(stream, *arrays)
-    return stream.getvalue()
-
-
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
 # What neither --heights nor adhesis trace takes: name, content, sentence.
 FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "gzip": ("x.csv.gz", gzip.compress(b"1\n2\n3\n"), r"compressed \(gzip\): .* \(gunzip .*gz\)"),
-    "gzip by content": ("x.csv", gzip.compress(b"1\n2\n3\n"), r"compressed \(gzip\)"),
     "bzip2": ("x.bz2", b"BZh91AY&SY", r"compressed \(bzip2\)"),
     "xz": ("x.xz", b"\xfd7zXZ\0\0", r"compressed \(xz\): unpack it first \(unxz"),
     "zip": ("x.zip", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
@@ -92,11 +85,9 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "xls": ("x.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "is a workbook"),
     "xlsx as csv": ("x.csv", archive("xl/workbook.xml"), "is a workbook: save its columns as text"),
     "zip as dat": ("x.dat", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
-    "npz": ("x.npz", saved(WAVE), r"archive of arrays: save the one of the heights as \.npy"),
-    "npz as npy": ("x.npy", saved(WAVE), "archive of arrays"),
+    "npz": ("x.npz", archive("z.npy"), r"archive of arrays: save the one of the heights as \.npy"),
     "pdf": ("x.pdf", b"%PDF-1.7\n", "is a PDF: export the heights as text"),
     "png": ("x.png", PNG, r"is a picture \(PNG\)"),
-    "png as csv": ("x.csv", PNG, r"is a picture \(PNG\)"),
     "jpeg": ("x.jpg", b"\xff\xd8\xff\xe0" + bytes(40), r"is a picture \(JPEG\)"),
     "empty": ("x.csv", b"", "is empty"),
     "blank": ("x.csv", b" \n\n", "is empty"),
@@ -305,7 +296,6 @@ def test_a_campaign_may_have_a_utf_8_mark(tmp_path: Path) -> None:
         (campaign_text().encode("utf-16"), "it is not UTF-8 text (UTF-16), so save it as UTF-8"),
         (campaign_text().encode("utf-16-le"), "it is not UTF-8 text (it holds zero bytes), so"),
         (b"# a\n# \xe4\n", "it is not UTF-8 text (line 2 holds the byte 0xe4), so save it as"),
-        (b"\x89PNG\r\n\x1a\n\0\0", "it is not UTF-8 text (it holds zero bytes)"),
     ],
 )
 def test_a_campaign_in_another_encoding_is_refused(data, reason, tmp_path):

@@ -1,6 +1,5 @@
 """``adhesis loop``: what it writes, and what it refuses before it computes or writes anything."""
 
-import csv
 import hashlib
 import json
 import re
@@ -17,6 +16,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.quantities import units_of
 from adhesis.ensemble.versions import provenance
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.campaign_support import table_of
 from tests.support.exact_wave import ExactWave
 from tests.support.options import SCENE, replacing, rough_loop
 from tests.support.scenes import HALF_SPACE
@@ -199,8 +199,7 @@ def test_the_curve_as_csv_has_units_in_its_header(wave_file, tmp_path):
     words = ("--load-steps", 4, "--json", out, "--csv", table, "--quiet")
     assert run(*wave_words(wave_file, *words)) == 0
     data = json.loads(out.read_text())
-    with table.open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = table_of(table)
     assert list(rows[0])[:5] == [
         *("branch", "load_step", "penetration (h_max)", "separation (m)", "mean_stress (Pa)")
     ]
@@ -208,12 +207,9 @@ def test_the_curve_as_csv_has_units_in_its_header(wave_file, tmp_path):
         assert [float(row[column]) for row in rows] == data[key]
     assert [row["branch"] for row in rows] == data["branch"]
     assert run(*wave_words(wave_file, *words, "--max-penetration", "0.3,0.6")) == 0
-    with table.open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    assert {row["turning_point (h_max)"] for row in rows} == {"0.3", "0.6"}
+    assert {row["turning_point (h_max)"] for row in table_of(table)} == {"0.3", "0.6"}
     assert run(*wave_words(wave_file, *words, "--path", "0.5,0.2,0.4,out")) == 0
-    with table.open(newline="") as stream:
-        assert {row["leg"] for row in csv.DictReader(stream)} == {"0", "1", "2", "3"}
+    assert {row["leg"] for row in table_of(table)} == {"0", "1", "2", "3"}
 
 
 @pytest.mark.usefixtures("exact_method")

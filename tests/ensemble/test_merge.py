@@ -18,9 +18,8 @@ from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import campaign_text, differences, run_python, write_campaign
-from tests.support.fake_run import fake_engine, fake_result
+from tests.support.fake_run import fake_result, run_file
 from tests.support.synthetic_results import sign
 
 CAMPAIGN = campaign_text(realisations="3")
@@ -44,17 +43,12 @@ def parts(folder, count, **others):
     return [computed(folder / f"p{k}.h5", f"{k}/{count}", **others) for k in range(1, count + 1)]
 
 
-def run(path, out, part="1/1"):
-    options = Options(part=Part.parse(part), patience=0.0)
-    return run_campaign(load_campaign(path), out, None, options, engine=fake_engine(""))
-
-
 def test_parts_merged_equal_the_file_of_one_run(tmp_path, capsys):
     path, whole = write_campaign(tmp_path), tmp_path / "whole.h5"
-    run(path, whole)
+    run_file(path, whole)
     names = [tmp_path / f"part{k}.h5" for k in (1, 2, 3)]
     for k, name in enumerate(names, start=1):
-        run(path, name, f"{k}/3")
+        run_file(path, name, part=Part(k, 3))
     assert main(["merge", *map(str, reversed(names)), "--out", str(tmp_path / "all.h5")]) == 0
     assert "8 rows taken over from 3 files; 8 of 8 tasks done" in capsys.readouterr().out
     assert differences(tmp_path / "all.h5", whole) == []
@@ -73,7 +67,7 @@ def test_a_merge_is_resumed_and_grown(tmp_path):
     assert differences(out, computed(tmp_path / "whole.h5")) == []
     larger = campaign_text(realisations="4", hurst="[0.7, 0.75, 0.8]")
     path = write_campaign(tmp_path, realisations="4", hurst="[0.7, 0.75, 0.8]")
-    assert run(path, out).computed == 12
+    assert run_file(path, out).computed == 12
     assert differences(out, computed(tmp_path / "larger.h5", text=larger)) == []
     # Parts of the smaller campaign still fit into the larger file.
     assert merge([two], out).taken == 0
@@ -83,7 +77,7 @@ def test_rows_stay_sound_when_a_number_of_the_campaign_becomes_an_axis(tmp_path)
     out = computed(tmp_path / "all.h5", skip=(2,))
     part = computed(tmp_path / "part.h5")
     grown = write_campaign(tmp_path, realisations="3", young="[1e6, 2e6]")
-    assert run(grown, out).computed == 13
+    assert run_file(grown, out).computed == 13
     with Results(out) as results:
         assert results.status().tolist() == [DONE] * 24
     created = tmp_path / "grown.h5"
@@ -177,7 +171,7 @@ def test_a_merge_that_the_disk_refuses_leaves_the_old_file(tmp_path, monkeypatch
 
 def test_a_part_is_what_it_is(tmp_path, capsys):
     path, out = write_campaign(tmp_path), tmp_path / "p.h5"
-    run(path, out, "2/3")
+    run_file(path, out, part=Part(2, 3))
     with Results(out) as results:
         assert results.part == Part(2, 3)
         assert list(results.tasks()) == list(results.campaign.tasks())[1::3]

@@ -17,7 +17,6 @@ from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.progress import Summary
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     adhesis,
@@ -28,23 +27,20 @@ from tests.support.campaign_support import (
     kill_all,
     ranks_of,
     start,
+    stat_of,
     wait_until,
     write_campaign,
 )
-from tests.support.fake_run import fake_engine
+from tests.support.fake_run import run_file
 
 pytestmark = pytest.mark.mpi
-
-
-def here(path, out, fake="") -> Summary:
-    return run_campaign(load_campaign(path), out, engine=fake_engine(fake))
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """The fake campaign, undisturbed, by one process."""
     folder = tmp_path_factory.mktemp("whole")
-    assert here(write_campaign(folder), folder / "whole.h5").done == 8
+    assert run_file(write_campaign(folder), folder / "whole.h5").done == 8
     return folder / "whole.h5"
 
 
@@ -123,7 +119,7 @@ def test_ranks_end_with_their_run_and_the_next_one_goes_on(
     assert all(phrase in errors for phrase in said), errors
     wait_until(lambda: all(map(has_ended, ranks)))
     kept, log = done_rows(out), tmp_path / "rest.log"
-    again = here(path, out, f"log={log}")
+    again = run_file(path, out, f"log={log}")
     assert (again.done, again.computed) == (8, 8 - kept)
     assert kept >= 2
     assert len(log.read_text().splitlines()) == 8 - kept  # none is begun twice
@@ -159,7 +155,7 @@ def test_ranks_whose_file_is_taken_away_end_with_one_sentence(
     assert said in line
     assert "Traceback" not in errors
     if done_to_it == "moved":
-        assert here(path, (tmp_path / "old.h5").rename(out)).done == 8
+        assert run_file(path, (tmp_path / "old.h5").rename(out)).done == 8
 
 
 def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(tmp_path):
@@ -184,7 +180,7 @@ KILLS = 20  # of each victim
 def test_kills_at_random_moments(tmp_path, victim):
     random.seed(victim)
     path, out, whole = write_campaign(tmp_path, realisations="4"), tmp_path / "r.h5", tmp_path / "w"
-    assert here(path, whole).done == 16
+    assert run_file(path, whole).done == 16
     killed = 0
     while killed < KILLS:
         done = set[str]()  # tasks as the fake task's log has them
@@ -274,9 +270,7 @@ def test_waiting_costs_the_master_next_to_nothing(tmp_path):
     master = ranks_of(process.pid)[0]
 
     def cpu() -> float:
-        with open(f"/proc/{master}/stat") as stat:
-            fields = stat.read().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        return sum(map(int, stat_of(master)[11:13])) / os.sysconf("SC_CLK_TCK")
 
     before, since = cpu(), time.monotonic()
     wait_until(lambda: begun() == 4)  # the master has waited for two tasks of four load steps

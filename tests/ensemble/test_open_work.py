@@ -1,6 +1,5 @@
 """The work of adhesion of receding edges in commands, campaigns, results files and reports."""
 
-import csv
 import json
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 import adhesis
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.findings import law, verdict
 from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.task.compute import Runner
@@ -19,16 +17,11 @@ from adhesis.ensemble.trace.answer import make_cycle
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.ensemble.trace.variants import make_plan
-from tests.support.campaign_support import campaign_text
+from tests.support.campaign_support import adhesis_here, campaign_text, table_of
 from tests.support.scenes import HALF_SPACE
 from tests.support.synthetic_results import rows, text_of, write
 
 ROUGH = ("--hurst", 0.8, "--seed", 1, "--n0", 2, "--ratio", 4, "--accuracy", 1e-2)
-DEPTH = ("--max-penetration", 0.5)
-
-
-def run(*words) -> int:
-    return main([str(word) for word in words])
 
 
 def text(value: str, **changes: str) -> str:
@@ -36,10 +29,12 @@ def text(value: str, **changes: str) -> str:
     return given.replace('method = "grid"\nnodes_per_wave = 16\n', "accuracy = 1e-2\n")
 
 
-def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
+def test_a_loop_lists_friction_and_instability(tmp_path):
     out = tmp_path / "loop.json"
-    words = ("--work-of-adhesion", "40mJ/m2", "--work-of-adhesion-open", "80mJ/m2")
-    assert run("loop", *ROUGH, *DEPTH, "--load-steps", 6, *words, "--json", out, "--quiet") == 0
+    words = ("--work-of-adhesion", "40mJ/m2", "--work-of-adhesion-open", "80mJ/m2", "--quiet")
+    path = ("--max-penetration", 0.5, "--load-steps", 6)
+    done = adhesis_here("loop", *ROUGH, *path, *words, "--json", out)
+    assert done.returncode == 0, done.stderr
     data = json.loads(out.read_text())
     assert (data["work_of_adhesion"], data["work_of_adhesion_open"]) == (0.04, 0.08)
     assert 0 < data["friction"] < data["loss"]
@@ -50,7 +45,7 @@ def test_a_loop_lists_friction_and_instability(tmp_path, capsys):
     assert np.all(np.diff([state["edge_friction"] for state in data["states"]]) >= 0)
     line = f"friction    {data['friction']:.6g} J/m² at edges, which recede at 0.08 J/m²; "
     line += f"{data['loss'] - data['friction']:.6g} J/m² lost by instability"
-    assert line in capsys.readouterr().out.splitlines()
+    assert line in done.stdout.splitlines()
 
 
 def small_trace():
@@ -137,14 +132,12 @@ def test_the_table_of_losses_has_both_parts_where_the_key_is_given(both, tmp_pat
     tables = []
     for data in both:
         losses(data).write_csv(tmp_path / "losses.csv")
-        with (tmp_path / "losses.csv").open(newline="") as stream:
-            tables.append(list(csv.reader(stream)))
-    (head, *lines), (one, *_) = tables
+        tables.append(table_of(tmp_path / "losses.csv"))
+    opened, (one, *_) = tables
     new = ["friction_mean [J/m^2]", "instability_mean [J/m^2]"]
-    assert [name for name in head if name in new] == new
-    assert "work_of_adhesion_open [J/m^2]" in head
-    for line in lines:
-        row = dict(zip(head, line, strict=True))
+    assert [name for name in opened[0] if name in new] == new
+    assert "work_of_adhesion_open [J/m^2]" in opened[0]
+    for row in opened:
         loss = float(row["loss_mean [J/m^2]"])
         assert float(row[new[0]]) == pytest.approx(0.25 * loss)
         assert float(row[new[1]]) == pytest.approx(0.75 * loss)

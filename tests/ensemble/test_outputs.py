@@ -4,36 +4,27 @@ import json
 import os
 import resource
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json, write_new
 from adhesis.ensemble.report.figures import style
+from tests.support.campaign_support import adhesis_here
 from tests.support.options import OF_WAVE, WAVE_HEIGHTS
 
 LOOP = ("--heights", "wave.csv", *OF_WAVE, "--load-steps", 2, "--quiet")
 
-Ask = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture
-def ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
-    """Run a command in a folder that holds wave.csv; gives exit code, output and last error."""
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, which holds wave.csv."""
     monkeypatch.chdir(tmp_path)
     Path("wave.csv").write_text("\n".join(map(repr, WAVE_HEIGHTS.tolist())))
-
-    def run(*words: object) -> tuple[int, str, str]:
-        code = main([str(word) for word in words])
-        text = capsys.readouterr()
-        return code, text.out, text.err
-
-    return run
+    return tmp_path
 
 
 def test_a_write_protected_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,17 +35,18 @@ def test_a_write_protected_file_is_refused(tmp_path: Path, monkeypatch: pytest.M
         check_outputs({"--json": path}, {})
 
 
-def test_a_full_disk_costs_one_output_and_neither_the_others_nor_the_loss(ask: Ask) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_full_disk_costs_one_output_and_neither_the_others_nor_the_loss() -> None:
     if not Path("/dev/full").exists():
         pytest.skip("needs /dev/full")
     words = ("--json", "/dev/full", "--fields", "f.npz", "--figure", "f.svg")
-    code, out, error = ask("loop", *LOOP, *words)
-    assert code == 74
-    assert error.splitlines()[-1] == (
+    done = adhesis_here("loop", *LOOP, *words)
+    assert done.returncode == 74
+    assert done.stderr.splitlines()[-1] == (
         "adhesis loop: --json /dev/full could not be written (No space left on device)"
     )
-    assert "\nloss  " in out
-    assert [line for line in out.splitlines() if line.startswith("wrote")] == [
+    assert "\nloss  " in done.stdout
+    assert [line for line in done.stdout.splitlines() if line.startswith("wrote")] == [
         "wrote       f.npz",
         "wrote       f.svg",
     ]
@@ -62,32 +54,33 @@ def test_a_full_disk_costs_one_output_and_neither_the_others_nor_the_loss(ask: A
     assert "</svg>" in Path("f.svg").read_text()
 
 
-def test_a_disk_that_is_full_before_the_work_is_no_bad_input(ask, monkeypatch):
+def test_a_disk_that_is_full_before_the_work_is_no_bad_input(folder, monkeypatch):
     def full(**_: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(tempfile, "TemporaryFile", full)
     for words in (["loop", *LOOP, "--json", "o.json"], ["bench", "--to", "b"]):
-        code, _, error = ask(*words)
-        assert (code, "it cannot be written (No space left on device)" in error) == (74, True)
-    assert [path.name for path in Path().iterdir()] == ["wave.csv"]
+        done = adhesis_here(*words)
+        assert done.returncode == 74
+        assert "it cannot be written (No space left on device)" in done.stderr
+    assert [path.name for path in folder.iterdir()] == ["wave.csv"]
 
 
-def test_a_failure_in_the_middle_leaves_the_old_file(ask, monkeypatch, tmp_path):
+def test_a_failure_in_the_middle_leaves_the_old_file(folder, monkeypatch):
     Path("o.json").write_text("old")
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    code, out, error = ask("loop", *LOOP, "--json", "o.json", "--figure", "f.png")
-    assert code == 74
-    assert "--json o.json could not be written" in error
-    assert "--figure f.png could not be written" in error
-    assert sum("could not be written" in line for line in error.splitlines()) == 1
-    assert "\nloss  " in out
+    done = adhesis_here("loop", *LOOP, "--json", "o.json", "--figure", "f.png")
+    assert done.returncode == 74
+    (line,) = (line for line in done.stderr.splitlines() if "could not be written" in line)
+    assert "--json o.json could not be written" in line
+    assert "--figure f.png could not be written" in line
+    assert "\nloss  " in done.stdout
     assert Path("o.json").read_text() == "old"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["o.json", "wave.csv"]
+    assert sorted(path.name for path in folder.iterdir()) == ["o.json", "wave.csv"]
 
 
 def test_a_figure_that_cannot_be_written_is_an_error_of_the_system(tmp_path: Path) -> None:
@@ -104,10 +97,11 @@ def test_a_figure_that_cannot_be_written_is_an_error_of_the_system(tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
-def test_links_stay_and_what_they_point_to_is_replaced(ask: Ask) -> None:
+@pytest.mark.usefixtures("folder")
+def test_links_stay_and_what_they_point_to_is_replaced() -> None:
     Path("real.json").write_text("old")
     Path("link.json").symlink_to("real.json")
-    assert ask("loop", *LOOP, "--json", "link.json")[0] == 0
+    assert adhesis_here("loop", *LOOP, "--json", "link.json").returncode == 0
     assert Path("link.json").is_symlink()
     assert json.loads(Path("real.json").read_text())["loss"] > 0
 

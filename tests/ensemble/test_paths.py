@@ -90,17 +90,13 @@ OF_WRITING = all_but(
 OF_FOLDERS = all_but("folder", "link to a folder", "no folder", "second name", ANOTHER[1])
 
 
-def kept(folder: Path) -> dict[str, Any]:
+def kept(folder: Path) -> dict[Path, Any]:
     """Return what lies in a folder: kinds, targets of links, and contents."""
     found = {}
-    for path in sorted(folder.rglob("*")):
-        state = path.lstat()
-        name = str(path.relative_to(folder))
-        found[name] = (stat.S_IFMT(state.st_mode), state.st_ino if name != "" else 0)
-        if path.is_symlink():
-            found[name] += (os.readlink(path),)
-        elif path.is_file():
-            found[name] += (path.read_bytes(),)
+    for path in folder.rglob("*"):
+        content = path.read_bytes() if path.is_file() and not path.is_symlink() else None
+        link = os.readlink(path) if path.is_symlink() else None
+        found[path] = (stat.S_IFMT(path.lstat().st_mode), path.lstat().st_ino, link, content)
     return found
 
 

@@ -1,6 +1,5 @@
 """Realisations in batches until the mean is known well enough: the rule, and its runs."""
 
-import csv
 import json
 import shutil
 
@@ -8,7 +7,8 @@ import numpy as np
 import pytest
 
 from adhesis.ensemble.aggregate.status import as_text, read_status
-from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.compare import growth
+from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.precision import (
     LEAST,
     MOST_LISTED,
@@ -26,20 +26,20 @@ from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
 from adhesis.ensemble.results.write import DatasetRows
-from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support import synthetic_results
 from tests.support.campaign_support import (
     adhesis,
     adhesis_here,
     campaign_text,
-    compare,
     differences,
+    differing,
     done_rows,
     kill_all,
     start,
+    table_of,
     wait_until,
 )
-from tests.support.fake_run import fake_engine
+from tests.support.fake_run import run_file
 
 STOP = "[stop]\nrelative_error = {}\nbatch = 4\nmost = {}\n"
 
@@ -51,18 +51,12 @@ def text(relative_error=0.2, most=80, quantity="", **changes):
     return campaign_text(**small, **changes) + fields + STOP.format(relative_error, most) + steered
 
 
-def run(path, out, fake="", **options):
-    return run_campaign(
-        load_campaign(path), out, None, Options(**options), engine=fake_engine(fake)
-    )
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     """The campaign of ``text()``, undisturbed, by one process: its results file and its end."""
     folder = tmp_path_factory.mktemp("finished")
     (folder / "c.toml").write_text(text())
-    return folder / "r.h5", run(folder / "c.toml", folder / "r.h5")
+    return folder / "r.h5", run_file(folder / "c.toml", folder / "r.h5")
 
 
 def test_the_rule_goes_by_the_interval_that_tables_print():
@@ -178,7 +172,7 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity,
     """By default that is the dimensionless loss, which has the interval of the table of losses."""
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text(quantity=quantity))
-    summary = run(path, out)
+    summary = run_file(path, out)
     assert (summary.pending, summary.failed, summary.stopped) == (0, 0, None)
     steered = quantity or "loss_dimensionless"
     with Results(out) as results:
@@ -241,7 +235,7 @@ def test_rows_that_are_not_needed_are_marked_at_once_and_not_read(tmp_path, monk
         path, out = tmp_path / f"{most}.toml", tmp_path / f"{most}.h5"
         path.write_text(text(0.25, most))
         written.clear()
-        done = run(path, out).done
+        done = run_file(path, out).done
         read.clear()
         assert read_status(out)["not_needed"] == 2 * most - done
         assert read == [done]
@@ -250,14 +244,14 @@ def test_rows_that_are_not_needed_are_marked_at_once_and_not_read(tmp_path, monk
     # A wish for more makes them pending, and nothing more is written of those.
     path.write_text(text(0.24, 8000))
     written.clear()
-    second = run(path, out)
+    second = run_file(path, out)
     assert len(written) < 100 * (1 + second.computed)
 
 
 def test_a_cell_without_adhesion_has_enough_with_the_least_number(tmp_path):
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text(0.01).replace("[0.04]", "[0.0, 0.04]"))
-    summary = run(path, out)
+    summary = run_file(path, out)
     for group, (_, known) in zip(read_status(out)["groups"], summary.precisions, strict=True):
         is_lossless = group["work_of_adhesion"] == 0
         assert group["met"] is known.met is is_lossless
@@ -270,10 +264,10 @@ def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path, finished
     shutil.copy(earlier, out)
     path.write_text(text(0.16))
     stopped = shutil.copy(earlier, tmp_path / "stopped.h5")
-    run(path, stopped, fake="fail=*:*:*", max_failures=1)
+    run_file(path, stopped, fake="fail=*:*:*", max_failures=1)
     assert read_status(stopped)["pending"] > 0  # what is wanted now, though not before
     path.write_text(text(0.16, 120))
-    second, alone = run(path, out), run(path, whole)
+    second, alone = run_file(path, out), run_file(path, whole)
     assert second.computed == alone.computed - first.computed > 0
     assert differences(out, whole) == []
 
@@ -291,10 +285,8 @@ def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
     for figures in ("FIELDS", "LOOPS", "LOSSES", "MECHANISMS"):
         monkeypatch.setattr(f"adhesis.ensemble.report.figures.catalogue.{figures}", ())
     data = write_report(out, tmp_path / "report")
-    with (tmp_path / "report" / "precision.csv").open(encoding="utf-8") as stream:
-        known = list(csv.DictReader(stream))
-    with (tmp_path / "report" / "losses.csv").open(encoding="utf-8") as stream:
-        printed = list(csv.DictReader(stream))
+    known = table_of(tmp_path / "report" / "precision.csv")
+    printed = table_of(tmp_path / "report" / "losses.csv")
     unit = " [J/m^2]" if quantity == "loss" else ""
     for mine, table, group in zip(known, printed, read_status(out)["groups"], strict=True):
         assert mine["quantity"] == group["quantity"] == quantity
@@ -318,7 +310,7 @@ def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
 def test_failures_count_as_looked_at_and_may_be_computed_again(tmp_path):
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
     path.write_text(text())
-    summary = run(path, out, fake="fail=*:*:3", max_failures=None)
+    summary = run_file(path, out, fake="fail=*:*:3", max_failures=None)
     assert summary.failed == 2
     with Results(out) as results:
         assert np.sum(results.status() == FAILED) == 2
@@ -340,10 +332,10 @@ def test_ranks_and_kills_change_no_bit_of_a_precision_campaign(tmp_path, finishe
 
 def test_what_a_stop_may_be():
     old, new = parse_campaign(text()), parse_campaign(text(0.1, 100))
-    assert set(compare(old, new).grown) == {"stop.relative_error", "stop.most"}
-    assert len(compare(new, old).other) == 2
-    assert compare(parse_campaign(campaign_text(realisations="8")), old).other
+    assert set(growth("f", old, new)) == {"stop.relative_error", "stop.most"}
+    assert len(differing(new, old)) == 2
+    assert differing(parse_campaign(campaign_text(realisations="8")), old)
     spelt = parse_campaign(text(quantity="loss_dimensionless"))
-    assert compare(old, spelt) == ((), ())
-    (phrase,) = compare(old, parse_campaign(text(quantity="loss"))).other
+    assert growth("f", old, spelt) == ()
+    (phrase,) = differing(old, parse_campaign(text(quantity="loss")))
     assert phrase == "stop.quantity is 'loss' here and 'loss_dimensionless' there"

@@ -186,10 +186,6 @@ def text_of(
 @pytest.mark.usefixtures("quick_figures")
 def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"
-    file.write_text(text_of(realisations="1"))
-    assert main(["run", str(file), "--out", str(out)]) == 0
-    with adhesis.open(out) as results:
-        before = results.dataset.load()
     file.write_text(text_of(realisations="2"))
     assert main(["run", str(file), "--out", str(out)]) == 0
     capsys.readouterr()
@@ -199,9 +195,6 @@ def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
     campaign = parse_campaign(file.read_text())
     with adhesis.open(out) as results:
         loops = results.dataset.load()
-    for name in ("loss", "turning_penetration", "unloading_mean_stress", "states"):
-        old, new = before[name], loops[name].isel(realisation=slice(0, 1))
-        np.testing.assert_array_equal(old, new)
     assert loops.turning_stress.values == pytest.approx(
         np.broadcast_to(np.reshape(PRELOADS, (-1, 1)), (1, 1, 2, 2)), rel=1e-8
     )

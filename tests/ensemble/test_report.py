@@ -1,7 +1,6 @@
 """The report: what the tables say, what the figures draw, what the page shows."""
 
 import base64
-import csv
 import io
 import re
 from dataclasses import replace
@@ -27,7 +26,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures import catalogue, loops, loss_figures, shapes_and_spectra
-from adhesis.ensemble.report.figures.style import PublishedFigure, save, style
+from adhesis.ensemble.report.figures.style import save, style
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import loss_tables
@@ -36,7 +35,7 @@ from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import GAP_BINS
 from tests.support.browser import needs_browser, seen_by_browser
-from tests.support.campaign_support import ROOT
+from tests.support.campaign_support import ROOT, table_of
 from tests.support.figures import few_figures
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
@@ -62,7 +61,7 @@ SAVED = "loss_by_mechanism"
 def made(file) -> tuple[Path, dict[str, Figure]]:
     """The report, and its figures by name."""
     with few_figures(SAVED) as figures:
-        write_report(file, file.parent / "report", io.StringIO())
+        write_report(file, file.parent / "report")
     return file.parent / "report", figures
 
 
@@ -76,30 +75,12 @@ def drawn(made) -> dict[str, Figure]:
     return made[1]
 
 
-@pytest.fixture
-def undrawn(monkeypatch) -> list[str]:
-    """Draw no figure but those of the list, for tests that read tables and the page alone."""
-    wanted: list[str] = []
-
-    def unless_wanted(item):
-        def draw(data):
-            return item.draw(data) if item.name in wanted else PublishedFigure()
-
-        return replace(item, draw=draw)
-
-    for name in ("LOOPS", "LOSSES", "MECHANISMS", "FIELDS"):
-        items = tuple(map(unless_wanted, getattr(catalogue, name)))
-        monkeypatch.setattr(catalogue, name, items)
-    return wanted
-
-
 def lines_of(axes) -> dict[str, np.ndarray]:
     return {line.get_label(): line.get_xydata() for line in axes.lines}
 
 
 def test_losses_csv_holds_the_averages_with_units(report, data):
-    with (report / "losses.csv").open(encoding="utf-8") as stream:
-        table = list(csv.DictReader(stream))
+    table = table_of(report / "losses.csv")
     assert [(float(r["hurst"]), float(r["work_of_adhesion [J/m^2]"])) for r in table] == [
         (h, g) for h in (0.7, 0.8) for g in GAMMAS
     ]
@@ -131,7 +112,7 @@ def of_paper(of: Campaign) -> bool:
     return paper.is_reading(of, of.sweep.hurst)
 
 
-@pytest.mark.usefixtures("undrawn", "quick_figures")
+@pytest.mark.usefixtures("quick_figures")
 def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
     for name in ("paper", "beside/ratio-200", "beside/equal-c0", "beside/penetration-0.93"):
         assert of_paper(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
@@ -154,7 +135,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
         assert not of_paper(parse_campaign(text.replace(old, new))), new
     plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=3, ratio=20)
     path = write(tmp_path / "r.h5", plan)
-    data = write_report(path, tmp_path / "out", io.StringIO())
+    data = write_report(path, tmp_path / "out")
     page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "19.36" not in page
     assert "aper" not in page.replace("paper.h5", "")
@@ -177,13 +158,9 @@ def test_tables_print_as_plain_lines(data, monkeypatch):
 
 
 def test_jumps_by_kind_add_up_to_all_drops(data):
-    table = mechanism_tables.jumps(data)
-    shares = np.zeros(len(data.cells))
-    for row in table.rows:
-        shares[[(c.hurst, c.work_of_adhesion) for c in data.cells].index(row[:2])] += row[-1]
-    np.testing.assert_allclose(shares, 1)
+    """Those of all jumps: test_opened.py."""
     glance = mechanism_tables.shares_by_kind(data)
-    place = {(row[0], row[1], row[2]): row[-1] for row in table.rows}
+    place = {row[:3]: row[-1] for row in mechanism_tables.jumps(data).rows}
     for row in glance.rows:
         assert sum(row[2:]) == pytest.approx(1)
         for column, share in zip(glance.columns[2:], row[2:], strict=True):
@@ -214,12 +191,8 @@ def test_contact_is_drawn_against_stress_over_slope(data, drawn):
     assert len(lines) == 6
     cell = data.finished([0.8], [0.04])[0]
     line = lines[r"$\gamma$ = 0.04 J/m², unloading"]
-    unit = 0.5 * 1e6 / 0.75 * 1000 * cell.values["h_max"] * np.sqrt(cell.values["m2"])
-    stress = h5_values(data, cell, "unloading_mean_stress")
-    expected = (stress / unit[:, None]).mean(axis=0)
-    np.testing.assert_allclose(line[:, 0], expected, rtol=1e-10)
-    area = h5_values(data, cell, "unloading_contact_fraction").mean(axis=0)
-    np.testing.assert_allclose(line[:, 1], area, rtol=1e-10)
+    for place, name in enumerate(("mean_stress_over_slope", "contact_fraction")):
+        np.testing.assert_array_equal(line[:, place], cell.curves[f"unloading_{name}"].mean)
 
 
 def test_an_interval_that_goes_on_below_zero_is_marked():
@@ -234,11 +207,6 @@ def test_an_interval_that_goes_on_below_zero_is_marked():
     axes.cla()
     loss_figures.errorbar(*what, from_zero=False)
     assert CARETDOWN not in [line.get_marker() for line in axes.lines]
-
-
-def h5_values(data, cell, name: str) -> np.ndarray:
-    with h5py.File(data.path) as raw:
-        return raw[name][:][cell.rows]
 
 
 def test_loops_are_drawn_with_one_standard_deviation(data, drawn):
@@ -308,7 +276,7 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data, drawn):
 
 
 def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
-    tmp_path, undrawn, quick_figures
+    tmp_path, quick_figures
 ):
     """The paper's captions: Fig. 3 γ = 0.01, Fig. 4 Δ~ = 0.4, Fig. 8 H = 0.7 and Δ~ = 0.7."""
     for kept, drawn_at, said in (
@@ -318,11 +286,10 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
         listed = f"field_nodes = 256\nfield_penetrations = {list(kept)}"
         text = text_of(**PLAN | {"realisations": 2}).replace("field_nodes = 256", listed)
         path = write(tmp_path / f"{len(kept)}.h5", text)
-        undrawn += ["fig3_shapes", "fig4_spectra_of_branches"]
-        data = write_report(path, tmp_path / str(len(kept)), io.StringIO())
+        data = write_report(path, tmp_path / str(len(kept)))
         page = (tmp_path / str(len(kept)) / "report.md").read_text(encoding="utf-8")
         caption = dict(re.findall(r"\*\*.*\(paper's (.*)\)\.\*\* (.*) \(\[PDF", page))
-        shapes, both = (quick_figures[name] for name in undrawn[-2:])
+        shapes, both = (quick_figures[n] for n in ("fig3_shapes", "fig4_spectra_of_branches"))
         assert "H = 0.8, $\\gamma$ = 0.01 J/m²" in shapes.axes[0].get_title(loc="left")
         assert "is at H = 0.8, γ = 0.01 J/m². Its separations" in caption["Fig. 3"]
         for axes, gamma in zip(both.axes, (0.01, 0.04), strict=True):
@@ -370,12 +337,11 @@ def test_shapes_show_the_surface_above_the_profile(data, drawn):
     assert len(detail) < len(lines["rigid"]) / 3
 
 
-def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, undrawn, quick_figures):
-    undrawn.append("fig7_loop_against_penetration")
+def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, quick_figures):
     for count, said in ((5, ""), (8, "6 of 8 γ")):
         plan = campaign(hurst=(0.7,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
         path = write(tmp_path / f"{count}.h5", plan)
-        write_report(path, tmp_path / str(count), io.StringIO())
+        write_report(path, tmp_path / str(count))
         axes = quick_figures["fig7_loop_against_penetration"].axes[0]
         assert len([k for k in lines_of(axes) if "unloading" in k]) == min(count, 6)
         page = (tmp_path / str(count) / "report.md").read_text(encoding="utf-8")
@@ -452,10 +418,9 @@ def test_the_page_embeds_every_figure_that_exists(report):
     assert "nan" not in page.replace("nano", "")
 
 
-def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, undrawn):
-    undrawn.append(SAVED)
+def test_the_same_file_gives_the_same_bytes(file, report, tmp_path):
     with few_figures(SAVED):
-        write_report(file, tmp_path, io.StringIO())
+        write_report(file, tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert {"losses.csv", "curves.nc", "report.html", "loss_by_mechanism.pdf"} < names
     for name in names:
@@ -486,7 +451,7 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(
 def test_one_finished_task_of_one_cell_is_enough(tmp_path, quick_figures):
     path = write(tmp_path / "r.h5", campaign(hurst=(0.8,), gamma=(0.04,), realisations=1))
     parts: list[str] = []
-    data = write_report(path, tmp_path / "out", io.StringIO(), progress=parts.append)
+    data = write_report(path, tmp_path / "out", progress=parts.append)
     assert data.done == 1
     # losses against H, m2 and γ would be single points
     assert not {"table1_losses", "loss_against_m2", "pull_off_stress"} & set(quick_figures)
@@ -621,14 +586,14 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     )
 
 
-@pytest.mark.usefixtures("undrawn", "quick_figures")
+@pytest.mark.usefixtures("quick_figures")
 def test_another_largest_penetration_is_compared_with(file, tmp_path):
     depths = "max_penetration = 0.9", "max_penetration = 0.6"
     lower = companion(tmp_path, "lower.h5", 0.5, *depths)
-    data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
+    data = write_report(file, tmp_path / "out", beside=[lower])
     assert "cycle.max_penetration = 0.6" in write_page(data, {})
     assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
-    write_report(file, tmp_path / "out", io.StringIO())
+    write_report(file, tmp_path / "out")
     assert not (tmp_path / "out" / "beside.csv").exists()
 
 

@@ -1,7 +1,5 @@
 """Averages, tables, curves and figures of a campaign on further axes than H and γ."""
 
-import csv
-import io
 import pickle
 import re
 from dataclasses import replace
@@ -25,6 +23,7 @@ from adhesis.ensemble.report.tables.loss_tables import losses, works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import FAILED
+from tests.support.campaign_support import table_of
 from tests.support.synthetic_results import campaign, rows, sign, text_of, write
 
 TOPS = (0.5, 0.7, 0.9)
@@ -101,10 +100,9 @@ def test_the_papers_cells_alone_stand_beside_the_paper(data):
 
 def test_tables_curves_and_page_have_every_axis(file, data, tmp_path, quick_figures):
     directory = tmp_path / "report"
-    write_report(file, directory, io.StringIO())
+    write_report(file, directory)
     for name in ("losses", "growth", "jumps", "slopes"):
-        with (directory / f"{name}.csv").open(encoding="utf-8") as stream:
-            table = list(csv.DictReader(stream))
+        table = table_of(directory / f"{name}.csv")
         assert {(r["ratio"], r["max_penetration"]) for r in table} == {
             (str(ratio), str(top)) for ratio in (50, 100) for top in TOPS
         }, name
@@ -294,7 +292,7 @@ def test_a_listed_row_is_named_by_all_its_axes(with_failures):
 
 
 def test_a_note_belongs_to_the_cells_that_are_drawn(with_failures, tmp_path, quick_figures):
-    write_report(with_failures, tmp_path / "report", io.StringIO())
+    write_report(with_failures, tmp_path / "report")
     notes = {name: figure.get_supxlabel() for name, figure in quick_figures.items()}
     for name in ("fig7_loop_against_penetration", "loss_by_mechanism", "jump_energies"):
         assert notes[name] == "ratio = 100, h_rms = 1 µm"

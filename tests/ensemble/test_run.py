@@ -347,7 +347,6 @@ CHANGED = r"holds \d of \d finished tasks: another program has"
 COPIED_OVER = {
     "zeros": (3, lambda empty, other: bytes(len(empty)), InputError, "is damaged"),
     "rows of before lost": (0, lambda empty, other: empty, WriteError, CHANGED),
-    "rows of before of another run": (0, lambda empty, other: other, WriteError, CHANGED),
     "rows of another run": (3, lambda empty, other: other, WriteError, CHANGED),
 }
 

@@ -26,7 +26,7 @@ import pytest
 from adhesis.ensemble.run import launch
 from tests.support.campaign_support import ROOT, campaign_text, done_rows, wait_until
 from tests.support.launchers import PATH
-from tests.support.processes import ran
+from tests.support.processes import executable, ran
 
 SCRIPT = ROOT / "jobs" / "slurm.sh"
 pytestmark = pytest.mark.slurm
@@ -253,17 +253,15 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Callab
         folder = tmp_path_factory.mktemp("a study, ")
         text = campaign_text(realisations=str(realisations))
         (folder / "study.toml").write_text(text)
-        adhesis = folder / "bin" / "adhesis"
-        adhesis.parent.mkdir()
-        adhesis.write_text(
+        adhesis = executable(
+            folder / "bin" / "adhesis",
             f"""#!/bin/sh
 behaviour="log=begun hold=2"
 if [ "$1" = report ]; then exec mkdir "$4"; fi
 if [ -n "$SLURM_RESTART_COUNT$SLURM_ARRAY_TASK_ID" ]; then behaviour=log=begun; fi
 exec "{sys.executable}" "{ROOT}/tests/support/fake_run.py" "$behaviour" "$@"
-"""
+""",
         )
-        adhesis.chmod(0o755)
         (folder / "mpirun").write_text(f"{mpirun}\n")  # as set-up records it
         env = cluster.env | {"ADHESIS": str(adhesis), "LAUNCHER": launcher, "REPORT": "no"}
         env |= {"STAGING": staging and str(folder / staging)}

@@ -412,7 +412,6 @@ def _replace(path):
 
 TAKEN_AWAY = {
     "removed": lambda path: path.unlink(),
-    "moved": lambda path: path.rename(path.with_name("old.h5")),
     "moved with its folder": lambda path: path.parent.rename(f"{path.parent}-old"),
     "replaced": _replace,
     "cut": lambda path: os.truncate(path, 1000),

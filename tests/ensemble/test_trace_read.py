@@ -213,12 +213,6 @@ REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], s
     "complex": (1j * Z, {"step": STEP}, InputError, "array holds complex128"),
     "a unit of its own": (BOTH.view(WithUnit), {"unit": "mm"}, TypeError, "array carries a unit"),
     "rows left out": (HEIGHTS.drop(9), {"step": STEP}, InputError, r"leaves rows .*\(drop=True\)"),
-    "by number": (
-        FRAME.drop(9),
-        {"columns": [2], "step": STEP},
-        InputError,
-        "index .* leaves rows",
-    ),
     "by name": (FRAME.drop(9), {"columns": ["z (um)"], "step": STEP}, InputError, "leaves rows"),
     "another order": (HEIGHTS.sort_values(), {"step": STEP}, InputError, "another order"),
     "units in a list": (list(BOTH.T.view(WithUnit)), {"unit": "mm"}, TypeError, "array carries a"),

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
@@ -213,20 +212,3 @@ def test_no_variation_is_read_as_another_trace_and_all_whole_ones_are_read(tmp_p
     found = [outcome(seed, tmp_path) for seed in range(VARIATIONS)]
     assert [wrong for _, wrong in found if wrong] == []
     assert sum(not refusal for refusal, _ in found) > 0.4 * VARIATIONS
-
-
-def column_text(seed: int) -> tuple[list[str], dict[str, object]]:
-    """Draw the heights of a single column that nothing else stands in, and its options."""
-    text = draw_text(seed)
-    heights = text.heights[~np.isnan(text.heights)]
-    return [f"{h * 1e6:.6f}" for h in heights], {"step": text.step, "unit": "um"}
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_two_columns_that_an_empty_line_divides_are_not_joined_in_silence(seed, tmp_path):
-    (one, options), (two, _) = column_text(seed), column_text(seed + 1000)
-    path = tmp_path / "two.txt"
-    for lines in ([*one, "", *one[::-1], "", *one], [*one, "", *two], [*one, "", "", *two]):
-        path.write_text("\n".join(lines))
-        with pytest.raises(InputError, match=rf"the first on line {len(one) + 1}: write NaN where"):
-            read_trace(path, **options)

@@ -26,7 +26,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.processes import ran
+from tests.support.processes import executable, ran
 
 pytestmark = pytest.mark.mpi
 NETWORK = "10.77.0.0/24"
@@ -50,12 +50,6 @@ class Nodes:
     spaces: tuple[str, str]
     folder: Path
 
-    def words(self, words: list[str]) -> list[str]:
-        enter = 'mount --bind "$0" /etc/hosts && hostname nodea && exec "$@"'
-        unshare = ["unshare", "--uts", "--ipc", "--mount", "bash", "-c", enter]
-        inside = ["ip", "netns", "exec", self.spaces[0], *unshare]
-        return [*inside, str(self.folder / "hosts"), *words]
-
     def launch(self, *words: object, fake: str) -> subprocess.Popen[str]:
         options = {
             "plm": "rsh",
@@ -67,7 +61,10 @@ class Nodes:
         mca = [word for name, value in options.items() for word in ("--mca", name, value)]
         start = [MPIRUN, "--allow-run-as-root", *mca, "--host", "nodea:2,nodeb:2", "-n", "4"]
         program = command(words, ranks=4, fake=fake)[3:]  # without the launcher
-        return started(self.words([*start, *program]))
+        enter = 'mount --bind "$0" /etc/hosts && hostname nodea && exec "$@"'
+        unshare = ["unshare", "--uts", "--ipc", "--mount", "bash", "-c", enter]
+        inside = ["ip", "netns", "exec", self.spaces[0], *unshare, str(self.folder / "hosts")]
+        return started([*inside, *start, *program])
 
     def kill(self, node: int) -> None:
         for pid in ran("ip", "netns", "pids", self.spaces[node], check=True).stdout.split():
@@ -83,14 +80,13 @@ def nodes(tmp_path: Path) -> Iterator[Nodes]:
         "127.0.0.1 localhost\n"
         + "".join(f"{a} {n}\n" for a, n in zip(ADDRESSES, NAMES, strict=True))
     )
-    agent = tmp_path / "agent"
-    agent.write_text(
+    executable(
+        tmp_path / "agent",
         "#!/bin/bash\nhost=$1\nshift\n"
         f'exec ip netns exec "adhesis-$host-{os.getpid()}" unshare --uts --ipc --mount bash -c '
         f'\'mount --bind {tmp_path}/hosts /etc/hosts && hostname "$0" && exec bash -c "$1"\' '
-        '"$host" "$*"\n'
+        '"$host" "$*"\n',
     )
-    agent.chmod(0o755)
     links = tuple(f"adh{os.getpid() % 100000}{end}" for end in "ab")
     steps = [f"ip netns add {space}" for space in spaces]
     steps.append(f"ip link add {links[0]} type veth peer name {links[1]}")

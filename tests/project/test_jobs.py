@@ -8,10 +8,11 @@ import re
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 
-from tests.support.processes import ran
+from tests.support.processes import executable, ran
 
 JOBS = Path(__file__).parents[2] / "jobs"
 
@@ -87,14 +88,10 @@ class Cluster:
 def cluster(tmp_path: Path) -> Cluster:
     folder = tmp_path / "a study, of two words"
     programs = folder / "bin"
-    programs.mkdir(parents=True)
     for name, text in STAND_INS.items():
         log = f'printf \'%s|\' {name} "$@" >>"$CALLS"; echo >>"$CALLS"'
-        (programs / name).write_text(f"#!/bin/bash\n{log}\n{text}\n")
-    body = "\n".join(line[4:] for line in QSUB.splitlines())
-    (programs / "qsub").write_text(f"#!/usr/bin/env python3\n{body}\n")
-    for program in programs.iterdir():
-        program.chmod(0o755)
+        executable(programs / name, f"#!/bin/bash\n{log}\n{text}\n")
+    executable(programs / "qsub", f"#!/usr/bin/env python3\n{dedent(QSUB)}")
     (folder / "nodes").write_text("a\na\nb\nb\n")
     (folder / "qstat").write_text(
         "Job Id: 17.head\n    Job_Name = wide\n    queue = small\n    Account_Name = ab12\n"
@@ -326,9 +323,8 @@ def test_pbs_job_tells_the_run_its_time_and_submits_the_report(cluster: Cluster)
 
 
 def test_pbs_job_submits_a_continuation_with_all_that_it_was_given(cluster: Cluster) -> None:
-    mine = cluster.folder / "bin" / "mine"
-    mine.write_text((cluster.folder / "bin" / "mpirun").read_text().replace("mpirun", "mine"))
-    mine.chmod(0o755)
+    programs = cluster.folder / "bin"
+    executable(programs / "mine", (programs / "mpirun").read_text().replace("mpirun", "mine"))
     settings = {"LAUNCHER": "mine -n 3", "MAX_RESTARTS": "2", "FILE": "r,1.h5"}
     options = {"OPTIONS": "--redo failed --max-failures 0"}
     assert pbs(cluster, CODE="75", PBS_O_QUEUE="route", **settings, **options).returncode == 75

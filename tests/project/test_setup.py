@@ -15,8 +15,8 @@ import pytest
 from packaging.requirements import Requirement
 
 from tests.project.test_package import PROJECT
-from tests.support.campaign_support import ROOT, started, wait_until
-from tests.support.processes import ran
+from tests.support.campaign_support import ROOT, has_ended, started, wait_until
+from tests.support.processes import executable, ran
 
 # Distribution names that differ from what is imported, and what other packages need to find.
 IMPORTED_AS = {"markdown-it-py": "markdown_it", "surfacetopography": "SurfaceTopography"}
@@ -77,9 +77,8 @@ def copied(folder: Path) -> Path:
 
 def test_an_older_python_is_named_before_anything_is_installed(tmp_path: Path) -> None:
     """By set-up; pip refuses it by requires-python."""
-    old = tmp_path / "python3.10"
-    old.write_text('#!/bin/sh\n[ "$1" = -V ] && echo Python 3.10.13 && exit 0\nexit 1\n')
-    old.chmod(0o755)
+    text = '#!/bin/sh\n[ "$1" = -V ] && echo Python 3.10.13 && exit 0\nexit 1\n'
+    old = executable(tmp_path / "python3.10", text)
     done = ran(copied(tmp_path), env=os.environ | {"PYTHON": str(old)}, timeout=None)
     assert done.returncode == 1
     assert done.stdout == ""
@@ -125,15 +124,8 @@ def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: P
     done = ran("bash", "-c", script, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (3, "")
     assert re.fullmatch(r"setup: what fails: \d+ s, failed", done.stdout.splitlines()[-1])
-    child = (tmp_path / "child").read_text().strip()
-
-    def is_alive() -> bool:
-        try:
-            return "sleep" in Path(f"/proc/{child}/cmdline").read_text()
-        except OSError:
-            return False
-
-    wait_until(lambda: not is_alive(), 20)  # by itself it would end later
+    child = int((tmp_path / "child").read_text())
+    wait_until(lambda: has_ended(child), 20)  # by itself it would end later
 
 
 def test_local_script_asks_for_a_campaign() -> None:
@@ -147,10 +139,8 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Sign
     # A checkout in which adhesis is a stand-in that notes how it is stopped.
     for folder in ("jobs", "tools"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
-    adhesis = tmp_path / ".venv" / "bin" / "adhesis"
-    adhesis.parent.mkdir(parents=True)
-    adhesis.write_text("#!/bin/bash\ntrap 'exit 75' USR1\nsleep 60 & touch begun\nwait\n")
-    adhesis.chmod(0o755)
+    stand_in = "#!/bin/bash\ntrap 'exit 75' USR1\nsleep 60 & touch begun\nwait\n"
+    executable(tmp_path / ".venv" / "bin" / "adhesis", stand_in)
     script = started([tmp_path / "jobs" / "local.sh", "study.toml", "1"], tmp_path)
     try:
         wait_until((tmp_path / "begun").exists)

@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,7 +30,7 @@ from tests.support.campaign_support import (
     environment,
     wait_until,
 )
-from tests.support.processes import ran
+from tests.support.processes import executable, ran
 
 JOBS = Path(__file__).parent.parent.parent / "jobs"
 ROWS = 30
@@ -125,19 +125,15 @@ class Site:
 @contextmanager
 def site(folder: Path) -> Iterator[Site]:
     """Make a site; what still runs in the end is ended."""
-    (folder / "bin").mkdir(parents=True)
     for name, text in {"adhesis": ADHESIS, "scontrol": SCONTROL}.items():
-        (folder / "bin" / name).write_text(text)
-        (folder / "bin" / name).chmod(0o755)
+        executable(folder / "bin" / name, text)
     made = Site(folder)
     try:
         yield made
     finally:
         for job in made.started:
-            try:
+            with suppress(ProcessLookupError):
                 os.killpg(job.pid, signal.SIGKILL)
-            except ProcessLookupError:
-                continue
         for job in made.started:
             job.communicate()
 

@@ -1,6 +1,7 @@
 """What the tests of campaigns share: campaigns, fake tasks, commands under mpirun."""
 
 import contextlib
+import csv
 import io
 import os
 import signal
@@ -10,11 +11,12 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from unittest.mock import patch
 
 import h5py
 import numpy as np
+import pytest
 
 from adhesis.ensemble.campaign.compare import growth
 from adhesis.ensemble.campaign.tables import Campaign
@@ -74,20 +76,11 @@ def campaign_text(**changes: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-class Compared(NamedTuple):
-    """Keys by which a campaign grew, and a phrase for each that makes it another one."""
-
-    grown: tuple[str, ...] = ()
-    other: tuple[str, ...] = ()
-
-
-def compare(old: Campaign, new: Campaign) -> Compared:
-    try:
-        return Compared(growth("f", old, new))
-    except InputError as error:
-        phrases = str(error).removeprefix("f holds another campaign: ")
-        phrases = phrases.removesuffix(" (here: this campaign, there: f)")
-        return Compared(other=tuple(phrases.split("; ")))
+def differing(old: Campaign, new: Campaign) -> list[str]:
+    """Return a phrase for each key that makes the new campaign another one."""
+    with pytest.raises(InputError, match=r"^f holds another campaign: .* there: f\)$") as refusal:
+        growth("f", old, new)
+    return str(refusal.value).partition(": ")[2].rpartition(" (here: ")[0].split("; ")
 
 
 def write_campaign(folder: Path, name: str = "c.toml", **changes: str) -> Path:
@@ -159,23 +152,20 @@ def run_python(*words: object, **extra: str) -> subprocess.CompletedProcess[str]
 
 def ranks_of(launcher: int) -> list[int]:
     """Return the process ids of the ranks that a launcher has started."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == launcher:
-            found.append(int(stat.parent.name))
-    return sorted(found)
+    pids = (int(path.name) for path in Path("/proc").glob("[0-9]*"))
+    return sorted(pid for pid in pids if stat_of(pid)[1:2] == [str(launcher)])
+
+
+def stat_of(pid: int) -> list[str]:
+    """Return the fields of /proc/PID/stat from the state on; none of a process that is gone."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return []
 
 
 def has_ended(pid: int) -> bool:
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return True
-    return stat.rpartition(")")[2].split()[0] == "Z"
+    return stat_of(pid)[:1] in ([], ["Z"])
 
 
 def hung_launchers() -> list[int]:
@@ -194,6 +184,12 @@ def wait_until(condition: Callable[[], bool], seconds: float = 150.0, every: flo
     while not condition():
         assert time.monotonic() < end, "waited too long"
         time.sleep(every)
+
+
+def table_of(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a .csv, by the names of its columns."""
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
 
 
 def done_rows(path: Path) -> int:

@@ -21,13 +21,16 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.session import Engine
+from adhesis.ensemble.run.progress import Summary
+from adhesis.ensemble.run.session import Engine, Options, run_campaign
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
@@ -125,6 +128,12 @@ def fake_engine(behaviour: str) -> Engine:
     if "silence" in settings:
         engine = replace(engine, silence=float(settings["silence"]))
     return replace(engine, all_write=False) if "serial" in settings else engine
+
+
+def run_file(path: Path, out: Path, fake: str = "", **options: Any) -> Summary:
+    """Run a campaign file in this process."""
+    campaign, engine = load_campaign(path), fake_engine(fake)
+    return run_campaign(campaign, out, options=Options(**options), engine=engine)
 
 
 if __name__ == "__main__":

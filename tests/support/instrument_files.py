@@ -110,11 +110,9 @@ def igor(path: Path, step: float, heights: Array) -> None:
     struct.pack_into("<4d", wave, 84, step, 1.0, 1.0, 1.0)
     wave[148:149] = b"m"  # data units
     wave[152:153] = b"m"  # dimension units
-    head = struct.pack("<hhi", 5, 0, len(wave) + len(data)) + b"\0" * 56
-    words = np.frombuffer(head[:64] + bytes(wave), "<i2").astype(np.int64)
-    check = int(-words.sum()) & 0xFFFF
-    head = struct.pack("<hHi", 5, check, len(wave) + len(data)) + b"\0" * 56
-    path.write_bytes(head[:64] + bytes(wave) + data)
+    head = struct.pack("<hHi", 5, 0, len(wave) + len(data)) + b"\0" * 56
+    check = int(-np.frombuffer(head + wave, "<i2").astype(np.int64).sum()) & 0xFFFF
+    path.write_bytes(head[:2] + struct.pack("<H", check) + head[4:] + wave + data)
 
 
 def netcdf(path: Path, step: float, heights: Array) -> None:
