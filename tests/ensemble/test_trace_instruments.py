@@ -13,6 +13,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support import instrument_files
+from tests.support.campaign_support import run_python
 
 pytestmark = pytest.mark.skipif(
     not instrument.available(), reason="the optional package SurfaceTopography is not installed"
@@ -138,3 +139,11 @@ def test_a_file_of_no_reader_is_refused_in_one_sentence(tmp_path: Path) -> None:
     (sentence,) = process.stderr.splitlines()
     assert sentence.startswith("adhesis trace: ")
     assert "is neither text nor an instrument format" in sentence
+
+
+def test_a_program_still_gets_logs(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """All logs of the process were disabled, for good if two threads read at once."""
+    (tmp_path / "a.bin").write_bytes(bytes(range(256)) * 20)
+    with pytest.raises(InputError, match="neither text nor"):
+        read_trace(tmp_path / "a.bin")
+    assert caplog.messages
