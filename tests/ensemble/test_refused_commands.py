@@ -53,7 +53,7 @@ run c.toml --dry-run --redo all -> --redo and --dry-run cannot be given together
 run c.toml --hurst 0.7 -> --hurst needs --redo: it chooses the tasks to compute again
 run c.toml --redo all --hurst {{x,-1,nan}} -> --hurst is '{{}}'
 run c.toml --redo all --work-of-adhesion 40 ->
-    --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2
+    --work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in "40mJ/m2"
 run c.toml --out r.h5 --redo failed --hurst 0.70000000001 ->
     --hurst is 0.70000000001: this campaign has no such task, only 0.7, 0.8
 run c.toml --out none.h5 --redo all -> --redo computes again what is in a results file, and none.h5
@@ -85,8 +85,8 @@ LOOP --period 2000 -> --period is 2000, which would be 2000 m: give its unit
 LOOP --layer 0 -> --layer is 0.0: it must be a positive number
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
-{{LOOP,TRACE --plan --unit um}} --stripes 2 -> --stripe-amplitude is missing: a work
-LOOP --stripe-phase 1.0 -> --stripes is missing: a work of adhesion that varies
+{{LOOP,TRACE --plan --unit um}} --stripes 2 -> --stripe-amplitude is missing: give the
+LOOP --stripe-phase 1.0 -> --stripes is missing: give the number of stripes
 LOOP --stripes 2 --stripe-amplitude 0.1 --strength 1e8 -> is given beside a strength
 loop --heights none.npy --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->
