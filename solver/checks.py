@@ -13,7 +13,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import Any, TypeGuard, TypeVar
 
@@ -169,6 +169,21 @@ def plain(number: float) -> str:
         return str(number)
     mantissa, e, exponent = f"{number:.6g}".partition("e")
     return mantissa + (f"e{int(exponent)}" if e else "")
+
+
+def at_least(bound: float, digits: int) -> str:
+    """Format a lower bound for a message, rounded up: the number that is shown is allowed."""
+    return _rounded(bound, digits, ROUND_CEILING)
+
+
+def at_most(bound: float, digits: int) -> str:
+    """Format an upper bound, rounded down; see :func:`at_least`."""
+    return _rounded(bound, digits, ROUND_FLOOR)
+
+
+def _rounded(bound: float, digits: int, rounding: str) -> str:
+    number = Context(digits, rounding).create_decimal(repr(float(bound)))
+    return f"{float(number):.{digits}g}"
 
 
 def counted(number: int, name: str) -> str:

@@ -40,7 +40,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from adhesis.solver.checks import instance
+from adhesis.solver.checks import at_least, at_most, instance
 from adhesis.solver.model.contact_state import ContactState as ContactState
 from adhesis.solver.model.jump import BRANCHES as BRANCHES
 from adhesis.solver.model.jump import Branch as Branch
@@ -248,7 +248,7 @@ class Method(NotebookDisplay, ABC):
         raise ValueError(
             f"work_of_adhesion is {gamma:g} J/m²: for this profile and E* = "
             f"{problem.half_space.modulus:g} Pa the method '{cls.name}' takes from "
-            f"{least:.2g} to {largest:.2g} J/m² ({cls.resolved_adhesion[0]:g} to "
+            f"{at_least(least, 2)} to {at_most(largest, 2)} J/m² ({cls.resolved_adhesion[0]:g} to "
             f"{cls.resolved_adhesion[1]:g} times the elastic energy of full contact); {advice}"
         )
 

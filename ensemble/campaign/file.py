@@ -19,7 +19,7 @@ from adhesis.ensemble.campaign.rules import list_of, number_in, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.regular_file import open_regular
-from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
+from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES, at_least
 from adhesis.solver.model.pattern import stripes_of
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
@@ -308,7 +308,8 @@ def _check_open(campaign: Campaign) -> bool:
     works = campaign.in_cells("sweep.work_of_adhesion", "material.work_of_adhesion_open")
     for gamma, found in works:
         if found < gamma or gamma == 0 < found:
-            rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
+            least = f"at least the work of adhesion, {at_least(gamma, 6)}"
+            rule = least if gamma else "left out, as γ is 0"
             raise InputError(
                 f"[material] work_of_adhesion_open is {found:g}: it must be {rule}, in "
                 "every cell of the sweep (zip joins lists whose values belong together)"

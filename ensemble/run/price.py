@@ -290,11 +290,13 @@ def _law(priors: list[float], seconds: list[float]) -> Callable[[float], float]:
 def _realisations(campaign: Campaign, known: Known) -> tuple[int, str]:
     """Realisations that a cell takes with ``[stop]``, and a sentence on it.
 
-    They follow from the standard deviation of a value over the mean of its cell.
+    They follow from the standard deviation of a value over the mean of its cell, of those with
+    adhesion: in others values are rounding.
     """
     at = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
     few = fewest(at)
-    values = [np.array([v for _, v in loops if math.isfinite(v)]) for loops in known.values()]
+    adhesive = (loops for (_, gamma, *_), loops in known.items() if gamma > 0)
+    values = [np.array([v for _, v in loops if math.isfinite(v)]) for loops in adhesive]
     values = [of_cell for of_cell in values if of_cell.size > 1]
     freedom = sum(of_cell.size - 1 for of_cell in values)
     if freedom < _FEWEST_FOR_SPREAD:

@@ -35,7 +35,10 @@ _OF_LIMIT = (
 )
 OF_DOUBT = ("audit_residual", "loss_error", "loss", "work_of_adhesion")
 """Numbers of a row from which :func:`doubtful` decides."""
-INSTEAD = "Rougher profiles, a stiffer material or a smaller preload let loops reach it"
+INSTEAD = (
+    "Rougher profiles or a stiffer material let loops reach it, or a smaller preload where the "
+    "stress is no tension"
+)
 
 
 def why_beyond(opens: bool) -> str:

@@ -47,6 +47,8 @@ _MAX_MISSING = 0.10
 # A degree is a form if its mean square height exceeds each of the six degrees above by this factor,
 # and surely one at the second factor; looked for up to the last number.
 _FORM, _SURE_FORM, _FORM_TO = 8.0, 30.0, 4
+# Rounding of lengths that messages show with six digits.
+_SHOWN = 5e-6
 # A trace is refused as noise if its rms height is below this multiple of the noise.
 _MIN_TO_NOISE = 1.1
 # Warn above this share of the two longest waves in the mean square height.
@@ -424,11 +426,11 @@ def _filled(
     longest_here = float(missing[worst] + 1) * trace.step
     allowed = max(_GAP_STEPS, _GAP_SHARE * heights.size) * trace.step
     allowed = allowed if longest is None else longest
-    if missing[worst] and longest_here > allowed * (1 + 1e-9):
+    if missing[worst] and longest_here > allowed * (1 + _SHOWN):
         at = start + int(starts[worst]) * trace.step
         raise InputError(
-            f"{trace.source} has a gap of {length_text(longest_here)} at {length_text(at)}: "
-            f"up to {length_text(allowed)} "
+            f"{trace.source} has a gap of {length_text(longest_here, 6)} at {length_text(at)}: "
+            f"up to {length_text(allowed, 6)} "
             f"is interpolated ({parameter('longest_gap')} allows more){_why_missing(trace)}"
         )
     index = np.arange(heights.size)
@@ -520,12 +522,13 @@ def _cut_off(
         "tip": f"what a tip of radius {length_text(radius)} follows",
     }
     if wanted is not None:
-        if not 2.2 * trace.step <= wanted <= length / 2:
-            low, high = (length_text(end, 6) for end in (2.2 * trace.step, length / 2))
+        low, high = 2.2 * trace.step, length / 2
+        if not low * (1 - _SHOWN) <= wanted <= high * (1 + _SHOWN):
             raise InputError(
                 f"{parameter('cut_off')} is {length_text(wanted, 6)}: it must lie between 2.2 "
-                f"steps ({low}) and half the length ({high})"
+                f"steps ({length_text(low, 6)}) and half the length ({length_text(high, 6)})"
             )
+        wanted = min(max(wanted, low), high)
         if wanted < shortest * (1 - 1e-9):
             work.warnings.append(
                 f"the cut-off {length_text(wanted)} is shorter than what the trace can be trusted "

@@ -26,7 +26,7 @@ class Lattice:
     adhesion : array
         γ(x) sqrt(1 + h'²), or γ(x) by the flat measure, in J/m².
     origin : int
-        Node at the highest crest.
+        Node at the first crest.
     equal_parts : int
         Of the period.
     """
@@ -52,7 +52,7 @@ class Lattice:
             problem.toughness(elastic.dx * np.arange(n, dtype=np.float64), profile.slopes(n)),
             problem.control,
             profile.h_max,
-            round(profile.highest_point[0] / elastic.dx) % n,
+            round(problem.first_crest / elastic.dx) % n,
             problem.equal_parts,
         )
 

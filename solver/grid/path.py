@@ -80,7 +80,7 @@ class Steps:
         self.states.append(before)
         position = self.profile.crests().position
         if self.adhesion_scale:
-            position = position[self.profile.first_of_equal(position, self.problem.equal_parts)]
+            position = position[self.problem.first_of_equal(position, self.problem.equal_parts)]
         crests = np.rint(position / self.lattice.dx).astype(np.intp)
         contact.mask[crests % self.lattice.n] = True
         self.solver.solve(contact, self.relaxation.tight)
@@ -260,6 +260,13 @@ class Steps:
         lost = self.lattice.control.is_load and not after.mask.any()
         if lost:
             after.separation = before.separation
+            # The loop is closed at this separation; edges may have a node left to the fold.
+            nearer = start.copy()
+            nearer.mask = start.mask & np.roll(start.mask, 1) & np.roll(start.mask, -1)
+            if nearer.mask.any():
+                self.solver.solve(nearer, self.relaxation.tight)
+                later = abs(nearer.separation - before.separation)
+                self.error += abs(before.mean_stress) * later
         end = self._append(after)
         at_stake = 0.0
         if other is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver.checks import at_least, at_most
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath
 from adhesis.solver.loading.mean_stress_event import REACHED, locate
 from adhesis.solver.method import ContactState, Fields, Method, Opening
@@ -106,9 +107,11 @@ def state_at_stress(
     found = {i: 0.0 if abs(difference) <= near else difference for i, difference in found.items()}
     least, most = min(found.values()), max(found.values())
     if least > 0 or most < 0:
+        low, high = stress + least, stress + most
+        low, high = low - REACHED * abs(low), high + REACHED * abs(high)
         raise ValueError(
             f"stress is {stress:g} Pa: on the {branch} branch the mean stress in contact lies "
-            f"between {stress + least:.6g} and {stress + most:.6g} Pa"
+            f"between {at_least(low, 6)} and {at_most(high, 6)} Pa"
         )
     at = [i for i, difference in found.items() if difference == 0]
     passing = [i for i in found if i - 1 in found and found[i - 1] * found[i] < 0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import InitVar, dataclass, field
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -13,6 +14,8 @@ from adhesis.solver.checks import (
     RMS_SLOPE,
     STRENGTH,
     WORK_OF_ADHESION,
+    at_least,
+    at_most,
     choice,
     instance,
     plain,
@@ -23,7 +26,7 @@ from adhesis.solver.model.control import Control, Value
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.pattern import AdhesionPattern
-from adhesis.solver.model.profile import Array, Profile
+from adhesis.solver.model.profile import Array, Integers, Profile, first_of_equal
 from adhesis.solver.values import ByValue
 
 Measure = Literal["arc", "flat"]
@@ -31,6 +34,9 @@ Measure = Literal["arc", "flat"]
 
 LONGEST_GRIFFITH_CRACK = 0.25
 """Length of the longest Griffith crack that may open a patch, in shortest waves."""
+
+# Of the shortest wave: places in equal parts of the period that differ by less are copies.
+_SAME_PLACE = 1e-3
 
 # Rounding of a separation over h_max: smaller penetrations count as 0.
 _ROUNDING = 8 * float(np.finfo(float).eps)
@@ -173,7 +179,8 @@ class Problem(ByValue):
         gamma = self.work_of_adhesion
         found = real("work_of_adhesion_open", self.work_of_adhesion_open, WORK_OF_ADHESION)
         if found < gamma or gamma == 0 < found:
-            rule = f"at least the work of adhesion, {gamma:g}" if gamma else "left out, as γ is 0"
+            least = f"at least the work of adhesion, {at_least(gamma, 6)}"
+            rule = least if gamma else "left out, as γ is 0"
             raise ValueError(f"work_of_adhesion_open is {found:g} J/m²: it must be {rule}")
         if found > gamma and math.isfinite(self.strength):
             raise ValueError(
@@ -240,10 +247,10 @@ class Problem(ByValue):
             return
         least = math.sqrt(4 * self.half_space.modulus * self.work_of_adhesion / (math.pi * most))
         if adhesion_range is None:
-            given, rule = f"strength is {self.strength:g} Pa", f"at least {least:.3g} Pa"
+            given, rule = f"strength is {self.strength:g} Pa", f"at least {at_least(least, 3)} Pa"
         else:
             given = f"adhesion_range is {adhesion_range:g} m"
-            rule = f"at most {self.work_of_adhesion / least:.3g} m"
+            rule = f"at most {at_most(self.work_of_adhesion / least, 3)} m"
         raise ValueError(
             f"{given}: it must be {rule} for this profile, or the crack that opens a patch, "
             f"{self.critical_crack:.3g} m long, exceeds a quarter of the shortest wave, and edges "
@@ -301,6 +308,25 @@ class Problem(ByValue):
         For much larger γ contact runs into full contact spontaneously.
         """
         return 0.25 * self.half_space.modulus * self.profile.moment(1)
+
+    @cached_property
+    def first_crest(self) -> float:
+        """Position in m of the highest crest; of equal ones, of that with the largest γ(x).
+
+        That one attracts first, however short the range of adhesion is.
+        """
+        if self.pattern is None:
+            return self.profile.highest_point[0]
+        x = self.profile.crests().position % self.profile.period
+        return float(x[np.argmax(self.pattern.at(self.profile.q0 * x))])
+
+    def first_of_equal(self, position: Array, equal_parts: int) -> Integers:
+        """Choose, of places in m where contact may begin alike, those where it does begin.
+
+        See :func:`first_of_equal`; of so many equal parts the period consists.
+        """
+        period, near = self.profile.period, _SAME_PLACE * self.profile.shortest_wavelength
+        return first_of_equal(position, self.first_crest, period / equal_parts, period, near)
 
     def separation(self, penetration: float) -> float:
         """Compute the separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""

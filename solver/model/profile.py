@@ -64,9 +64,6 @@ MIRRORED = 1e-6
 """Of h_max, of a pattern of γ: waves may be so far from their mirror image. Jumps are hardly
 located more finely."""
 
-# Of the shortest wave: places in equal parts of the period that differ by less are copies.
-_SAME_PLACE = 1e-3
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Crests(ByValue):
@@ -315,16 +312,6 @@ class Profile(ByValue):
         # a wave raises one crest over another by up to four times its coefficient
         return np.flatnonzero(np.abs(self.coefficients) > EQUAL_CRESTS / 4 * self.h_max)
 
-    def first_of_equal(self, position: Array, equal_parts: int) -> NDArray[np.intp]:
-        """Choose, of places in m where contact may begin alike, those where it does begin.
-
-        See :func:`first_of_equal`; of so many equal parts the period of a problem consists.
-        """
-        near = _SAME_PLACE * self.shortest_wavelength
-        return first_of_equal(
-            position, self.highest_point[0], self.period / equal_parts, self.period, near
-        )
-
     # ------------------------------------------------------------------ transformations
 
     def shifted(self, distance: float) -> Profile:
@@ -348,11 +335,11 @@ def first_of_equal(
 ) -> NDArray[np.intp]:
     """Choose, of places where contact may begin alike, those where it does begin.
 
-    That is the first to the right of the highest crest, with its copies in the other equal parts of
+    That is the first to the right of the first crest, with its copies in the other equal parts of
     the period. The rest are its mirror images, or equal it by chance: in any other profile one of
     them comes first, however little they differ. Returned are the indices of the places.
 
-    ``origin`` is the highest crest, ``part`` and ``period`` are the lengths of one of the equal
+    ``origin`` is the first crest, ``part`` and ``period`` are the lengths of one of the equal
     parts and of all, and ``near`` is the largest error of the positions, all in one unit.
     """
     away = (position - origin + near) % period

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import re
 
 import numpy as np
 import pytest
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.model.profile import self_affine_profile
@@ -229,3 +231,21 @@ def test_crests_of_roughness_are_no_single_features() -> None:
         )
         count += bool(prepared(profile.at(X)).features)
     assert count == 0
+
+
+def test_lengths_that_a_refusal_names_are_taken() -> None:
+    """Half the length was refused as beyond itself: "it must lie between … and 199.875 µm"."""
+    gappy = Z.copy()
+    gappy[100:140] = np.nan
+    for step in (1e-6 / 3, 0.5e-6, 0.9e-6, 1e-6 / 7):
+        for heights, name, given in (
+            (Z, "cut_off", 1e-12),
+            (Z, "cut_off", 0.5),
+            (gappy, "longest_gap", 1e-9),
+        ):
+            trace = Trace(heights, step, "t.txt")
+            with pytest.raises(InputError) as refusal:
+                prepare_trace(trace, **{name: given})  # type: ignore[arg-type]
+            named = re.findall(r"[\d.]+ [µn]m", str(refusal.value).removeprefix("cut_off is "))
+            shown = named[-1] if given == 0.5 else named[0] if name == "longest_gap" else named[-2]
+            prepare_trace(trace, **{name: LENGTH.read(shown)})  # type: ignore[arg-type]

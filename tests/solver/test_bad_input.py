@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,7 @@ from adhesis.solver.checks import Bounds, counted, real, shown, whole
 from adhesis.solver.loading.cycle import check_cycle
 from adhesis.solver.method import MethodReport
 from tests.support.exact_wave import ExactWave
+from tests.support.scenes import rough
 from tests.support.wrong_values import WithUnit, outside
 
 PERIOD, AMPLITUDE = 1e-3, 1e-6
@@ -574,3 +575,32 @@ def test_a_command_is_answered_in_its_own_words() -> None:
     with pytest.raises(InputError, match=r"^degree is 9: it must be"):
         prepare_trace(TRACE, degree=9)
     assert issubclass(InputError, ValueError)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_a_bound_that_a_refusal_names_is_taken(seed: int) -> None:
+    """Rounded to the nearest, 9.5e-07 m was refused: it must be at most 9.5e-07 m."""
+    profile = rough(3, 4, seed)
+
+    def problem(gamma: float = 0.0123, **others: Any) -> Problem:
+        return Problem(profile, SOLID, gamma, **others)
+
+    def named(pattern: str, call: Callable[[], object]) -> list[float]:
+        with pytest.raises(ValueError, match=pattern) as refusal:
+            call()
+        found = re.search(pattern, str(refusal.value))
+        assert found
+        return [float(number) for number in found.groups()]
+
+    (strength,) = named(r"at least (\S+) Pa for", lambda: problem(strength=10.0))
+    (longest,) = named(r"at most (\S+) m for", lambda: problem(adhesion_range=1e-3))
+    problem(strength=strength)
+    problem(adhesion_range=longest)
+    for name in ("sharp", "grid"):
+        call = partial(make_method, name, problem(1e29))
+        for gamma in named(r"from (\S+) to (\S+) J", call):
+            make_method(name, problem(gamma))
+    loop = run_loop(make_method("sharp", problem()), max_penetration=0.5, load_steps=4)
+    pattern = r"between (\S+) and (\S+) Pa"
+    for stress in named(pattern, lambda: loop.at_stress(1e9, "unloading")):
+        loop.at_stress(stress, "unloading")

@@ -91,6 +91,16 @@ def test_the_two_methods_agree_under_every_control(relative):
     assert grid.pull_off_stress == pytest.approx(sharp.pull_off_stress, rel=0.01)
 
 
+@pytest.mark.parametrize("seed", [2, 4, 5])
+def test_the_error_of_the_grid_holds_where_a_weight_falls_off(seed):
+    """Up to 1.6 errors lay between the methods: the place of the fall is known to a node alone."""
+    problem = Problem(scenes.rough(2, 2, seed), scenes.HALF_SPACE, 5e-4, Control(0.0))
+    path = {"max_stress": 100.0, "load_steps": 5}
+    sharp = scenes.loop_of(problem, **path)
+    grid = scenes.loop_of(problem, "grid", nodes_per_wave=32, **path)
+    assert abs(grid.loss - sharp.loss) < grid.loss_error
+
+
 @pytest.mark.parametrize("stiffness", [0.0, 1e6])
 def test_a_wave_without_adhesion_carries_a_weight_as_westergaard_has_it(stiffness):
     """What holds the solid is so soft that first touch carries next to nothing."""

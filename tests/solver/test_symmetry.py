@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, run_loop
+from adhesis import Control, HalfSpace, LoopResult, Problem, Profile, run_loop, stripes
 from adhesis.solver.model.problem import Measure
 from adhesis.solver.registry import MethodName
 from tests.support.scenes import HALF_SPACE as SOFT
@@ -136,6 +136,24 @@ def test_two_equal_parts_that_are_mirrored_lose_the_same_wherever_they_lie(
         for profile in (*profiles, Profile(2e-3, coefficients))
     ]
     np.testing.assert_allclose(losses, losses[0], rtol=1e-4)
+
+
+@pytest.mark.parametrize("method", ["sharp", "grid"])
+def test_of_equal_crests_that_with_the_largest_work_of_adhesion_touches_first(method):
+    """Wherever the period begins: rounding chose one, and losses differed by 7e-3."""
+    grooves, stripe = Profile(2e-3, np.array([0, 0, 5e-7])), stripes(1, 0.4, 2.5)
+    nodes = 16 if method == "grid" else None
+    losses = [
+        loop_of(
+            Problem(grooves.shifted(share * 2e-3), SOFT, 2e-3, pattern=stripe.shifted(share)),
+            method,
+            nodes_per_wave=nodes,
+            max_penetration=0.6,
+            load_steps=5,
+        ).loss
+        for share in (0.0, 0.25, 0.5625, 0.625)  # whole nodes: crests are at nodes
+    ]
+    np.testing.assert_allclose(losses, losses[0], rtol=1e-5)
 
 
 def test_two_patches_that_are_mirror_images_part_as_soon_as_they_are_a_saddle():

@@ -142,7 +142,7 @@ class Nucleation:
     def first_touch(self, opening: float = 0.0) -> tuple[float, list[Touch]]:
         """Return the separation q0 s at which the first seeds are put, and the touches.
 
-        These are at the highest crest (:meth:`Profile.first_of_equal`), in units of 1/q0 at an
+        These are at the first crest (:attr:`Problem.first_crest`), in units of 1/q0 at an
         ``opening`` within the range; there are none where no patch grows there.
         """
         profile = self.problem.profile
@@ -193,7 +193,7 @@ class Nucleation:
     def _first_of_equal(self, position: Array) -> Integers:
         """Choose those of equal touches at which contact begins; without adhesion all."""
         if self.edges.critical > 0:
-            return self.problem.profile.first_of_equal(position, self.edges.symmetry.parts)
+            return self.problem.first_of_equal(position, self.edges.symmetry.parts)
         return np.arange(len(position))
 
     def minimum(self, field: GapField) -> tuple[float, Minima]:
