@@ -95,9 +95,8 @@ def law(data: Aggregate) -> Iterator[str]:
         finite = [value for value in values if math.isfinite(value)]
         return in_one_unit(name, sorted({min(finite), max(finite)}), " to ")
 
-    mean = ""
+    mean = "" if material.stripes is None else " in the mean"
     if material.stripes is not None:
-        mean = " in the mean"
         yield (
             f"The work of adhesion varies along the profile, {shown('stripes')} times in its "
             f"period and by {shown('stripe_amplitude')} of γ (phase {shown('stripe_phase')} rad); "

@@ -78,10 +78,7 @@ def read_scan(
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep warnings and log messages of the readers from stderr: each tries the file, known or not.
-
-    Handlers of logs that a program has set up get them as before.
-    """
+    """Keep warnings and logs of the readers from stderr; a program's own handlers get the logs."""
     import logging
     import warnings
 
