@@ -60,7 +60,8 @@ class Quantity:
     shown: tuple[str, ...]  # units in which values are shown, from the largest to the smallest
     # A larger number without a unit is likely to be in another unit, and is asked about
     largest: float = math.inf
-    # What to give instead of such a number, which replaces ``{0}``; quotes, if any, replace ``{1}``
+    # What to give instead of such a number, which replaces ``{0}``: in quotes, which a campaign
+    # file needs and a shell takes off
     question: str = ""
     # Units by further names; with them, capitals do not count
     others: Mapping[str, str] = field(default_factory=dict)
@@ -91,16 +92,13 @@ class Quantity:
             )
         return unit
 
-    def check(self, number: float, quotes: str = "") -> None:
-        """Raise UnitError for a number that can hardly be in the SI unit.
-
-        ``quotes`` stand around a value with a unit where it is to be given.
-        """
+    def check(self, number: float) -> None:
+        """Raise UnitError for a number that can hardly be in the SI unit."""
         if self.largest < abs(number) < math.inf:
             shown = f"{number:g}"
             raise UnitError(
                 f"is {shown}, which would be {shown} {self.unit}: give its unit, "
-                f"{self.question.format(shown, quotes)}"
+                f"{self.question.format(shown)}"
             )
 
     def read(self, text: str) -> float:
@@ -160,7 +158,7 @@ LENGTH = Quantity(
     "a length, as in 5e-6 (m) or 0.5um",
     ("m", "mm", "µm", "nm"),
     1.0,
-    "as in {1}{0}um{1} ({1}{0}m{1}, if metres are meant)",
+    'as in "{0}um" ("{0}m", if metres are meant)',
     {
         name: unit
         for unit, names in {
@@ -202,7 +200,7 @@ WORK_OF_ADHESION = Quantity(
     "a number in J/m² with a decimal point, as in 0.02, or with its unit, as in 20mJ/m2",
     ("J/m²",),
     10.0,  # the surface energies of solids are below
-    "as in {1}{0}mJ/m2{1} ({1}{0}J/m2{1}, if J/m² are meant)",
+    'as in "{0}mJ/m2" ("{0}J/m2", if J/m² are meant)',
 )
 QUANTITIES = {q.unit: q for q in (LENGTH, STRESS, STIFFNESS, WORK_OF_ADHESION)}
 """Quantities by their SI unit."""
@@ -392,8 +390,9 @@ def duration(seconds: float) -> str:
 
 
 def percent(*shares: float, digits: int = 2) -> str:
-    """Return significant digits of a share without an exponent: "12 %"; of two, "3 to 12 %"."""
-    return " to ".join(f"{float(f'{100 * share:.{digits}g}'):g}" for share in shares) + " %"
+    """Return significant digits of a share without exponent: "12 %"; "3 to 12 %" of unlike ones."""
+    texts = (f"{float(f'{100 * share:.{digits}g}'):g}" for share in shares)
+    return " to ".join(dict.fromkeys(texts)) + " %"
 
 
 def rounded_percent(share: float, places: int = 1, sign: str = "") -> str:

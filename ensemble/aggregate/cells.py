@@ -88,9 +88,9 @@ class Cell:
         names = [name for name in self.values if name not in _NOT_AVERAGED]
         means = estimates(np.array([self.values[name] for name in names]))
         found = dict(zip(names, means, strict=True))
-        if not self.work_of_adhesion and self.done:  # nothing is lost: the values are rounding
-            for name in ("loss", "loss_dimensionless", "loss_per_contact"):
-                found[name] = Estimate(self.done, 0.0, 0.0, 0.0, np.nan, np.nan)
+        if not self.work_of_adhesion:  # nothing is lost: the values are rounding
+            (nothing,) = estimates(np.zeros(self.done), with_interval=False)
+            found |= dict.fromkeys(("loss", "loss_dimensionless", "loss_per_contact"), nothing)
         for name in ("small_scale_share", "largest_contact_fraction"):
             share = found[name]
             low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave it

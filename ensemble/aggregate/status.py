@@ -256,7 +256,7 @@ def _failure_lines(failures: Sequence[Mapping[str, Any]], path: str, part: str |
         options = f"--out {shell_word(path)}{f' --part {part}' if part else ''} --redo failed"
         late = any(error.startswith("longer than the time limit") for error in errors)
         limit = ", with a longer time_limit in [solver]" if late else ""
-        return [*lines, f"again: adhesis run CAMPAIGN.toml {options}{limit}"]
+        return [*lines, f"again{limit}: adhesis run CAMPAIGN.toml {options}"]
     which = "they" if refused == len(errors) else f"{refused} of them"
     fail, they_are = ("fails", "it is") if refused == 1 else ("fail", "they are")
     if len(errors) == 1:

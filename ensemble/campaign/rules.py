@@ -54,7 +54,7 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
         if isinstance(value, Written):
             return Written(number, value.unit)
         if quantity is not None:
-            quantity.check(number, '"')
+            quantity.check(number)
         return number
 
     example = "" if quantity is None else f', or a {quantity.name} as "{quantity.example}"'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -69,11 +70,10 @@ def _outcome(data: Aggregate) -> str:
         what = "the drops before the fall are lost"
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}{friction}."
-    share = [cell.estimates["small_scale_share"].mean for cell in cells]
+    share = [100 * cell.estimates["small_scale_share"].mean for cell in cells]
     return (
         f"{top}, on average over realisations, from {_loss(cells[0])} to {_loss(cells[-1])}; "
-        f"{100 * min(share):.0f} to {100 * max(share):.0f} % of {what} where edges run inside "
-        f"patches{friction}."
+        f"{from_to(share, '{:.0f}'.format)} % of {what} where edges run inside patches{friction}."
     )
 
 
@@ -90,24 +90,21 @@ def law(data: Aggregate) -> Iterator[str]:
     """Report the law of adhesion; none where it is one γ of zero range."""
     material = data.campaign.material
 
-    def of_cells(name: str) -> list[float]:
-        return [getattr(cell.campaign.material, name) for cell in data.cells]
-
     def shown(name: str) -> str:
-        found = of_cells(name)
-        return in_one_unit(name, sorted({min(found), max(found)}), " to ")
+        values = [getattr(cell.campaign.material, name) for cell in data.cells]
+        finite = [value for value in values if math.isfinite(value)]
+        return in_one_unit(name, sorted({min(finite), max(finite)}), " to ")
 
+    mean = "" if material.stripes is None else " in the mean"
     if material.stripes is not None:
-        count, amplitude, phase = (
-            from_to(of_cells(name)) for name in ("stripes", "stripe_amplitude", "stripe_phase")
-        )
         yield (
-            f"The work of adhesion varies along the profile, {count} times in its period and by "
-            f"{amplitude} of γ (phase {phase} rad); γ is its mean."
+            f"The work of adhesion varies along the profile, {shown('stripes')} times in its "
+            f"period and by {shown('stripe_amplitude')} of γ (phase {shown('stripe_phase')} rad); "
+            "γ is its mean."
         )
     if material.work_of_adhesion_open is not None:
         opened = shown("work_of_adhesion_open")
-        yield f"Edges advance at γ, and recede at a work of adhesion of {opened}."
+        yield f"Edges advance at γ, and recede at a work of adhesion of {opened}{mean}."
     if material.adhesion_range is not None:
         yield (
             f"Adhesion has a range of {shown('adhesion_range')}: surfaces touch at that gap, and "
@@ -118,10 +115,12 @@ def law(data: Aggregate) -> Iterator[str]:
             f"Adhesion has a strength of {shown('strength')}: patches open from inside there, and "
             "surfaces touch at a gap of γ over it."
         )
+        if any(cell.campaign.material.strength == math.inf for cell in data.cells):
+            yield "Where the strength is inf, the range of adhesion is zero."
 
 
 def _from_to(shares: Sequence[float]) -> str:
-    return percent(*sorted({min(shares), max(shares)}))
+    return percent(min(shares), max(shares))
 
 
 def turning_point(data: Aggregate) -> str:

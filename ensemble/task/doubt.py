@@ -36,8 +36,8 @@ _OF_LIMIT = (
 OF_DOUBT = ("audit_residual", "loss_error", "loss", "work_of_adhesion")
 """Numbers of a row from which :func:`doubtful` decides."""
 INSTEAD = (
-    "Rougher profiles or a stiffer material let loops reach it, or a smaller preload where the "
-    "stress is no tension"
+    "Rougher profiles or a stiffer material let loops reach it, or a smaller preload, unless all "
+    "contact is in tension"
 )
 
 

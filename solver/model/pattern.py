@@ -171,7 +171,7 @@ def stripes_of(
     if count is None or amplitude is None:
         missing = "stripes" if count is None else "stripe_amplitude"
         raise ValueError(
-            f"{missing} is missing: a work of adhesion that varies has a number of stripes and an "
-            "amplitude, and a phase beside both if need be"
+            f"{missing} is missing: give the number of stripes and their amplitude together, and a "
+            "phase only beside both"
         )
     return stripes(count, amplitude, phase or 0.0)

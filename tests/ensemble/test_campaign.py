@@ -141,8 +141,8 @@ work_of_adhesion_open = 0.08; strength = 3e9 -> _open and a range or strength: a
 work_of_adhesion_open = 0.08; method = "grid" ->
     [solver] method is 'grid' beside a work_of_adhesion_open
 strength = 3e6 -> [solver] method is 'grid' beside a range or strength
-stripes = 2 -> [material] stripe_amplitude is missing: a work of adhesion that varies
-stripe_phase = 1.0 -> [material] stripes is missing: a work of adhesion that varies
+stripes = 2 -> [material] stripe_amplitude is missing: give the number of stripes
+stripe_phase = 1.0 -> [material] stripes is missing: give the number of stripes
 stripes = 2; stripe_amplitude = 0.1; strength = 1e8; method =; nodes_per_wave = ->
     is given beside a strength
 # rules that hold in every cell

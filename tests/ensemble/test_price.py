@@ -114,7 +114,7 @@ def test_pilot_loops_short_of_their_preload_are_reported():
     assert warning == (
         "WARNING: 2 of 4 pilot loops do not reach the preload, and turn at the latest turning "
         "point: at load steps the mean stress is at most 1.2 kPa. Rougher profiles or a stiffer "
-        "material let loops reach it, or a smaller preload where the stress is no tension."
+        "material let loops reach it, or a smaller preload, unless all contact is in tension."
     )
 
     def pulls(campaign, task):

@@ -41,10 +41,10 @@ REFUSED: list[tuple[Quantity, str, str]] = [
     (LENGTH, "", "is '': it must be a length, as in 5e-6 (m) or 0.5um"),
     (LENGTH, "5 parsec", f"is '5 parsec': its unit must be one of {LENGTHS}"),
     (LENGTH, "9" * 400 + "x", "…': its unit must be one of m, cm"),
-    (LENGTH, "20", "which would be 20 m: give its unit, as in 20um (20m, if metres are meant)"),
+    (LENGTH, "20", 'would be 20 m: give its unit, as in "20um" ("20m", if metres are meant)'),
     (HEIGHT, "0.4", "is 0.4, which would be 0.4 m: give"),
     (STRESS, "1mPa", "is '1mPa': its unit must be one of Pa, kPa, MPa, GPa"),  # no thousandth
-    (WORK_OF_ADHESION, "20", "which would be 20 J/m²: give its unit, as in 20mJ/m2 (20J/m2, if"),
+    (WORK_OF_ADHESION, "20", 'which would be 20 J/m²: give its unit, as in "20mJ/m2" ("20J'),
     (WORK_OF_ADHESION, "20mJ", f"is '20mJ': {IS_WORK}"),
     (WORK_OF_ADHESION, "0,02", f"is '0,02': {IS_WORK}"),
     (WORK_OF_ADHESION, "20J/m", f"its unit must be one of {WORKS}"),

@@ -82,7 +82,7 @@ LOOP --unit um -> --unit belongs to --trace
 LOOP --layer 0 -> --layer is 0.0: it must be a positive number
 LOOP --layer 1e-3 --stiffness 1 -> --layer are given: give one of them
 LOOP --work-of-adhesion-open 0.08 --method grid -> --method is 'grid' beside a work
-{{LOOP,TRACE --plan --unit um}} --stripes 2 -> --stripe-amplitude is missing: a work
+{{LOOP,TRACE --plan --unit um}} --stripes 2 -> --stripe-amplitude is missing: give the
 LOOP --stripes 2 --stripe-amplitude 0.1 --strength 1e8 -> is given beside a strength
 loop --heights none.npy --period 1e-3 -> --work-of-adhesion, --young, --poisson are missing: with
 loop --heights wave.csv --work-of-adhesion 0.01 --young 1e6 --poisson 0.5 ->

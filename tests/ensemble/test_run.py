@@ -250,9 +250,9 @@ def test_a_task_that_hangs_meets_the_time_limit_and_the_limit_may_change(tmp_pat
     assert process.returncode == 1
     failure = json.loads(adhesis_here("status", out, "--json").stdout)["failures"][0]
     assert failure["error"] == "longer than the time limit of 0.6 s"
-    again = f"again: adhesis run CAMPAIGN.toml --out {out} --redo failed"
+    again = f"adhesis run CAMPAIGN.toml --out {out} --redo failed"
     shown = adhesis_here("status", out).stdout
-    assert f"{again}, with a longer time_limit in [solver]\n" in shown
+    assert f"again, with a longer time_limit in [solver]: {again}\n" in shown
     assert failure["seconds"] > 0.5
     process, _ = run(tmp_path, "--redo", "failed", method='"grid"\ntime_limit = 60')
     assert process.returncode == 0

@@ -131,7 +131,9 @@ def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> 
         read_trace(tmp_path / "a.h5")
 
 
-def test_a_file_of_no_reader_is_refused_in_one_sentence(tmp_path: Path) -> None:
+def test_a_file_of_no_reader_is_refused_in_one_sentence(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     """One of the readers logs the bytes that it cannot use."""
     (tmp_path / "a.bin").write_bytes(bytes(range(256)) * 20)
     words = ("trace", tmp_path / "a.bin", "--plan", "--work-of-adhesion", 0.01)
@@ -139,3 +141,6 @@ def test_a_file_of_no_reader_is_refused_in_one_sentence(tmp_path: Path) -> None:
     (sentence,) = process.stderr.splitlines()
     assert sentence.startswith("adhesis trace: ")
     assert "is neither text nor an instrument format" in sentence
+    with pytest.raises(InputError):
+        read_trace(tmp_path / "a.bin")
+    assert caplog.messages  # a program that has set up handlers of logs still gets them

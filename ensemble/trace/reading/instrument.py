@@ -45,7 +45,7 @@ def read_scan(
     length or unit, it holds a map and no row is chosen, or the chosen channel or row is not there.
     """
     io = _library()
-    with _without_a_word():
+    with _quiet():
         try:
             reader = io.open_topography(source.name if source.content is None else source.open())
             channels = list(reader.channels)
@@ -77,19 +77,19 @@ def read_scan(
 
 
 @contextmanager
-def _without_a_word() -> Iterator[None]:
-    """Silence warnings and logs of the readers: of a file of none of them many have some."""
+def _quiet() -> Iterator[None]:
+    """Keep warnings and logs of the readers from stderr; a program's own handlers get the logs."""
     import logging
     import warnings
 
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
+    nowhere = logging.NullHandler()  # without any handler messages go to stderr
+    logging.root.addHandler(nowhere)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
     finally:
-        logging.disable(before)
+        logging.root.removeHandler(nowhere)
 
 
 def _refuse(source: Source, sentence: str) -> NoReturn:
