@@ -13,6 +13,7 @@ from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support import instrument_files
+from tests.support.campaign_support import run_python
 
 pytestmark = pytest.mark.skipif(
     not instrument.available(), reason="the optional package SurfaceTopography is not installed"
