@@ -38,21 +38,19 @@ WIDE bool invert_definite(const double* matrix, int n, double* inverse) {
   unit.assign(n * n, 0.0);
   if (!factor_rows(factor.data(), n)) return false;
   for (int i = 0; i < n; ++i) unit[i * n + i] = 1;
-  // Lᵀ Y = 1, then L X = Y, the columns from the diagonal on: Y has no others, and X is symmetric
+  // Lᵀ Y = 1, then L X = Y, for all columns at once
   for (int k = n - 1; k >= 0; --k) {
     double* row = unit.data() + k * n;
-    for (int i = k + 1; i < n; ++i)
-      subtract(factor[i * n + k], unit.data() + i * n + i, row + i, n - i);
-    scale(1 / factor[k * n + k], row + k, n - k);
+    for (int i = k + 1; i < n; ++i) subtract(factor[i * n + k], unit.data() + i * n, row, n);
+    scale(1 / factor[k * n + k], row, n);
   }
   for (int k = 0; k < n; ++k) {
     double* row = unit.data() + k * n;
-    for (int i = 0; i < k; ++i)
-      subtract(factor[k * n + i], unit.data() + i * n + k, row + k, n - k);
-    scale(1 / factor[k * n + k], row + k, n - k);
+    for (int i = 0; i < k; ++i) subtract(factor[k * n + i], unit.data() + i * n, row, n);
+    scale(1 / factor[k * n + k], row, n);
   }
   for (int i = 0; i < n; ++i)
-    for (int j = i; j < n; ++j) inverse[i * n + j] = inverse[j * n + i] = unit[i * n + j];
+    for (int j = 0; j < n; ++j) inverse[i * n + j] = 0.5 * (unit[i * n + j] + unit[j * n + i]);
   return true;
 }
 
