@@ -14,7 +14,7 @@ namespace adhesis {
 // Radians of the highest Chebyshev mode over one panel: 8 to 14 Gauss nodes resolve half a wave.
 inline constexpr double PANEL_PHASE = 3.0;
 
-// Charges of a run, at most, and more than the nodes of a gap: enough for patches of 4e-10 of their
+// Charges of a run, at most, and more than the nodes of a gap: enough for patches of 5e-10 of their
 // run at an accuracy of 1e-14.
 inline constexpr int MOST_CHARGES = 160;
 

@@ -34,7 +34,7 @@ int divide(const std::vector<Gap>& gaps, int first, int last,
 // In η the potentials of the others are analytic up to the lines Im η = ±τ, τ = π/(2α). The sine
 // takes the strip between these nearly to an ellipse, so that series in s converge up to π/2 times
 // as fast as in η (Kosloff, Tal-Ezer, J. Comput. Phys. 104:457, 1993). The images of the lines and
-// the branch points of the inverse, s = ±1/sin(c), limit the rate; with `c` it is within 2 % of the
+// the branch points of the inverse, s = ±1/sin(c), limit the rate; with `c` it is within 3 % of the
 // largest, where both do alike.
 struct RunMap {
   double c, sine, rate;

@@ -168,6 +168,15 @@ def test_a_command_loads_no_more_than_it_needs(tmp_path: Path) -> None:
     assert "scan" not in loaded or "SurfaceTopography" in loaded["scan"]
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda p: p.stem)
+def test_what_a_benchmark_imports_is_there(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test runs most of them."""
+    monkeypatch.syspath_prepend(path.parent)
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module != "__future__":
+            exec(ast.unparse(node), {})  # raises ImportError
+
+
 def test_the_types_of_the_kernels_are_those_of_the_module() -> None:
     """`python tools/stub.py` writes them."""
     assert stub() == (ROOT / "adhesis" / "solver" / "_kernels.pyi").read_text()

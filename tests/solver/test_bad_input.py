@@ -342,6 +342,7 @@ Problem(WAVE, SOLID, 0.004, pattern=0.3) -> TypeError: pattern is 0.3
 profile_from_heights([2.0, 2.0, 2.0], 1.0) -> ValueError: the profile is flat (h_max = 0)
 profile_from_heights([1.0, 2.0], 1.0) -> ValueError: heights hold 2 value(s): at least 3
 profile_from_heights(LEFT_OUT, 1.0) -> ValueError: the index of heights leaves rows out, or has
+profile_from_heights(xr.DataArray(LEFT_OUT), 1.0) -> ValueError: the index of heights leaves rows
 profile_from_heights([0.0, 1e+200, 0.0], 1.0) -> ValueError: largest height is 1e+200: it must be
 profile_from_heights([0.0, 1e-200, 0.0], 1.0) -> ValueError: largest coefficient is 3.3
 profile_from_heights([1, 2j, 3], 1.0) -> TypeError: heights[1] is 2j: it must be a real number

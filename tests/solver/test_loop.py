@@ -140,6 +140,12 @@ def test_only_the_last_drop_under_a_load_may_be_negative_without_an_error(
     assert estimated_error(0.25, jumps, -0.125, problem) == error + 0.375
 
 
+def test_a_drop_is_the_difference_of_the_energies_whatever_its_sign():
+    low, high = (ContactState(1e-6, np.array([[0, 1e-4]]), 0.0, u, 0.0, 0.1) for u in (1.0, 3.0))
+    assert Jump.between(low, high, "loading", 2.0).energy_drop == -1.0
+    assert Jump.between(high, low, "loading", 2.0).energy_drop == 1.0
+
+
 def test_a_contact_that_never_detaches_is_reported():
     class Sticking(ExactWave):
         def follow(self, state: ContactState, separation: float) -> Path:

@@ -187,7 +187,7 @@ class Descents:
                 if ways:
                     gaps = ways[0]
                 elif not strict and rests <= 2 * RESTS:
-                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS, law)
+                    gaps = self._move_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
     def _hidden_minimum(self, gaps: Array, prescribed: float, law: EdgeLaw) -> list[Rival]:
@@ -258,20 +258,19 @@ class Descents:
             raise FullContact
         return min(smallest, CLOSING_SHARE * float(length[0]))
 
-    def _perturb_most_unbalanced(
-        self, gaps: Array, prescribed: float, times: int, law: EdgeLaw
-    ) -> Array:
-        """Move the most unbalanced edge on by ``times`` half a longest step.
+    def _move_unbalanced(self, gaps: Array, prescribed: float, times: int, law: EdgeLaw) -> Array:
+        """Move the most unbalanced edges on by ``times`` half a longest step.
 
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
-        minimum: the flow stands still there. A minimum draws the edge back.
+        minimum: the flow stands still there. A minimum draws the edges back. Edges with half as
+        large an imbalance move, too: where one of two equal ones moved alone, it led to a minimum
+        that both together pass, and a loss was wrong by 8 %.
         """
         opening = self._edges.solution(gaps, prescribed).edge_opening
         residual = opening - law.critical_of(gaps, opening)
-        e = int(np.argmax(np.abs(residual)))
-        step = np.zeros(gaps.size)
-        step[e] = -np.sign(residual[e]) * step_limits(gaps, 0.5 * times * law.longest_step)[e]
-        return move_edges(gaps, step)
+        unbalanced = np.abs(residual) > 0.5 * np.abs(residual).max()
+        step = step_limits(gaps, 0.5 * times * law.longest_step) * unbalanced
+        return move_edges(gaps, -np.sign(residual) * step)
 
 
 def leaving_step(hessian: Array, limit: Array, order: Array, balanced: float = 0.0) -> Array | None:
