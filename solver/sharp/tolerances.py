@@ -30,8 +30,9 @@ and longest correction of an equilibrium that is searched nearby."""
 DESCENT_HANDS_OVER = 1e-3
 """λ_min. Shorter descent steps are left to Newton's iteration, and edges that a descent moves by
 less have not left their branch."""
-ENDLESS = 100_000
-"""Steps of one descent, or nucleations in one jump; more are an endless loop."""
+ENDLESS = 10_000
+"""Steps of one descent, or nucleations in one jump: more go to and fro, or are an endless loop.
+With ten times as many three of 96 loops of a patch that rocks from bump to bump were refused."""
 RESTS = 20
 """How often a descent may come to rest without a minimum that Newton's iteration finds; as often
 again edges that are nearly in equilibrium are taken, or moved. Without it

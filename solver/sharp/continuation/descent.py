@@ -145,14 +145,13 @@ class Descents:
         edges = self._edges
         law = EdgeLaw(edges.law_at(gaps))
         law.longest_step *= share
-        left, rests, raced = ENDLESS, 0, False
+        rests, raced = 0, False
         rested, start = np.empty((0, 2)), gaps
-        while left > 0 and rests <= 2 * RESTS:
+        while rests <= 2 * RESTS:
             near = edges.response_near(gaps, prescribed)
             if near is None:
                 raise NoState("there is no field of these edges", prescribed)
-            end = near.descend(gaps, start, prescribed, left, equal_speeds, law, edges.model)
-            left -= end.steps
+            end = near.descend(gaps, start, prescribed, ENDLESS, equal_speeds, law, edges.model)
             edges.count.descent_steps += end.steps
             edges.count.fields += end.steps
             if end.event == DescentEvent.NO_FIELD:
@@ -167,9 +166,9 @@ class Descents:
                     return rest, raced
                 law = EdgeLaw(law)
                 law.smallest = self._smallest_of_last_gap(gaps, law.smallest)
-            if end.event == DescentEvent.AT_REST:
-                # Next to a fold the field's error may hide whether there is a minimum; whatever
-                # is taken for it, the next step in s decides.
+            if end.event in (DescentEvent.AT_REST, DescentEvent.STEP_LIMIT):
+                # Next to a fold the field's error may hide whether there is a minimum: edges go to
+                # and fro. Whatever is taken for it, the next step in s decides.
                 rests += 1
                 same = gaps.shape == rested.shape
                 if same and np.abs(gaps - rested).max() < edges.newton_tolerance:
@@ -184,8 +183,8 @@ class Descents:
                 if not strict and edges.adhesion.pins:
                     edges.forget()  # that of the edges on the way may pin and release some by turns
                 ways = self.ways_off_saddle(gaps, prescribed, law)
-                if ways:
-                    gaps = ways[0]
+                if ways:  # by ever less where the last steps have led to and fro
+                    gaps = gaps + 0.5 ** max(rests - RESTS, 0) * (ways[0] - gaps)
                 elif not strict and rests <= 2 * RESTS:
                     gaps = self._move_unbalanced(gaps, prescribed, rests - RESTS, law)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
