@@ -362,7 +362,7 @@ bool Tree::place_anew(int index, const std::vector<Gap>& gaps, double digits, Fl
     moved[index] = run.interval.end != before.end || run.interval.patch != before.patch;
     const int wanted = wanted_rank(run.interval, digits);
     if (wanted > run.room) return false;
-    if (wanted > run.rank + 1) {  // one fewer is no worse than the modes of gaps
+    if (wanted > run.rank + 1) {  // one fewer errs about as much as the modes of gaps
       run.rank = wanted;
       moved[index] = true;
     }

@@ -224,8 +224,9 @@ def five_equal_parts(shift: float) -> Problem:
     [
         # the sign of the mode that has softened at a fold decided: 1 and 2 % of the loss
         (
-            *(partial(equal_waves, 5, 189692, 0.0227),),
-            *([(0.0, 1e-5), (0.1234, 1e-3), (0.37, 1e-3)], 1e-4),
+            partial(equal_waves, 5, 189692, 0.0227),
+            [(0.0, 1e-5), (0.1234, 1e-3), (0.37, 1e-3)],
+            1e-4,
         ),
         (partial(equal_waves, 9, 53930, 0.0119), [(s, 1e-3) for s in (0.0, 0.1234, 0.37)], 1e-4),
         # where they touch, and at a fold, the error of the field parted them: 1 % of the loss
@@ -260,8 +261,12 @@ def test_edges_that_race_to_one_minimum_are_no_race():
         ([1.122e-7, -2.432e-8, 7.455e-9], 1.0588e-5, 0.99999, 40, (1e-3, 4e-3, 5e-3), 10),
         # rests taken for minima at once made two to five jumps more; never taken, none was found
         (
-            *([2.387e-7, -4.39e-8, -4.86e-9, 7.34e-8, 5.52e-8, 5.57e-8], 1.88e-5, 0.9, 10),
-            *((1e-3, 2e-3, 5e-3), 14),
+            [2.387e-7, -4.39e-8, -4.86e-9, 7.34e-8, 5.52e-8, 5.57e-8],
+            1.88e-5,
+            0.9,
+            10,
+            (1e-3, 2e-3, 5e-3),
+            14,
         ),
     ],
 )
