@@ -53,15 +53,14 @@ def row_checksums(read: Read, kept: NDArray[np.intp], rows: NDArray[np.intp]) ->
     ``kept`` are the rows that keep their fields; both they and ``rows`` ascend.
     """
     out = np.zeros(rows.size, np.uint32)
-    width = sum(read(d.name, slice(0, 1)).nbytes for d in OF_TASKS)
-    step = max(1, _BLOCK_BYTES // width)
     places = dict(zip(kept.tolist(), range(kept.size), strict=True))
-    done = 0
+    done, step = 0, 64  # rows of the first block, which shows how long one is
     while done < rows.size:
         first = int(rows[done])
         last = done + int(np.searchsorted(rows[done:], first + step))
         stretch = slice(first, int(rows[last - 1]) + 1)
         block = np.concatenate([_bytes(read(d.name, stretch)) for d in OF_TASKS], axis=1)
+        step = max(1, _BLOCK_BYTES // block.shape[1])
         for number, row in enumerate(rows[done:last].tolist(), done):
             value = zlib.crc32(block[row - first].data)
             if row in places:

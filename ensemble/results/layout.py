@@ -108,13 +108,14 @@ def create(
 
 
 def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
+    made: dict[str, h5py.Dataset] = {}
     for column, shape, values in schema.members(campaign, part):
-        dataset = _allocate(file, column, shape)
+        dataset = made[column.name] = _allocate(file, column, shape)
         if not column.dims:
             dataset.make_scale(column.name)
         dataset.attrs.update(column.described)
         for axis, dim in enumerate(column.dims):
-            dataset.dims[axis].attach_scale(file[dim])
+            dataset.dims[axis].attach_scale(made[dim])
         if values is not None:
             dataset[...] = values()
 

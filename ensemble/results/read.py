@@ -61,7 +61,8 @@ class Results:
                 file = h5py.File(self.path, "r")
             self._file = stack.enter_context(file)
             self._check_links()
-            self._check_size()
+            found = {d.name: self._file[d.name] for d in schema.DATASETS if d.name in self._file}
+            self._check_size(found)
             self.attributes = self._root_attributes()
             schema.check_version(
                 self.path, self.attributes.get("file_type"), self.attributes["file_version"]
@@ -70,18 +71,17 @@ class Results:
             self.campaign = parse_campaign(text, str(self.path), is_stored=True)
             self.part = self._part()
             self._check_attributes()
-            self._check_members()
+            self._check_members(found)
             self._tasks = self.campaign.tasks(self.part)
             stack.pop_all()
 
-    def _check_size(self) -> None:
+    def _check_size(self, found: dict[str, h5py.Dataset]) -> None:
         """Refuse a file with more than a campaign can have beside its rows, before reading.
 
         HDF5 keeps texts beside the datasets, with no limit to their length.
         """
         size = os.path.getsize(self.path)
-        rows = (self._file[d.name] for d in schema.DATASETS if d.name in self._file)
-        held = sum(min(size, dataset.id.get_storage_size()) for dataset in rows)
+        held = sum(min(size, dataset.id.get_storage_size()) for dataset in found.values())
         if size - held > _MOST_BESIDES + held:
             raise InputError(
                 f"{self.path} holds {bytes_text(size - held)} beside its rows, more than a "
@@ -132,14 +132,16 @@ class Results:
                     f"{shown(value)}"
                 )
 
-    def _check_members(self) -> None:
+    def _check_members(self, found: dict[str, h5py.Dataset]) -> None:
         """Compare scales and datasets with what would be laid out for the campaign.
 
         Numbers are read when all headers are right: one could promise more of them than memory
         holds, or those of other files.
         """
         wanted = schema.members(self.campaign, self.part)
-        missing = [m.dataset.name for m in wanted if m.dataset.name not in self._file]
+        names = (member.dataset.name for member in wanted)
+        found = {name: found.get(name) or self._file.get(name) for name in names}
+        missing = [name for name, dataset in found.items() if dataset is None]
         if missing:
             raise InputError(
                 f"{self.path} was written by another state of adhesis, without {missing[0]}: read "
@@ -147,7 +149,6 @@ class Results:
             )
         if sum(member.nbytes for member in wanted) > os.path.getsize(self.path):
             raise ValueError("truncated")
-        found = {member.dataset.name: self._file[member.dataset.name] for member in wanted}
         for dataset, shape, _ in wanted:
             here = found[dataset.name]
             along = [list(dim.values()) for dim in here.dims]
@@ -198,9 +199,8 @@ class Results:
         """Return a dataset, or some rows of it: a slice, or ascending numbers; and some columns."""
         with _damage(self.path):
             dataset = self._file[name]
-            if isinstance(rows, slice):
-                return np.asarray(dataset[(rows, *columns)])
-            pieces = [dataset[(stretch, *columns)] for stretch in stretches(rows)]
+            parts = [rows] if isinstance(rows, slice) else stretches(rows)
+            pieces = [dataset[(part, *columns)] for part in parts]
             return np.concatenate(pieces) if len(pieces) != 1 else np.asarray(pieces[0])
 
     def status(self) -> NDArray[np.uint8]:
@@ -242,8 +242,7 @@ class Results:
         return tuple(out)
 
     def _checked_status(self) -> NDArray[np.uint8]:
-        suspects = np.arange(len(self))
-        status = np.zeros(len(self), np.uint8)
+        suspects, status = np.arange(len(self)), np.zeros(len(self), np.uint8)
         # A row that a run empties and computes again at this moment looks damaged, once.
         for _ in range(_LOOKS):
             status[suspects] = self.column(schema.STATUS.name, suspects)
@@ -261,7 +260,8 @@ class Results:
         """
         written, spare = self.column(schema.CHECKSUM.name, rows), status == schema.NOT_NEEDED
         held = np.zeros_like(written)
-        held[spare] = empty_checksums(self._file, schema.NOT_NEEDED, rows[spare])
+        if spare.any():
+            held[spare] = empty_checksums(self._file, schema.NOT_NEEDED, rows[spare])
         held[~spare] = row_checksums(self.column, self.column(KEPT), rows[~spare])
         return np.asarray((status > schema.NOT_NEEDED) | (written != held))
 

@@ -11,8 +11,7 @@ the stress with s: σ = σ₀ - (s - s₀) σ₁, with s from the prescribed val
 
 from __future__ import annotations
 
-from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +84,11 @@ class Contact:
 
     def copy(self) -> Contact:
         """Return a copy that shares no array with this one."""
-        return deepcopy(self)
+        arrays = {name: getattr(self, name).copy() for name in ("mask", "stress", "displacement")}
+        response = self.response
+        if response is not None:
+            response = SeparationResponse(response.stress.copy(), response.displacement.copy())
+        return replace(self, **arrays, response=response)
 
 
 class ContactSolver:

@@ -54,7 +54,7 @@ def survey(contact: Contact, lattice: Lattice) -> Edges:
     count = first.size
     last = first + width - 1
     after_patch = np.append(first[1:], first[:1] + n) - last - 1  # free nodes
-    gap = np.concatenate([np.roll(after_patch, 1), after_patch])
+    gap = np.concatenate([after_patch[-1:], after_patch[:-1], after_patch])
     inner, outer = np.concatenate([first, last % n]), np.concatenate([first - 1, last + 1]) % n
     grow, recede = [0.0] * (2 * count), [0.0] * (2 * count)
     w, gl, gr = width.tolist(), gap[:count].tolist(), gap[count:].tolist()

@@ -58,19 +58,22 @@ struct ChebyshevRule {
   Vector node, share;
 };
 
-const ChebyshevRule& chebyshev_rule(int rank) {
-  static const std::vector<ChebyshevRule> rules = [] {
-    std::vector<ChebyshevRule> all;
-    for (int count = 0; count <= MOST_CHARGES; ++count) {
-      ChebyshevRule& rule = all.emplace_back();
-      for (int i = 0; i < count; ++i) {
-        const double t = pi * (count - i - 0.5) / count;
-        rule.node.push_back(std::cos(t));
-        rule.share.push_back(i % 2 == 0 ? std::sin(t) : -std::sin(t));
-      }
+// No lambda: g++ would try for seconds to make a constant of what it returns.
+std::vector<ChebyshevRule> chebyshev_rules() {
+  std::vector<ChebyshevRule> all;
+  for (int count = 0; count <= MOST_CHARGES; ++count) {
+    ChebyshevRule& rule = all.emplace_back();
+    for (int i = 0; i < count; ++i) {
+      const double t = pi * (count - i - 0.5) / count;
+      rule.node.push_back(std::cos(t));
+      rule.share.push_back(i % 2 == 0 ? std::sin(t) : -std::sin(t));
     }
-    return all;
-  }();
+  }
+  return all;
+}
+
+const ChebyshevRule& chebyshev_rule(int rank) {
+  static const std::vector<ChebyshevRule> rules = chebyshev_rules();
   return rules[rank];
 }
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.markers import CARETDOWN
 
-from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
 from adhesis.ensemble.aggregate.status import as_text, read_status
@@ -112,8 +112,7 @@ def of_paper(of: Campaign) -> bool:
     return paper.is_reading(of, of.sweep.hurst)
 
 
-@pytest.mark.usefixtures("quick_figures")
-def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
+def test_the_paper_stands_beside_its_own_campaigns_alone(tmp_path):
     for name in ("paper", "beside/ratio-200", "beside/equal-c0", "beside/penetration-0.93"):
         assert of_paper(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
     text = (ROOT / "jobs" / "paper.toml").read_text()
@@ -134,12 +133,12 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path):
         assert old in text
         assert not of_paper(parse_campaign(text.replace(old, new))), new
     plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=3, ratio=20)
-    path = write(tmp_path / "r.h5", plan)
-    data = write_report(path, tmp_path / "out")
-    page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    data = aggregate(write(tmp_path / "r.h5", plan))
+    page = write_page(data, catalogue.sections(data))
     assert "19.36" not in page
     assert "aper" not in page.replace("paper.h5", "")
-    assert "19.36" not in (tmp_path / "out" / "losses.csv").read_text()
+    loss_tables.losses(data).write_csv(tmp_path / "losses.csv")
+    assert "19.36" not in (tmp_path / "losses.csv").read_text()
     with style():
         assert "paper" not in lines_of(loss_figures.loss_against_hurst(data).axes[0])
 
@@ -275,9 +274,16 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data, drawn):
     assert BINS_PER_DECADE * np.log10(edges[1] / edges[0]) == pytest.approx(1)
 
 
-def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
-    tmp_path, quick_figures
-):
+def of_report(path: Path, *names: str) -> tuple[Aggregate, str, list[Figure]]:
+    """The averages of a file, the page of its report, and these of its figures alone."""
+    data = aggregate(path)
+    sections = catalogue.sections(data)
+    items = {item.name: item for section in sections.values() for item in section}
+    with style():
+        return data, write_page(data, sections), [items[name].of(data) for name in names]
+
+
+def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp_path):
     """The paper's captions: Fig. 3 γ = 0.01, Fig. 4 Δ~ = 0.4, Fig. 8 H = 0.7 and Δ~ = 0.7."""
     for kept, drawn_at, said in (
         ((0.3, 0.4, 0.7, 0.9), 9 * 0.045, ("", "")),  # the nearest of 20 load steps
@@ -286,10 +292,9 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(
         listed = f"field_nodes = 256\nfield_penetrations = {list(kept)}"
         text = text_of(**PLAN | {"realisations": 2}).replace("field_nodes = 256", listed)
         path = write(tmp_path / f"{len(kept)}.h5", text)
-        data = write_report(path, tmp_path / str(len(kept)))
-        page = (tmp_path / str(len(kept)) / "report.md").read_text(encoding="utf-8")
+        names = "fig3_shapes", "fig4_spectra_of_branches"
+        data, page, (shapes, both) = of_report(path, *names)
         caption = dict(re.findall(r"\*\*.*\(paper's (.*)\)\.\*\* (.*) \(\[PDF", page))
-        shapes, both = (quick_figures[n] for n in ("fig3_shapes", "fig4_spectra_of_branches"))
         assert "H = 0.8, $\\gamma$ = 0.01 J/m²" in shapes.axes[0].get_title(loc="left")
         assert "is at H = 0.8, γ = 0.01 J/m². Its separations" in caption["Fig. 3"]
         for axes, gamma in zip(both.axes, (0.01, 0.04), strict=True):
@@ -337,14 +342,13 @@ def test_shapes_show_the_surface_above_the_profile(data, drawn):
     assert len(detail) < len(lines["rigid"]) / 3
 
 
-def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, quick_figures):
+def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path):
     for count, said in ((5, ""), (8, "6 of 8 γ")):
         plan = campaign(hurst=(0.7,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
         path = write(tmp_path / f"{count}.h5", plan)
-        write_report(path, tmp_path / str(count))
-        axes = quick_figures["fig7_loop_against_penetration"].axes[0]
-        assert len([k for k in lines_of(axes) if "unloading" in k]) == min(count, 6)
-        page = (tmp_path / str(count) / "report.md").read_text(encoding="utf-8")
+        _, page, (figure,) = of_report(path, "fig7_loop_against_penetration")
+        drawn = lines_of(figure.axes[0])
+        assert len([k for k in drawn if "unloading" in k]) == min(count, 6)
         assert ("Figures with a panel" in page) is bool(said)
         assert said in page
 
@@ -586,8 +590,9 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     )
 
 
-@pytest.mark.usefixtures("quick_figures")
-def test_another_largest_penetration_is_compared_with(file, tmp_path):
+def test_another_largest_penetration_is_compared_with(file, tmp_path, monkeypatch):
+    for figures in ("FIELDS", "LOOPS", "LOSSES", "MECHANISMS"):
+        monkeypatch.setattr(catalogue, figures, ())
     depths = "max_penetration = 0.9", "max_penetration = 0.6"
     lower = companion(tmp_path, "lower.h5", 0.5, *depths)
     data = write_report(file, tmp_path / "out", beside=[lower])
