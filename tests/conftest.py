@@ -54,6 +54,13 @@ def quick_figures() -> Iterator[dict[str, Any]]:
         yield figures
 
 
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write reports without figures, for tests that read their tables and pages."""
+    for figures in ("FIELDS", "LOOPS", "LOSSES", "MECHANISMS"):
+        monkeypatch.setattr(f"adhesis.ensemble.report.figures.catalogue.{figures}", ())
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run what is marked slow, too")
 

@@ -112,7 +112,7 @@ def test_names_of_files_are_printed_without_control_characters(tmp_path, monkeyp
     assert (tmp_path / f"{name}.json").exists()
 
 
-@pytest.mark.usefixtures("quick_figures")
+@pytest.mark.usefixtures("no_figures")
 def test_a_report_names_a_file_whose_name_is_no_utf_8(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     campaign = parse_campaign(campaign_text())

@@ -274,7 +274,7 @@ def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path, finished
 
 @pytest.mark.parametrize("quantity", ["loss_dimensionless", "loss"])
 def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
-    tmp_path, capsys, monkeypatch, quantity
+    tmp_path, capsys, no_figures, quantity
 ):
     """Of these losses the spread is 20 %, that of W~ 28 %: ± 9 % is met by the loss alone."""
     stop = f'[stop]\nrelative_error = 0.09\nmost = 40\nquantity = "{quantity}"\n'
@@ -282,8 +282,6 @@ def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
     values = synthetic_results.rows(plan)
     values["status"][70:] = PENDING
     out = synthetic_results.write(tmp_path / "r.h5", plan, values)
-    for figures in ("FIELDS", "LOOPS", "LOSSES", "MECHANISMS"):
-        monkeypatch.setattr(f"adhesis.ensemble.report.figures.catalogue.{figures}", ())
     data = write_report(out, tmp_path / "report")
     known = table_of(tmp_path / "report" / "precision.csv")
     printed = table_of(tmp_path / "report" / "losses.csv")

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.markers import CARETDOWN
 
-from adhesis.ensemble.aggregate.average import Aggregate, aggregate
+from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.by_blocks import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
 from adhesis.ensemble.aggregate.status import as_text, read_status
@@ -36,7 +36,7 @@ from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import GAP_BINS
 from tests.support.browser import needs_browser, seen_by_browser
 from tests.support.campaign_support import ROOT, table_of
-from tests.support.figures import few_figures
+from tests.support.figures import few_figures, figures_of
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
 GAMMAS = (0.01, 0.04, 0.07)
@@ -58,21 +58,16 @@ SAVED = "loss_by_mechanism"
 
 
 @pytest.fixture(scope="module")
-def made(file) -> tuple[Path, dict[str, Figure]]:
-    """The report, and its figures by name."""
+def drawn(file) -> dict[str, Figure]:
+    """The figures of the report by name."""
     with few_figures(SAVED) as figures:
         write_report(file, file.parent / "report")
-    return file.parent / "report", figures
+    return figures
 
 
 @pytest.fixture(scope="module")
-def report(made) -> Path:
-    return made[0]
-
-
-@pytest.fixture(scope="module")
-def drawn(made) -> dict[str, Figure]:
-    return made[1]
+def report(drawn, file) -> Path:
+    return file.parent / "report"
 
 
 def lines_of(axes) -> dict[str, np.ndarray]:
@@ -274,15 +269,6 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data, drawn):
     assert BINS_PER_DECADE * np.log10(edges[1] / edges[0]) == pytest.approx(1)
 
 
-def of_report(path: Path, *names: str) -> tuple[Aggregate, str, list[Figure]]:
-    """The averages of a file, the page of its report, and these of its figures alone."""
-    data = aggregate(path)
-    sections = catalogue.sections(data)
-    items = {item.name: item for section in sections.values() for item in section}
-    with style():
-        return data, write_page(data, sections), [items[name].of(data) for name in names]
-
-
 def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp_path):
     """The paper's captions: Fig. 3 γ = 0.01, Fig. 4 Δ~ = 0.4, Fig. 8 H = 0.7 and Δ~ = 0.7."""
     for kept, drawn_at, said in (
@@ -291,9 +277,9 @@ def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp
     ):
         listed = f"field_nodes = 256\nfield_penetrations = {list(kept)}"
         text = text_of(**PLAN | {"realisations": 2}).replace("field_nodes = 256", listed)
-        path = write(tmp_path / f"{len(kept)}.h5", text)
-        names = "fig3_shapes", "fig4_spectra_of_branches"
-        data, page, (shapes, both) = of_report(path, *names)
+        data = aggregate(write(tmp_path / f"{len(kept)}.h5", text))
+        page = write_page(data, catalogue.sections(data))
+        shapes, both = figures_of(data, "fig3_shapes", "fig4_spectra_of_branches")
         caption = dict(re.findall(r"\*\*.*\(paper's (.*)\)\.\*\* (.*) \(\[PDF", page))
         assert "H = 0.8, $\\gamma$ = 0.01 J/m²" in shapes.axes[0].get_title(loc="left")
         assert "is at H = 0.8, γ = 0.01 J/m². Its separations" in caption["Fig. 3"]
@@ -345,10 +331,11 @@ def test_shapes_show_the_surface_above_the_profile(data, drawn):
 def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path):
     for count, said in ((5, ""), (8, "6 of 8 γ")):
         plan = campaign(hurst=(0.7,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
-        path = write(tmp_path / f"{count}.h5", plan)
-        _, page, (figure,) = of_report(path, "fig7_loop_against_penetration")
+        data = aggregate(write(tmp_path / f"{count}.h5", plan))
+        (figure,) = figures_of(data, "fig7_loop_against_penetration")
         drawn = lines_of(figure.axes[0])
         assert len([k for k in drawn if "unloading" in k]) == min(count, 6)
+        page = write_page(data, catalogue.sections(data))
         assert ("Figures with a panel" in page) is bool(said)
         assert said in page
 
@@ -590,9 +577,8 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
     )
 
 
-def test_another_largest_penetration_is_compared_with(file, tmp_path, monkeypatch):
-    for figures in ("FIELDS", "LOOPS", "LOSSES", "MECHANISMS"):
-        monkeypatch.setattr(catalogue, figures, ())
+@pytest.mark.usefixtures("no_figures")
+def test_another_largest_penetration_is_compared_with(file, tmp_path):
     depths = "max_penetration = 0.9", "max_penetration = 0.6"
     lower = companion(tmp_path, "lower.h5", 0.5, *depths)
     data = write_report(file, tmp_path / "out", beside=[lower])

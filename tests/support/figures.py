@@ -13,6 +13,15 @@ DOT = base64.b64decode(
 )
 
 
+def figures_of(data: Any, *names: str) -> list[Any]:
+    """Draw figures of a report by their names, and no others."""
+    from adhesis.ensemble.report.figures import catalogue, style  # loads matplotlib
+
+    items = {item.name: item for part in catalogue.sections(data).values() for item in part}
+    with style.style():
+        return [items[name].of(data) for name in names]
+
+
 @contextmanager
 def few_figures(*written: str) -> Iterator[dict[str, Any]]:
     """Collect figures by name; those that are not ``written`` are pictures of their names."""

@@ -13,16 +13,10 @@ TOGETHER = {
     "readers": ("test_heights.py", "test_trace_instruments.py", "test_trace_field_texts.py"),
 }
 LONG = (
-    *("ranks", "test_kinetics.py", "test_docs.py", "test_hostile.py", "test_report.py"),
+    *("ranks", "test_hostile.py", "test_kinetics.py", "test_docs.py", "test_report.py"),
     *("test_precision.py", "test_notebook.py", "test_run.py", "test_symmetry.py", "test_damage.py"),
-    *(
-        "test_merge.py",
-        "test_preload.py",
-        "test_grid.py",
-        "test_extremes.py",
-        "test_report_axes.py",
-    ),
-    *("readers", "test_staging.py", "test_every_claim"),
+    *("test_merge.py", "test_store.py", "test_preload.py", "test_extremes.py", "test_grid.py"),
+    *("test_limits.py", "test_report_axes.py", "readers", "test_staging.py", "test_every_claim"),
 )
 
 
