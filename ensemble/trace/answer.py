@@ -437,16 +437,16 @@ def make_cycle(
         gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
     if len(turns) == 1:
         turns = (turns[0], *(float(f"{share * turns[0]:.6g}") for share in (1 / 3, 2 / 3)))
-    for name, values in (("work_of_adhesion", gammas), (turning, turns)):
-        if not values:
-            raise ValueError(f"{name} is empty: it must hold one number at least")
-        if len(set(values)) < len(values):
-            raise ValueError(f"{name} is {list(values)}: its values must differ")
     for point in turns:
         if cycle.at_preload:
             check_preload(point, control)
             point = checks.FULL_PENETRATION if cycle.latest is None else cycle.latest
         check_cycle(point, cycle.load_steps, control)
+    for name, values in (("work_of_adhesion", gammas), (turning, turns)):
+        if not values:
+            raise ValueError(f"{name} is empty: it must hold one number at least")
+        if len(set(values)) < len(values):
+            raise ValueError(f"{name} is {list(values)}: its values must differ")
     return replace(cycle, works_of_adhesion=gammas, turning_points=turns)
 
 

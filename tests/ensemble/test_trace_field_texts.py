@@ -227,6 +227,9 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
         flags = [row.replace("valid", "quality") for row in words]
         (note,) = read_trace(put(tmp_path / "t.csv", flags), columns=[1, 2]).notes[1:2]
         assert re.fullmatch(r"column 3 \(quality\) holds .* and .* alone: it is not used", note)
+    degrees = [re.sub(r"^(\d+\.0.*),1$", r"\1,2", row) for row in rows(range(40, 43))]
+    trace = read_trace(put(tmp_path / "t.csv", degrees), columns=[1, 2])
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
     empty = [row.removesuffix(",0") for row in rows(range(40, 43))]
     trace = read_trace(put(tmp_path / "t.csv", empty), columns=[1, 2])
     assert "column 3 (valid) holds 1 and empty fields alone: it is not used" in trace.notes
@@ -680,11 +683,13 @@ def test_a_count_does_not_become_positions_by_the_unit_of_the_heights(name, tmp_
 
 def test_another_step_than_that_in_use_is_noted(tmp_path: Path) -> None:
     counted = ["Pitch: 0.5 um", "n;z (um)", *(f"{k};{z}" for k, z in enumerate(ZS))]
+    of_stage = ["x (um),y (um),z (um)", *(f"{k / 2},{3 * k / 8},{z}" for k, z in enumerate(ZS))]
     for text, *options, note in (
         (counted, "the header has a step or pitch of 500 nm, against a step of 1 µm"),
         ([UM, *TWO], {"columns": [2]}, "column 1 (x (um)) has steps of 0.5, as positions or a c"),
+        (of_stage, {"columns": [1, 3], "step": None}, "column 2 (y (um)) has steps of 0.375, as"),
     ):
-        notes = read_trace(put(tmp_path / "t.txt", text), step=1e-6, **dict(*options)).notes
+        notes = read_trace(put(tmp_path / "t.txt", text), **{"step": 1e-6} | dict(*options)).notes
         assert any(found.startswith(note) for found in notes)
 
 
