@@ -194,8 +194,8 @@ def read_trace(
         Columns of positions and heights, shape (2,), or of heights alone, shape (1,): counted from
         1, or names of a DataFrame.
     row, channel : int, optional
-        Row of a map (of an instrument file, a text or a table) and channel of an instrument file,
-        counted from 0.
+        Row of a map (of an instrument file, a text, an array or a table) and channel of an
+        instrument file, counted from 0.
     delimiter, decimal : str, optional
         Delimiter and decimal sign, where a text can be read in two ways.
 
@@ -248,7 +248,7 @@ def read_trace(
             f"channels ({parameter('columns')} chooses columns)"
         )
     if is_text and source.is_npy:
-        table = _columns_of(source.name, load_array(source))
+        table = _columns_of(load_array(source))
         return _from_table(source.name, table, unit, step, wanted, row, "npy")
     if is_text:
         table = read_table(source, delimiter, decimal)
@@ -336,7 +336,7 @@ def _columns_named(table: Any, wanted: Sequence[int | str]) -> list[int | str]:
 def _table_of(source: Any, wanted: Sequence[int] | None) -> tuple[str, str, Table] | None:
     """Return name, form and columns of an array or a DataFrame; None for any other source."""
     if isinstance(source, np.ndarray | list | tuple):
-        return "array", "array", _columns_of("array", _numbers("array", source))
+        return "array", "array", _columns_of(_numbers("array", source))
     if not hasattr(source, "iloc"):  # which a DataFrame and a Series have
         return None
     if hasattr(source, "to_frame"):  # a Series is a column
@@ -378,15 +378,13 @@ def _table_of(source: Any, wanted: Sequence[int] | None) -> tuple[str, str, Tabl
     return "the table", form, Table(values, filled, tuple(header), (names,), lines, " ", ".")
 
 
-def _columns_of(name: str, values: Array) -> Table:
-    if values.ndim == 2 and 2 in values.shape:
-        columns = values if values.shape[0] == 2 else values.T
-    elif values.ndim < 2 or 1 in values.shape:
+def _columns_of(values: Array) -> Table:
+    """Return the columns of an array; two rows are positions and heights, and one row heights."""
+    if values.ndim < 2 or values.size == 0 or 1 in values.shape:
         columns = values.reshape(1, -1)
     else:
-        shape = " × ".join(map(str, values.shape))
-        raise InputError(f"{name} holds {shape} numbers: a trace has one column or two")
-    lines = np.arange(1, columns.shape[1] + 1)
+        columns = values if len(values) == 2 < values.shape[1] else values.T
+    lines: Any = np.arange(1, columns.shape[1] + 1)
     filled = tuple(range(len(columns)))
     return Table(columns, filled, (), (), lines, " ", ".")
 
