@@ -209,10 +209,7 @@ def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
 
 def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: Path) -> None:
     def rows(marked: range) -> list[str]:
-        return [
-            "x (um),z (um),valid",
-            *(f"{row},{int(k not in marked)}" for k, row in enumerate(TWO)),
-        ]
+        return [f"{UM},valid", *(f"{row},{int(k not in marked)}" for k, row in enumerate(TWO))]
 
     trace = read_trace(put(tmp_path / "t.csv", rows(range(40, 43))), columns=[1, 2])
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
@@ -734,9 +731,8 @@ def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_pa
     with pytest.raises(InputError, match=r"line 1 of .*, at the end of a column: remove it"):
         read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
     others = ZS[int(np.argmin(np.abs(Z))) :]  # which begin near nought
-    assert (
-        len(read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um")[0]) == len(others) + 1
-    )
+    heights, _ = read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um")
+    assert len(heights) == len(others) + 1
 
 
 NAMED = [

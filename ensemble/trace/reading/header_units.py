@@ -8,6 +8,7 @@ for positions, for heights or beside them. Of any other name ("log z (nm)", "z (
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from collections.abc import Sequence
@@ -314,6 +315,16 @@ def stated_steps(header: Sequence[str], decimal: str, counts: bool) -> list[floa
             if all(abs(step / known - 1) > 1e-9 for known in steps):
                 steps.append(step)
     return steps
+
+
+def other_steps(header: Sequence[str], decimal: str, step: float) -> list[str]:
+    """Describe the distances of two points that a header states, and that are not the step in m."""
+    return [
+        f"the header has a step or pitch of {length_text(other, 5)}, against a step of "
+        f"{length_text(step, 5)}"
+        for other in stated_steps(header, decimal, counts=True)
+        if not math.isclose(other, step, rel_tol=0.01)  # both may be rounded
+    ]
 
 
 def _step(text: str, decimal: str, counts: bool) -> float | None:

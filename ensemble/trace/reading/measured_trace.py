@@ -16,8 +16,8 @@ from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
     Column,
     HeaderUnits,
+    other_steps,
     parse_units,
-    stated_steps,
     step_of_header,
     units_of_header,
 )
@@ -247,12 +247,13 @@ def read_trace(
             f"{parameter('channel')} is {channel}: {source} holds columns of numbers, and no "
             f"channels ({parameter('columns')} chooses columns)"
         )
-    if is_text and source.is_npy:
-        table = _columns_of(load_array(source))
-        return _from_table(source.name, table, unit, step, wanted, row, "npy")
     if is_text:
-        table = read_table(source, delimiter, decimal)
-        return _from_table(source.name, table, unit, step, wanted, row, f"text, {table.form}")
+        is_npy = source.is_npy
+        table = (
+            _columns_of(load_array(source)) if is_npy else read_table(source, delimiter, decimal)
+        )
+        form = "npy" if is_npy else f"text, {table.form}"
+        return _from_table(source.name, table, unit, step, wanted, row, form)
     _refuse_options(
         "texts: an instrument's file states its own lengths (a text that holds zero bytes, as in "
         "UTF-16 without a mark, is to be saved as UTF-8)",
@@ -375,6 +376,10 @@ def _table_of(source: Any, wanted: Sequence[int] | None) -> tuple[str, str, Tabl
     lines: Any = np.arange(1, len(source) + 1)
     filled = tuple(range(len(names)))
     form = f"columns {', '.join(header[k - 1] for k in chosen)}"
+    index = source.index
+    apart = abs(index[1] - index[0]) if len(index) > 1 and index.dtype.kind in "if" else 1
+    if len(chosen) == 1 and (apart != 1 or index.dtype.kind == "f"):
+        form += f"; their index has steps of {apart:g}, and is not used"
     return "the table", form, Table(values, filled, tuple(header), (names,), lines, " ", ".")
 
 
@@ -459,10 +464,7 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
-    for other in stated_steps(table.header, table.decimal, counts=True):
-        if not np.isclose(other, step, rtol=0.01, atol=0):  # both may be rounded
-            stated, used = length_text(other, 5), length_text(step, 5)
-            notes.append(f"the header has a step or pitch of {stated}, against a step of {used}")
+    notes.extend(other_steps(table.header, table.decimal, step))
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length(name, columns[0], step, lines)
     warnings = []
