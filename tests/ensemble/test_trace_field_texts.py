@@ -60,6 +60,7 @@ READ: dict[str, Any] = {
         ["X resolution,9,um", "DataLine,POS = 0", *(f"{k},{z}" for k, z in enumerate(ZS))],
         Z_UM,
     ),
+    "Å behind a name": ["Lateral um,Raw Å,", *(f"{x},{1e4 * float(z):.2f}," for x, z in PAIRS)],
     "a unit in Japanese": ["測定ピッチ,0.5,um", "単位,um", "データ", *ZS],
     "units by option": ([f"{x} {z}" for x, z in PAIRS], {"unit": "um"}),
     "inches and their parts": (

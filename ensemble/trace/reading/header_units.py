@@ -53,8 +53,8 @@ _BESIDE = _UNITS | _set(
 _ALONE = _set("a b c d")  # columns of a spreadsheet
 _OF_PROFILES = _set("p r w total")  # which P, W and R profiles are, behind their filters
 
-# Units that are words or parts of names, too, need brackets. A is ampere as well: it is Å in
-# brackets behind a name of positions or heights alone.
+# Units that are words or parts of names, too, need brackets; of Å a capital is none of them. A is
+# ampere as well: it is Å in brackets behind a name of positions or heights alone.
 _AMBIGUOUS = ("m", "in", "å", "mil", "mils", "thou")
 _UNAMBIGUOUS = [name for name in LENGTH.spellings if name.lower() not in (*_AMBIGUOUS, "a")]
 
@@ -63,7 +63,7 @@ def _one_of(names: Sequence[str]) -> str:
     return "|".join(sorted(map(re.escape, names), key=len, reverse=True))
 
 
-_WORD, _ANY = _one_of(_UNAMBIGUOUS), _one_of([*_UNAMBIGUOUS, *_AMBIGUOUS])
+_WORD, _ANY = rf"{_one_of(_UNAMBIGUOUS)}|(?-i:Å)", _one_of([*_UNAMBIGUOUS, *_AMBIGUOUS])
 _OPEN, _CLOSE = r"[(\[<{]\s*(?:in\s+)?", r"\s*[)\]>}]"
 _COLUMN = re.compile(
     rf"(.*?)(?:{_OPEN}({_ANY}|A){_CLOSE}|(?:[/:=,;]|\bin\s)\s*({_ANY})|(?:^|(?<=[\s_]))({_WORD})"
