@@ -209,31 +209,30 @@ def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
 
 
 def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: Path) -> None:
-    def rows(marked: range) -> list[str]:
+    def rows(marked: range = range(40, 43)) -> list[str]:
         return [f"{UM},valid", *(f"{row},{int(k not in marked)}" for k, row in enumerate(TWO))]
 
-    trace = read_trace(put(tmp_path / "t.csv", rows(range(40, 43))), columns=[1, 2])
+    trace = read_trace(put(tmp_path / "t.csv", rows()), columns=[1, 2])
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
-    other = [row.replace("valid", "flag") for row in rows(range(40, 43))]
+    other = [row.replace("valid", "flag") for row in rows()]
     trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
     assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
     for good, bad in ("255", "0"), ("1", "-1"), ("True", "False"), ("ok", "NG"):
-        words = [re.sub(",1$", f",{good}", row) for row in rows(range(40, 43))]
-        words = [re.sub(",0$", f",{bad}", row) for row in words]
+        words = [re.sub(",1$", f",{good}", re.sub(",0$", f",{bad}", row)) for row in rows()]
         trace = read_trace(put(tmp_path / "t.csv", words), columns=[1, 2])
         assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
         flags = [row.replace("valid", "quality") for row in words]
         (note,) = read_trace(put(tmp_path / "t.csv", flags), columns=[1, 2]).notes[1:2]
         assert re.fullmatch(r"column 3 \(quality\) holds .* and .* alone: it is not used", note)
-    degrees = [re.sub(r"^(\d+\.0.*),1$", r"\1,2", row) for row in rows(range(40, 43))]
+    degrees = [re.sub(r"^(\d+\.0.*),1$", r"\1,2", row) for row in rows()]
     trace = read_trace(put(tmp_path / "t.csv", degrees), columns=[1, 2])
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
-    empty = [row.removesuffix(",0") for row in rows(range(40, 43))]
+    empty = [row.removesuffix(",0") for row in rows()]
     trace = read_trace(put(tmp_path / "t.csv", empty), columns=[1, 2])
     assert "column 3 (valid) holds 1 and empty fields alone: it is not used" in trace.notes
-    long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
+    path = put(tmp_path / "t.csv", rows(range(40, 100)))
     with pytest.raises(InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"):
-        prepare_trace(long)
+        prepare_trace(read_trace(path, columns=[1, 2]))
 
 
 def test_whole_numbers_between_commas_are_read_below_a_name_each(tmp_path: Path) -> None:

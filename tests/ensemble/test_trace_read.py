@@ -114,20 +114,19 @@ NAMED = FRAME.set_axis(["x", "z", "more"], axis=1)
 HEIGHTS = FRAME["z (um)"]
 WITH_UNITS = NAMED[["x", "z"]].copy()
 WITH_UNITS.attrs["units"] = {"x": "mm", "z": "um"}
-Z_UM: dict[str, object] = {"unit": "um", "step": STEP}
 IN_MEMORY: dict[str, tuple[Callable[[], object], dict[str, object]]] = {
     "stream of text": (lambda: io.StringIO(TEXT), {}),
     "stream of bytes": (lambda: io.BytesIO(TEXT.encode("latin-1")), {}),
     "stream of an array": (lambda: npy(BOTH), {"unit": "um"}),
-    "stream of an array of heights": (lambda: npy(1e6 * Z), Z_UM),
+    "stream of an array of heights": (lambda: npy(1e6 * Z), {"unit": "um", "step": STEP}),
     "array": (lambda: BOTH, {"unit": "um"}),
     "array of two rows": (lambda: BOTH.T, {"unit": "um"}),
-    "array of a map": (lambda: 1e6 * np.array([Z, -Z, Z]), Z_UM | {"row": 2}),
+    "array of a map": (lambda: 1e6 * np.array([Z, -Z, Z]), {"unit": "um", "step": STEP, "row": 2}),
     "stream of three columns": (lambda: npy(BOTH[:, [0, 0, 1]]), {"unit": "um", "columns": [1, 3]}),
     "array in metres": (lambda: np.column_stack([X, Z]), {}),
     "list": (lambda: BOTH.tolist(), {"unit": "um"}),
-    "heights": (lambda: 1e6 * Z, Z_UM),
-    "whole numbers": (lambda: np.rint(1e12 * Z).astype(int) / 1e6, Z_UM),
+    "heights": (lambda: 1e6 * Z, {"unit": "um", "step": STEP}),
+    "whole numbers": (lambda: np.rint(1e12 * Z).astype(int) / 1e6, {"unit": "um", "step": STEP}),
     "table": (lambda: FRAME[["x (mm)", "z (um)"]], {}),
     "table, columns by name": (lambda: FRAME, {"columns": ["x (mm)", "z (um)"]}),
     "table, columns by number": (lambda: FRAME, {"columns": [1, 2]}),
