@@ -359,21 +359,14 @@ def units_of(document: Mapping[str, Any]) -> dict[str, str]:
         elif value is None and path[-1] not in UNITS:
             pass  # unknown whether it would be a number
         elif value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
-            found[".".join(path)] = _unit(path, units)
+            parent, name = ("", *path)[-2:]
+            name = parent if name in ("value", "uncertainty") else name
+            found[".".join(path)] = "1" if parent == "doubts" else units.get(name, "1")
 
     for name, value in document.items():
         if name not in _LEFT_OUT:
             visit((name,), value)
     return found
-
-
-def _unit(path: tuple[str, ...], units: Mapping[str, str]) -> str:
-    name, parent = path[-1], path[-2] if len(path) > 1 else ""
-    if parent == "doubts":
-        return "1"
-    if name in ("value", "uncertainty"):
-        return units.get(parent, "1")
-    return units.get(name, "1")
 
 
 def duration(seconds: float) -> str:

@@ -135,8 +135,9 @@ def _group(cell: Cell) -> dict[str, Any]:
 
 def as_text(status: dict[str, Any], pace: str = "") -> str:
     """Return a status as lines for people; ``pace`` is added to the first."""
+    part = f", part {status['part']} of a campaign" if status["part"] else ""
     lines = [
-        f"{status['file']}: {counted(status['tasks'], 'task')}, {status['done']} done, "
+        f"{status['file']}{part}: {counted(status['tasks'], 'task')}, {status['done']} done, "
         f"{status['pending']} pending, {status['failed']} failed"
         + (f", {status['not_needed']} not needed" if status["not_needed"] else "")
         + (f", {len(status['damaged'])} damaged" if status["damaged"] else "")

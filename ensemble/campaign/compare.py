@@ -29,12 +29,13 @@ def growth(
     """
     before, after = old.values(), new.values()
     grown, other = [], []
-    missing = _cells(old) - _cells(new)
+    cells = [{one.identity(task) for task in one.tasks().of_cells()} for one in (old, new)]
+    is_kept = cells[0] <= cells[1]
     for key in differing(old, new):
         was, value = before[key], after[key]
         if KEYS[key].metadata["free"]:
             continue
-        if _extends(key, was, value) and not missing:
+        if _extends(key, was, value) and is_kept:
             grown.append(key)
         else:
             here_there = ("not given" if v is None else shown(v) for v in (value, was))
@@ -56,12 +57,5 @@ def _extends(key: str, was: Any, now: Any) -> bool:
     # All turning points of a profile belong together: they do not become more.
     if key in [f"cycle.{name}" for name in TURNING_POINTS]:
         return False
-    return _values(was) < _values(now)
-
-
-def _values(value: Any) -> set[Any]:
-    return set(value) if isinstance(value, list) else {value}
-
-
-def _cells(campaign: Campaign) -> set[Any]:
-    return {campaign.identity(task) for task in campaign.tasks().of_cells()}
+    fewer, more = (set(value) if isinstance(value, list) else {value} for value in (was, now))
+    return fewer < more

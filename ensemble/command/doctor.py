@@ -61,11 +61,10 @@ def _text(diagnosis: Diagnosis) -> str:
         ("cores", str(diagnosis.cores)),
         ("writer", f"{diagnosis.writer}: {diagnosis.why}"),
     ]
-    lines = [f"{name:<10}{text}" for name, text in rows]
-    lines.append("")
-    for check in diagnosis.checks:
-        mark = "ok  " if check.ok else "FAIL" if check.needed else "note"
-        lines.append(f"{mark}  {check.name}: {check.text}")
-    lines.append("")
-    lines.append("usable" if diagnosis.usable else "not usable as it is: see FAIL above")
-    return "\n".join(lines)
+    found = [f"{name:<10}{text}" for name, text in rows]
+    marks = (
+        "ok  " if check.ok else "FAIL" if check.needed else "note" for check in diagnosis.checks
+    )
+    tried = [f"{m}  {c.name}: {c.text}" for m, c in zip(marks, diagnosis.checks, strict=True)]
+    verdict = "usable" if diagnosis.usable else "not usable as it is: see FAIL above"
+    return "\n".join([*found, "", *tried, "", verdict])

@@ -24,7 +24,7 @@ from adhesis.ensemble.trace.options import (
     pattern_of,
     prepared_of,
     refuse_several,
-    trace_of,
+    shown_while_read,
     what_was_read,
 )
 from adhesis.ensemble.versions import input_record, provenance
@@ -218,19 +218,16 @@ def _profile(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
         return _self_affine(args), [], []
     if args.heights is not None:
         return _given_heights(args)
-    prepared = prepared_of(args, trace_of(args, args.trace))
+    prepared = prepared_of(args, args.trace)
     print(what_was_read(prepared))
     return prepared.profile(), list(prepared.warnings), list(prepared.trace.notes)
 
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
-    heights, said = read_heights(
-        args.heights,
-        period=checks.real("period", args.period, checks.LENGTH),
-        unit=args.unit,
-        delimiter=args.delimiter,
-        decimal=args.decimal,
-    )
+    period = checks.real("period", args.period, checks.LENGTH)
+    options = {name: getattr(args, name) for name in ("unit", "delimiter", "decimal")}
+    with shown_while_read(args.heights, args.quiet):
+        heights, said = read_heights(args.heights, period=period, **options)
     warning = heights_warning(heights, f"{args.heights}")
     return profile_from_heights(heights, args.period), [warning] if warning else [], [said]
 

@@ -19,7 +19,7 @@ from adhesis.ensemble.trace.answer import (
     make_cycle,
     run_plan,
 )
-from adhesis.ensemble.trace.options import pattern_of, prepared_of, trace_of, what_was_read
+from adhesis.ensemble.trace.options import pattern_of, prepared_of, what_was_read
 from adhesis.ensemble.trace.variants import make_plan
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver.model.half_space import HalfSpace
@@ -45,7 +45,7 @@ def execute(args: argparse.Namespace) -> int:
         )  # fmt: skip
     if args.to is not None:
         check_output_folder("--to", args.to, FILES, {"the command": args.file})
-    prepared = prepared_of(args, trace_of(args, args.file))
+    prepared = prepared_of(args, args.file)
     source = input_record(args.file)
     with refused_as_input(vars(args)):
         check(prepared, cycle)

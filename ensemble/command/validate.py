@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Run the references and print what came out."""
     from adhesis.solver.validate.claims import METHODS, validate
+    from adhesis.solver.values import finite
 
     names = [name for name in METHODS if not args.method or name in args.method]
     for name in args.method or ():
@@ -46,18 +47,13 @@ def execute(args: argparse.Namespace) -> int:
     rows = validate(names, on_row=lambda row: print(_line(row), file=stream, flush=True))
     failed = [row for row in rows if not row.passed]
     if args.json:
-        print(json.dumps([_record(row) for row in rows], indent=1, allow_nan=False))
+        found = [asdict(row) | {"passed": row.passed} for row in rows]
+        # JSON has no NaN: a method that did not get there has no error.
+        known = [{k: finite(v) if isinstance(v, float) else v for k, v in f.items()} for f in found]
+        print(json.dumps(known, indent=1, allow_nan=False))
     else:
         print(f"{len(rows) - len(failed)} of {len(rows)} claims hold")
     return SOME_FAILED if failed else DONE
-
-
-def _record(row: Row) -> dict[str, object]:
-    from adhesis.solver.values import finite
-
-    # JSON has no NaN: a method that did not get there has no error.
-    known = {k: finite(v) if isinstance(v, float) else v for k, v in asdict(row).items()}
-    return {**known, "passed": row.passed}
 
 
 def _line(row: Row) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
-from adhesis.ensemble.trace.reading.header_units import HeaderUnits, units_of_header
+from adhesis.ensemble.trace.reading.header_units import HeaderUnits, other_steps, units_of_header
 from adhesis.ensemble.trace.reading.measured_trace import load_array, units_of_columns
 from adhesis.ensemble.trace.reading.missing_heights import without_codes
 from adhesis.ensemble.trace.reading.source import source_of
@@ -86,8 +86,14 @@ def read_heights(
     is_high = heights.size and np.ptp(heights) > HEIGHT.largest  # all heights count
     step = None if is_high else period / max(heights.size, 1)
     (_, of_heights), given_by = units_of_columns(f"{source}", found, unit, heights[None], step)
-    said = f"{counted(heights.size, 'height')} in {of_heights} ({given_by})"
-    return np.asarray(heights * LENGTH.units[of_heights]), said
+    said = [f"{counted(heights.size, 'height')} in {of_heights} ({given_by})"]
+    if found.depth:
+        said.append(
+            f"they are named {found.depth!r}: change their sign if they grow into the sample"
+        )
+    if table:
+        said.extend(other_steps(table.header, table.decimal, period / heights.size))
+    return np.asarray(heights * LENGTH.units[of_heights]), "; ".join(said)
 
 
 def heights_warning(heights: Array, name: str) -> str | None:

@@ -16,7 +16,7 @@ from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
 
 
 def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
-    """Return the JSON document of a loop or path; see the README for its keys and units.
+    """Return the JSON document of a loop or path, whose ``provenance`` names the units.
 
     The states of a loop are there twice: ``states`` is a list of objects, one per state, and each
     of its keys is also a list of its own at the top level, for readers that want columns.

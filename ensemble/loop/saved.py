@@ -272,8 +272,8 @@ def _read_sealed(path: Path) -> xr.Dataset:
         stream.seek(max(0, size - _LENGTH))
         if not stream.read(len(_MARK)) == _MARK:
             raise InputError(
-                f"path is {path}: it has no checksum at its end, so it was not saved by adhesis, "
-                "was cut off, or another program has changed it"
+                f"path is {path}: it has no checksum at its end, so a loop's save did not write it "
+                "(adhesis.open opens a campaign's results), or it was cut off or changed"
             )
         if size > _MOST_BYTES:
             raise InputError(f"path is {path}: it has {size / 1e6:.0f} MB, more than any loop")

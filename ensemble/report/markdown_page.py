@@ -123,12 +123,13 @@ def _summary(data: Aggregate) -> str:
         for axis in data.further
         if axis.name not in TURNING_POINTS
     )
+    part = f", part {data.attributes['part']} of the campaign" if "part" in data.attributes else ""
     many = counted(sweep.realisations, "realisation")
     if data.campaign.stop.relative_error is not None:
         counts = [cell.done for cell in data.cells]
         many = f"{from_to(counts)} realisations by `[stop]`"
     return (
-        f"{counted(data.done, 'loop')} of {counted(data.total, 'task')}: "
+        f"{counted(data.done, 'loop')} of {counted(data.total, 'task')}{part}: "
         f"H = {in_one_unit('hurst', sweep.hurst)}; "
         f"γ = {in_one_unit('work_of_adhesion', sweep.work_of_adhesion)}; {further}"
         f"{many}. Each loop was loaded to {findings.turning_point(data)} "

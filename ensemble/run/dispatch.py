@@ -41,7 +41,7 @@ import math
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
@@ -246,7 +246,8 @@ class Master:
         while self._room and self._halted is None and self.schedule.waiting:
             load, rank = self._room[0]
             sent = self._sent[rank]
-            if len(sent) != load or not self._has_room(sent):
+            has_room = not sent or (load <= MOST_AHEAD and sum(sent.values()) < AHEAD)
+            if len(sent) != load or not has_room:
                 heapq.heappop(self._room)
                 continue
             tasks = self.schedule.take(self.limits.time_left())
@@ -258,10 +259,6 @@ class Master:
                 self.notes[task] = None
                 self.channel.send(rank, ("task", task))
             heapq.heapreplace(self._room, (len(sent), rank))
-
-    @staticmethod
-    def _has_room(sent: Mapping[int, float]) -> bool:
-        return not sent or (len(sent) <= MOST_AHEAD and sum(sent.values()) < AHEAD)
 
     def _dismiss(self) -> None:
         for rank in self._sent:

@@ -80,7 +80,8 @@ _SHORTER_WAVES = {
 }
 # One patch that carries all contact is that of a single crest up to this share of the period.
 _ONE_PATCH = 0.25
-# Numbers of the document by their names: of the trace, of the answer's loop, of all loops alike.
+# Numbers of the document by name: of the plan, the trace, the answer's loop, all loops alike.
+_PLANNED = ("waves", "patches", "wall", "processes")
 _READ = ("points", "step", "length", "height_range", "drop_outs", "tip_radius")
 _CONTACT = (
     *("young", "poisson", "work_of_adhesion", "work_of_adhesion_open", "measure"),
@@ -437,16 +438,16 @@ def make_cycle(
         gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
     if len(turns) == 1:
         turns = (turns[0], *(float(f"{share * turns[0]:.6g}") for share in (1 / 3, 2 / 3)))
-    for name, values in (("work_of_adhesion", gammas), (turning, turns)):
-        if not values:
-            raise ValueError(f"{name} is empty: it must hold one number at least")
-        if len(set(values)) < len(values):
-            raise ValueError(f"{name} is {list(values)}: its values must differ")
     for point in turns:
         if cycle.at_preload:
             check_preload(point, control)
             point = checks.FULL_PENETRATION if cycle.latest is None else cycle.latest
         check_cycle(point, cycle.load_steps, control)
+    for name, values in (("work_of_adhesion", gammas), (turning, turns)):
+        if not values:
+            raise ValueError(f"{name} is empty: it must hold one number at least")
+        if len(set(values)) < len(values):
+            raise ValueError(f"{name} is {list(values)}: its values must differ")
     return replace(cycle, works_of_adhesion=gammas, turning_points=turns)
 
 
@@ -628,8 +629,8 @@ def run_rows(answer: Answer) -> list[dict[str, Any]]:
     for run in answer.plan.runs:
         found = answer.results.get(run.name)
         entry: dict[str, Any] = {
-            **{"name": run.name, "group": run.group, "said": run.description},
-            **{"reference": run.reference, "expected_seconds": answer.plan.seconds[run.name]},
+            **{name: getattr(run, name) for name in ("name", "group", "reference")},
+            **{"said": run.description, "expected_seconds": answer.plan.seconds[run.name]},
         }
         if isinstance(found, dict):
             entry |= {key: value for key, value in found.items() if key != "states"}
@@ -646,10 +647,7 @@ def document(answer: Answer) -> dict[str, Any]:
     spectrum = prepared.spectrum
     return {
         "file": trace.source,
-        "read": {
-            "said": list(trace.notes),
-            **{name: getattr(trace, name) for name in _READ},
-        },
+        "read": {"said": list(trace.notes), **{name: getattr(trace, name) for name in _READ}},
         "preparation": [
             {"name": step.name, "said": step.description, **step.numbers} for step in prepared.steps
         ],
@@ -658,7 +656,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "cut_off": prepared.cut_off,
         "cut_off_limits": prepared.limits,
         "degree": prepared.degree,
-        "noise": prepared.spectrum.noise,
+        "noise": spectrum.noise,
         "spectrum": {
             "wave_number": spectrum.wave_number.tolist(),
             "power": spectrum.power.tolist(),
@@ -678,12 +676,8 @@ def document(answer: Answer) -> dict[str, Any]:
         "loop": dict(answer.main),
         "runs": run_rows(answer),
         "plan": {
-            "waves": plan.waves,
-            "patches": plan.patches,
-            "seconds": sum(plan.seconds.values()),
-            "wall": plan.wall,
-            "processes": plan.processes,
-            "hints": list(plan.hints),
+            **{name: getattr(plan, name) for name in _PLANNED},
+            **{"seconds": sum(plan.seconds.values()), "hints": list(plan.hints)},
         },
         "largest_changes": [
             {"name": change.run.name, "factor": change.factor} for change in answer.largest_changes

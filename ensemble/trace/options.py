@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import argparse
+import os
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from adhesis.ensemble.errors import InputError, quoted, refused_as_input
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.quantities import LENGTH
+from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.model.pattern import AdhesionPattern, stripes_of
 
 MAX_PENETRATION = 0.9
 """Turning point Δ/h_max where none is given."""
+
+_LARGE = 2_000_000  # bytes; smaller files are read within a few seconds
 
 _OF_READING = ("unit", "step", "delimiter", "decimal", "row", "channel")
 _OF_PREPARING = ("degree", "cut_off", "tip_radius", "longest_gap", "keep_outliers", "invert")
 _NAMES = (*_OF_READING, "columns", *_OF_PREPARING, "exclude")
 
 
-def trace_of(args: argparse.Namespace, path: Path) -> Trace:
-    """Read the trace by the options."""
+def prepared_of(args: argparse.Namespace, path: Path) -> Prepared:
+    """Read a trace and prepare it by the options."""
     columns = None
     if args.columns is not None:
         try:
@@ -30,14 +35,19 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
             raise InputError(
                 f"--columns is {args.columns!r}: it must be one or two whole numbers, as in 1,3"
             ) from None
-    same = {name: getattr(args, name) for name in _OF_READING}
-    return read_trace(path, columns=columns, **same)
+    of_reading, of_preparing = (
+        {name: getattr(args, name) for name in names} for names in (_OF_READING, _OF_PREPARING)
+    )
+    exclude = [_range(text) for text in args.exclude or ()]
+    with shown_while_read(path, args.quiet):
+        trace = read_trace(path, columns=columns, **of_reading)
+        return prepare_trace(trace, exclude=exclude, **of_preparing)
 
 
-def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:
-    """Prepare the trace by the options."""
-    same = {name: getattr(args, name) for name in _OF_PREPARING}
-    return prepare_trace(trace, exclude=[_range(text) for text in args.exclude or ()], **same)
+def shown_while_read(path: Path, quiet: bool) -> AbstractContextManager[object]:
+    """Return a context that reports on stderr how long a large file is being read."""
+    is_large = os.path.isfile(path) and os.path.getsize(path) > _LARGE
+    return bar(f"reading {path}", last=False) if is_large and not quiet else nullcontext()
 
 
 def _range(text: str) -> tuple[float, float]:

@@ -272,13 +272,12 @@ def _sweep_rows(answer: Answer) -> list[list[str]]:
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
     rows = [(g, point, numbers) for g, numbers in answer.works_of_adhesion]
     rows += [(gamma, d, numbers) for d, numbers in answer.turning_points if d != point]
-    head = ["γ, J/m²", cycle.turning.sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
-    table = [head]
+    table = [["γ, J/m²", cycle.turning.sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]]
     for g, d, r in sorted(rows, key=lambda row: row[:2]):
-        cells = [
+        pairs = (
             (1e3 * r["loss"], answer.loss),
             (1e-3 * r["pull_off_stress"], answer.pull_off_stress),
-        ]
-        known = [with_error(value, abs(value) * of.relative) for value, of in cells]
+        )
+        known = [with_error(value, abs(value) * of.relative) for value, of in pairs]
         table.append([f"{g:g}", f"{d:g}", *known, f"{r['contact_fraction']:.3f}", f"{r['jumps']}"])
     return table

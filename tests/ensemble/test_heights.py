@@ -164,12 +164,16 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, Any], str]] = {
 }
 
 
+OF_HEADER = """16 heights in m (header); they are named 'Depth (m)': change their sign if they \
+grow into the sample; the header has a step or pitch of 9 µm, against a step of 62.5 µm"""
+
+
 @pytest.mark.parametrize(
     ("kind", "options", "said"),
     [
         ("z", (), "16 heights in m (assumed: no unit is given)"),
         ("z", ("--unit", "m"), "16 heights in m (--unit)"),
-        ("z (m)", (), "16 heights in m (header)"),
+        ("dx = 9 um\nDepth (m)", (), OF_HEADER),
     ],
 )
 def test_how_heights_were_read_stands_beside_the_loss(kind, options, said, tmp_path, capsys):

@@ -6,11 +6,13 @@ import h5py
 import numpy as np
 import pytest
 
+from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.status import as_text, read_status
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.results import layout
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.layout import create
@@ -65,10 +67,9 @@ def test_a_merge_is_resumed_and_grown(tmp_path):
     assert merge([one, three], out).done == 8
     assert merge([two, one], out).taken == 4
     assert differences(out, computed(tmp_path / "whole.h5")) == []
-    larger = campaign_text(realisations="4", hurst="[0.7, 0.75, 0.8]")
     path = write_campaign(tmp_path, realisations="4", hurst="[0.7, 0.75, 0.8]")
     assert run_file(path, out).computed == 12
-    assert differences(out, computed(tmp_path / "larger.h5", text=larger)) == []
+    assert differences(out, computed(tmp_path / "larger.h5", text=path.read_text())) == []
     # Parts of the smaller campaign still fit into the larger file.
     assert merge([two], out).taken == 0
 
@@ -96,15 +97,16 @@ def test_what_failed_in_one_part_gives_way_to_what_was_done_in_another(tmp_path)
         assert (merged.done, merged.failed) == (10, 2)
         with Results(out) as results:
             assert results.status()[[3, 4, 5, 9]].tolist() == [DONE, FAILED, DONE, FAILED]
-            task = results.tasks()[3]
-            loss = fake_result(results.campaign, task)["loss"]
+            loss = fake_result(results.campaign, results.tasks()[3])["loss"]
             assert results.column("loss")[3] == loss
 
 
 def test_what_failed_in_a_part_is_computed_again_in_that_part(tmp_path):
     path = computed(tmp_path / "a b.h5", "2/3", fail=(1,))
-    again = f"again: adhesis run CAMPAIGN.toml --out '{path}' --part 2/3 --redo failed"
-    assert again in as_text(read_status(path)).splitlines()
+    text = as_text(read_status(path))
+    assert text.startswith(f"{path}, part 2/3 of a campaign: ")
+    assert f"\nagain: adhesis run CAMPAIGN.toml --out '{path}' --part 2/3 --redo failed" in text
+    assert "3 loops of 4 tasks, part 2/3 of the campaign: " in write_page(aggregate(path), {})
 
 
 def refused(sources, out) -> str:

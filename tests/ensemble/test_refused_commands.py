@@ -155,6 +155,7 @@ TRACE --plan --unit um --columns x -> --columns is 'x': it must be one or two
 TRACE --plan --unit um --tip-radius 5m -> trusted from 50 µm on (what a tip of
 TRACE --plan --unit um --max-stress 5 -> a weight or a machine?
 TRACE --plan --unit um --stiffness 0 -> (--stiffness 0) needs --max-stress
+TRACE --plan --unit um --max-penetration 0 -> --max-penetration is 0.0: it must be a positive
 TRACE --plan --unit um --max-penetration deep -> --max-penetration is 'deep'
 TRACE --plan --unit um --step 1um -> --step belongs to heights without
 TRACE --plan --unit um --processes 0 -> --processes is 0

@@ -421,13 +421,16 @@ def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_pat
     assert document["single_features"][0]["position"] == pytest.approx(640e-6, abs=2e-6)
 
 
-def test_the_command_plans_with_ranges_left_out_and_writes_nothing(tmp_path, capsys):
+def test_the_command_plans_with_ranges_left_out_and_writes_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("adhesis.ensemble.trace.options._LARGE", 0)
+    monkeypatch.setattr("adhesis.ensemble.reporter.interval", lambda elapsed: 1e-3)
     path = tmp_path / "t.txt"
     rows = [f"{1e6 * a:.3f};{1e6 * z:.6f}" for a, z in zip(X, PROFILE.at(X), strict=True)]
     path.write_text("\n".join(["x (µm);z (µm)", *rows]).replace(".", ","))
     words = ["trace", str(path), *CONTACT, "--tip-radius", "2um", "--plan"]
     assert main([*words, "--exclude", "0.2mm:230um", "--exclude", "900um:2mm"]) == 0
-    said = capsys.readouterr().out
+    said, progress = capsys.readouterr()
+    assert progress.startswith(f"reading {path}")
     for text in ("400 points, step 2.5 µm", "decimal commas", "positions in µm", "plan ", "waves"):
         assert text in said
     assert sorted(tmp_path.iterdir()) == [path]

@@ -60,6 +60,7 @@ READ: dict[str, Any] = {
         ["X resolution,9,um", "DataLine,POS = 0", *(f"{k},{z}" for k, z in enumerate(ZS))],
         Z_UM,
     ),
+    "Å behind a name": ["Lateral um,Raw Å,", *(f"{x},{1e4 * float(z):.2f}," for x, z in PAIRS)],
     "a unit in Japanese": ["測定ピッチ,0.5,um", "単位,um", "データ", *ZS],
     "units by option": ([f"{x} {z}" for x, z in PAIRS], {"unit": "um"}),
     "inches and their parts": (
@@ -208,31 +209,30 @@ def test_all_codes_of_missing_heights_are_drop_outs(codes, missing, tmp_path):
 
 
 def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: Path) -> None:
-    def rows(marked: range) -> list[str]:
-        return [
-            "x (um),z (um),valid",
-            *(f"{row},{int(k not in marked)}" for k, row in enumerate(TWO)),
-        ]
+    def rows(marked: range = range(40, 43)) -> list[str]:
+        return [f"{UM},valid", *(f"{row},{int(k not in marked)}" for k, row in enumerate(TWO))]
 
-    trace = read_trace(put(tmp_path / "t.csv", rows(range(40, 43))), columns=[1, 2])
+    trace = read_trace(put(tmp_path / "t.csv", rows()), columns=[1, 2])
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
-    other = [row.replace("valid", "flag") for row in rows(range(40, 43))]
+    other = [row.replace("valid", "flag") for row in rows()]
     trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
     assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
     for good, bad in ("255", "0"), ("1", "-1"), ("True", "False"), ("ok", "NG"):
-        words = [re.sub(",1$", f",{good}", row) for row in rows(range(40, 43))]
-        words = [re.sub(",0$", f",{bad}", row) for row in words]
+        words = [re.sub(",1$", f",{good}", re.sub(",0$", f",{bad}", row)) for row in rows()]
         trace = read_trace(put(tmp_path / "t.csv", words), columns=[1, 2])
         assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
         flags = [row.replace("valid", "quality") for row in words]
         (note,) = read_trace(put(tmp_path / "t.csv", flags), columns=[1, 2]).notes[1:2]
         assert re.fullmatch(r"column 3 \(quality\) holds .* and .* alone: it is not used", note)
-    empty = [row.removesuffix(",0") for row in rows(range(40, 43))]
+    degrees = [re.sub(r"^(\d+\.0.*),1$", r"\1,2", row) for row in rows()]
+    trace = read_trace(put(tmp_path / "t.csv", degrees), columns=[1, 2])
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
+    empty = [row.removesuffix(",0") for row in rows()]
     trace = read_trace(put(tmp_path / "t.csv", empty), columns=[1, 2])
     assert "column 3 (valid) holds 1 and empty fields alone: it is not used" in trace.notes
-    long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
+    path = put(tmp_path / "t.csv", rows(range(40, 100)))
     with pytest.raises(InputError, match=r"lacks 15\.0 % .*; 60 heights marked 0 in column 3 \(va"):
-        prepare_trace(long)
+        prepare_trace(read_trace(path, columns=[1, 2]))
 
 
 def test_whole_numbers_between_commas_are_read_below_a_name_each(tmp_path: Path) -> None:
@@ -680,11 +680,13 @@ def test_a_count_does_not_become_positions_by_the_unit_of_the_heights(name, tmp_
 
 def test_another_step_than_that_in_use_is_noted(tmp_path: Path) -> None:
     counted = ["Pitch: 0.5 um", "n;z (um)", *(f"{k};{z}" for k, z in enumerate(ZS))]
+    of_stage = ["x (um),y (um),z (um)", *(f"{k / 2},{3 * k / 8},{z}" for k, z in enumerate(ZS))]
     for text, *options, note in (
         (counted, "the header has a step or pitch of 500 nm, against a step of 1 µm"),
         ([UM, *TWO], {"columns": [2]}, "column 1 (x (um)) has steps of 0.5, as positions or a c"),
+        (of_stage, {"columns": [1, 3], "step": None}, "column 2 (y (um)) has steps of 0.375, as"),
     ):
-        notes = read_trace(put(tmp_path / "t.txt", text), step=1e-6, **dict(*options)).notes
+        notes = read_trace(put(tmp_path / "t.txt", text), **{"step": 1e-6} | dict(*options)).notes
         assert any(found.startswith(note) for found in notes)
 
 
@@ -729,9 +731,8 @@ def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(first, tmp_pa
     with pytest.raises(InputError, match=r"line 1 of .*, at the end of a column: remove it"):
         read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
     others = ZS[int(np.argmin(np.abs(Z))) :]  # which begin near nought
-    assert (
-        len(read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um")[0]) == len(others) + 1
-    )
+    heights, _ = read_heights(put(tmp_path / "h.csv", ["0", *others]), unit="um")
+    assert len(heights) == len(others) + 1
 
 
 NAMED = [

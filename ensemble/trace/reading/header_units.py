@@ -8,6 +8,7 @@ for positions, for heights or beside them. Of any other name ("log z (nm)", "z (
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from collections.abc import Sequence
@@ -52,8 +53,8 @@ _BESIDE = _UNITS | _set(
 _ALONE = _set("a b c d")  # columns of a spreadsheet
 _OF_PROFILES = _set("p r w total")  # which P, W and R profiles are, behind their filters
 
-# Units that are words or parts of names, too, need brackets. A is ampere as well: it is Å in
-# brackets behind a name of positions or heights alone.
+# Units that are words or parts of names, too, need brackets; of Å a capital is none of them. A is
+# ampere as well: it is Å in brackets behind a name of positions or heights alone.
 _AMBIGUOUS = ("m", "in", "å", "mil", "mils", "thou")
 _UNAMBIGUOUS = [name for name in LENGTH.spellings if name.lower() not in (*_AMBIGUOUS, "a")]
 
@@ -62,7 +63,7 @@ def _one_of(names: Sequence[str]) -> str:
     return "|".join(sorted(map(re.escape, names), key=len, reverse=True))
 
 
-_WORD, _ANY = _one_of(_UNAMBIGUOUS), _one_of([*_UNAMBIGUOUS, *_AMBIGUOUS])
+_WORD, _ANY = rf"{_one_of(_UNAMBIGUOUS)}|(?-i:Å)", _one_of([*_UNAMBIGUOUS, *_AMBIGUOUS])
 _OPEN, _CLOSE = r"[(\[<{]\s*(?:in\s+)?", r"\s*[)\]>}]"
 _COLUMN = re.compile(
     rf"(.*?)(?:{_OPEN}({_ANY}|A){_CLOSE}|(?:[/:=,;]|\bin\s)\s*({_ANY})|(?:^|(?<=[\s_]))({_WORD})"
@@ -314,6 +315,16 @@ def stated_steps(header: Sequence[str], decimal: str, counts: bool) -> list[floa
             if all(abs(step / known - 1) > 1e-9 for known in steps):
                 steps.append(step)
     return steps
+
+
+def other_steps(header: Sequence[str], decimal: str, step: float) -> list[str]:
+    """Describe the distances of two points that a header states, and that are not the step in m."""
+    return [
+        f"the header has a step or pitch of {length_text(other, 5)}, against a step of "
+        f"{length_text(step, 5)}"
+        for other in stated_steps(header, decimal, counts=True)
+        if not math.isclose(other, step, rel_tol=0.01)  # both may be rounded
+    ]
 
 
 def _step(text: str, decimal: str, counts: bool) -> float | None:

@@ -16,8 +16,8 @@ from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
     Column,
     HeaderUnits,
+    other_steps,
     parse_units,
-    stated_steps,
     step_of_header,
     units_of_header,
 )
@@ -194,8 +194,8 @@ def read_trace(
         Columns of positions and heights, shape (2,), or of heights alone, shape (1,): counted from
         1, or names of a DataFrame.
     row, channel : int, optional
-        Row of a map (of an instrument file, a text or a table) and channel of an instrument file,
-        counted from 0.
+        Row of a map (of an instrument file, a text, an array or a table) and channel of an
+        instrument file, counted from 0.
     delimiter, decimal : str, optional
         Delimiter and decimal sign, where a text can be read in two ways.
 
@@ -247,12 +247,13 @@ def read_trace(
             f"{parameter('channel')} is {channel}: {source} holds columns of numbers, and no "
             f"channels ({parameter('columns')} chooses columns)"
         )
-    if is_text and source.is_npy:
-        table = _columns_of(source.name, load_array(source))
-        return _from_table(source.name, table, unit, step, wanted, row, "npy")
     if is_text:
-        table = read_table(source, delimiter, decimal)
-        return _from_table(source.name, table, unit, step, wanted, row, f"text, {table.form}")
+        is_npy = source.is_npy
+        table = (
+            _columns_of(load_array(source)) if is_npy else read_table(source, delimiter, decimal)
+        )
+        form = "npy" if is_npy else f"text, {table.form}"
+        return _from_table(source.name, table, unit, step, wanted, row, form)
     _refuse_options(
         "texts: an instrument's file states its own lengths (a text that holds zero bytes, as in "
         "UTF-16 without a mark, is to be saved as UTF-8)",
@@ -336,7 +337,7 @@ def _columns_named(table: Any, wanted: Sequence[int | str]) -> list[int | str]:
 def _table_of(source: Any, wanted: Sequence[int] | None) -> tuple[str, str, Table] | None:
     """Return name, form and columns of an array or a DataFrame; None for any other source."""
     if isinstance(source, np.ndarray | list | tuple):
-        return "array", "array", _columns_of("array", _numbers("array", source))
+        return "array", "array", _columns_of(_numbers("array", source))
     if not hasattr(source, "iloc"):  # which a DataFrame and a Series have
         return None
     if hasattr(source, "to_frame"):  # a Series is a column
@@ -375,18 +376,20 @@ def _table_of(source: Any, wanted: Sequence[int] | None) -> tuple[str, str, Tabl
     lines: Any = np.arange(1, len(source) + 1)
     filled = tuple(range(len(names)))
     form = f"columns {', '.join(header[k - 1] for k in chosen)}"
+    index = source.index
+    apart = abs(index[1] - index[0]) if len(index) > 1 and index.dtype.kind in "if" else 1
+    if len(chosen) == 1 and (apart != 1 or index.dtype.kind == "f"):
+        form += f"; their index has steps of {apart:g}, and is not used"
     return "the table", form, Table(values, filled, tuple(header), (names,), lines, " ", ".")
 
 
-def _columns_of(name: str, values: Array) -> Table:
-    if values.ndim == 2 and 2 in values.shape:
-        columns = values if values.shape[0] == 2 else values.T
-    elif values.ndim < 2 or 1 in values.shape:
+def _columns_of(values: Array) -> Table:
+    """Return the columns of an array; two rows are positions and heights, and one row heights."""
+    if values.ndim < 2 or values.size == 0 or 1 in values.shape:
         columns = values.reshape(1, -1)
     else:
-        shape = " × ".join(map(str, values.shape))
-        raise InputError(f"{name} holds {shape} numbers: a trace has one column or two")
-    lines = np.arange(1, columns.shape[1] + 1)
+        columns = values if len(values) == 2 < values.shape[1] else values.T
+    lines: Any = np.arange(1, columns.shape[1] + 1)
     filled = tuple(range(len(columns)))
     return Table(columns, filled, (), (), lines, " ", ".")
 
@@ -461,10 +464,7 @@ def _from_table(
                 f"header: give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
-    for other in stated_steps(table.header, table.decimal, counts=True):
-        if not np.isclose(other, step, rtol=0.01, atol=0):  # both may be rounded
-            stated, used = length_text(other, 5), length_text(step, 5)
-            notes.append(f"the header has a step or pitch of {stated}, against a step of {used}")
+    notes.extend(other_steps(table.header, table.decimal, step))
     if len(columns) == 1 and form.startswith("text"):
         _refuse_length(name, columns[0], step, lines)
     warnings = []

@@ -34,7 +34,8 @@ def may_be_code(value: float) -> bool:
 
 def is_known_code(value: float) -> bool:
     """Return whether instruments write this number for a missing height."""
-    return abs(value) >= _ENORMOUS or any(abs(abs(value) - code) <= 1.0 for code in _CODES)
+    size = abs(value)
+    return size >= _ENORMOUS or (size > 9997 and any(abs(size - code) <= 1.0 for code in _CODES))
 
 
 def without_codes(heights: Array, *, known_alone: bool = False) -> tuple[Array, str]:
@@ -102,8 +103,8 @@ def invalid_rows(
 ) -> tuple[Array, list[str]]:
     """Return which rows a column named "valid" marks with nought, and descriptions.
 
-    Other columns beside the chosen ones that hold two numbers alone are described, and beside a
-    lone one those that rise or fall throughout.
+    Other columns beside the chosen ones that hold two numbers alone are described, and those that
+    rise or fall throughout.
     """
     marked = np.zeros(columns.shape[1], dtype=bool)
     notes = []
@@ -111,21 +112,24 @@ def invalid_rows(
         numbers = np.unique(column[np.isfinite(column)])
         held = [f"{number:g}" for number in numbers[:3]]
         held += ["empty fields"] * bool(len(held) == 1 and np.isnan(column).any())
-        steps = np.diff(column)
-        replaces_step = len(chosen) == 1 and (np.all(steps > 0) or np.all(steps < 0))
-        if k in chosen or (len(held) != 2 and not replaces_step):
+        if k in chosen or len(held) < 2:
             continue
+        steps, has_two = np.diff(column), len(held) == 2
         names = [row[k] for row in fields if row[k]]
         name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
-        if replaces_step:
+        if np.all(steps > 0) or np.all(steps < 0):
             step = abs(np.median(steps))
             notes.append(
                 f"{name} has steps of {step:g}, as positions or a count do: it is not used"
             )
-        elif any(map(VALID.match, names)) and numbers[0] <= 0 < numbers[-1]:
+        elif (
+            any(map(VALID.match, names))
+            and numbers[0] <= 0 < numbers[-1]
+            and (has_two or numbers[0] == 0)
+        ):
             marked |= column <= 0
             count = counted(int((column <= 0).sum()), "height")
             notes.append(f"{count} marked {held[0]} in {name} taken as drop-outs")
-        else:
+        elif has_two:
             notes.append(f"{name} holds {' and '.join(held)} alone: it is not used")
     return marked, notes

@@ -72,18 +72,17 @@ def is_missing(field: str) -> bool:
 def value(field: str, decimal: str) -> float | None:
     """Return the number of a field: NaN for a gap, None for a word."""
     plain = field.strip()
-    if is_missing(plain):
-        return float("nan")
-    if not _NUMBER.fullmatch(plain) or ("." if decimal == "," else ",") in plain:
+    if not _NUMBER.fullmatch(plain):
+        return float("nan") if is_missing(plain) else None
+    if ("." if decimal == "," else ",") in plain:
         return None
     return float(plain.replace(",", ".").replace("D", "e").replace("d", "e"))
 
 
 def printed_form(field: str) -> tuple[int, int]:
     """Return the number of decimals of a printed number, and of digits of its exponent."""
-    mantissa, _, exponent = re.sub("[eEdD]", "e", field).partition("e")
-    decimals = re.split(r"[.,]", mantissa)[1:]
-    return len(decimals[0]) if decimals else 0, len(exponent.lstrip("+-"))
+    mantissa, _, exponent = field.lower().replace("d", "e").partition("e")
+    return len(mantissa.replace(",", ".").partition(".")[2]), len(exponent.lstrip("+-"))
 
 
 def is_without_words(line: str) -> bool:
