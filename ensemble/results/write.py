@@ -113,6 +113,7 @@ class Writer(AbstractContextManager["Writer"]):
                         rows_of = self._datasets[dataset.name]
                         empty = np.full((stop - start, *rows_of.shape), dataset.fill, rows_of.dtype)
                         rows_of.write(start, empty)
+                    self.flush()
 
     def mark(self, rows: Iterable[int], status: int) -> None:
         """Mark rows (ascending) without a result as pending, or as not needed.
