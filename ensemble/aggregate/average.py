@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.by_blocks import (
     Curve,
@@ -26,7 +25,7 @@ from adhesis.ensemble.aggregate.by_blocks import (
     average_fields,
     count_jumps,
 )
-from adhesis.ensemble.aggregate.cells import Cell, finished_cells, stress_scale
+from adhesis.ensemble.aggregate.cells import Cell, alike, finished_cells, stress_scale
 from adhesis.ensemble.aggregate.companions import (
     Companion,
     LossDifference,
@@ -36,7 +35,6 @@ from adhesis.ensemble.aggregate.companions import (
 from adhesis.ensemble.campaign.tables import Axis, Campaign
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
-from adhesis.ensemble.task.dataset import KEPT
 from adhesis.solver.method import BRANCHES
 
 _MAX_FAILURES = 20
@@ -129,22 +127,17 @@ class Aggregate:
         if not self.further:
             return self
         groups = [names for names in self.campaign.sweep.zip if _H_AND_GAMMA.intersection(names)]
-        following = set(chain.from_iterable(groups))
-        layers: dict[tuple[float, ...], list[AveragedCell]] = {}
-        for cell in self.cells:
-            point = tuple(value for name, value in cell.others if name not in following)
-            layers.setdefault(point, []).append(cell)
+        following = _H_AND_GAMMA.union(*groups)
+        layers = alike(self.cells, following)
         last = max(point for point, layer in layers.items() if any(cell.done for cell in layer))
         return replace(self, cells=tuple(layers[last]))
 
     @cached_property
     def paired(self) -> list[PairedDifference]:
         """Each step from one γ to the next, where both have realisations in common."""
-        rows: dict[tuple[Any, ...], list[Cell]] = {}
-        for cell in self.cells:
-            rows.setdefault((cell.hurst, cell.others), []).append(cell)
         found = []
-        for lower, upper in chain.from_iterable(map(pairwise, rows.values())):
+        rows = alike(self.cells, {"work_of_adhesion"}).values()
+        for lower, upper in chain.from_iterable(map(pairwise, rows)):
             loss = difference(lower, upper, "loss")
             scaled = difference(lower, upper, "loss_dimensionless")
             if loss is not None and scaled is not None:
@@ -165,26 +158,23 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     InputError if a file cannot be read, is no results file, or holds no finished task.
     """
     with Results(path) as results:
-        status, kept = results.status(), np.append(results.column(KEPT), len(results))
-        cells = tuple(_averaged(results, cell, kept) for cell in finished_cells(results))
-        failed = np.flatnonzero(status == FAILED)[:_MAX_FAILURES]
+        cells = tuple(_averaged(results, cell) for cell in finished_cells(results))
+        failed = np.flatnonzero(results.status() == FAILED)[:_MAX_FAILURES]
+        errors = (text or "no reason given" for text in results.errors(failed))
         companions = tuple(read_companion(other, results.campaign) for other in beside)
         return Aggregate(
             path=results.path,
             campaign=results.campaign,
             attributes=results.attributes,
             cells=cells,
-            failures=tuple(
-                (row, text or "no reason given")
-                for row, text in zip(failed.tolist(), results.errors(failed), strict=True)
-            ),
+            failures=tuple(zip(failed.tolist(), errors, strict=True)),
             companions=companions,
             doubts=(*results.doubts(), *(d for other in companions for d in other.doubts)),
             damaged=results.damaged().size,
         )
 
 
-def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedCell:
+def _averaged(results: Results, cell: Cell) -> AveragedCell:
     ones = np.ones(cell.done)
     stress = 1 / stress_scale(cell.campaign, cell.values["h_max"])
     # by dataset, the curves to make of it, with the factor of each row
@@ -203,5 +193,5 @@ def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedC
         **{entry.name: getattr(cell, entry.name) for entry in fields(Cell)},
         curves=curves,
         jumps=count_jumps(results, cell.rows),
-        fields=average_fields(results, cell.rows, kept),
+        fields=average_fields(results, cell.rows),
     )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,6 +138,9 @@ class Cell:
         return precision(values, stop.relative_error, stop.quantity, finished=not self.pending)
 
 
+SomeCell = TypeVar("SomeCell", bound=Cell)
+
+
 def precisions(cells: Iterable[Cell]) -> list[tuple[str, Precision]]:
     """Return name and precision of every cell; none without ``[stop]``."""
     known = ((cell.name, cell.precision) for cell in cells)
@@ -156,6 +160,17 @@ def loops_beyond_zero_range(cells: Iterable[Cell]) -> list[tuple[Cell, int]]:
 def _sorted(loops: Iterable[tuple[Array, NDArray[np.bool_], Cell]]) -> list[tuple[Cell, int]]:
     found = [(by[k], cell, int(k)) for by, chosen, cell in loops for k in np.flatnonzero(chosen)]
     return [(cell, k) for _, cell, k in sorted(found, key=itemgetter(0))]
+
+
+def alike(
+    cells: Iterable[SomeCell], but: Collection[str]
+) -> dict[tuple[float, ...], list[SomeCell]]:
+    """Group cells that differ on these axes alone, by their values on the others."""
+    groups: dict[tuple[float, ...], list[SomeCell]] = {}
+    for cell in cells:
+        fixed = tuple(value for name, value in cell.at.items() if name not in but)
+        groups.setdefault(fixed, []).append(cell)
+    return groups
 
 
 def finished_cells(results: Results) -> list[Cell]:

@@ -55,9 +55,8 @@ def read_status(path: Path | str) -> dict[str, Any]:
     """
     with Results(path) as results:
         campaign, tasks, state = results.campaign, results.tasks(), results.status()
-        further = axis_datasets(campaign)
-        units = {"hurst": "1", "work_of_adhesion": "J m-2"}
-        units |= {dataset.name: dataset.unit for dataset in further}
+        units = {axis.name: axis.unit for axis in campaign.axes[:2]}
+        units |= {dataset.name: dataset.unit for dataset in axis_datasets(campaign)}
         cells = read_cells(results)
         failed = np.flatnonzero(state == FAILED)
         seconds = results.column("wall_time", failed).tolist()
@@ -229,11 +228,11 @@ def _listed(
 
 
 def _range_of(row: Mapping[str, Any]) -> str:
-    row = {**row, "loss": math.nan if row["loss"] is None else row["loss"]}
+    loss = math.nan if row["loss"] is None else row["loss"]
     known = {name: row[name] for name in RANGES if row[name] is not None}
-    least = min(known, key=lambda name: known[name]) if known else None
-    shown = "no finite range" if least is None else f"{least} {known[least]:.2g} m"
-    return f"{shown}, loss {row['loss']:.3g} J/m²"
+    least = min(known, key=known.__getitem__, default="")
+    shown = f"{least} {known[least]:.2g} m" if known else "no finite range"
+    return f"{shown}, loss {loss:.3g} J/m²"
 
 
 def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:

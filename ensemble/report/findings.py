@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
-from adhesis.ensemble.aggregate.cells import Cell, doubtful_loops, precisions
+from adhesis.ensemble.aggregate.cells import Cell, alike, doubtful_loops, precisions
 from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import name_at, place
@@ -83,7 +83,9 @@ def _friction(data: Aggregate, cells: Sequence[Cell]) -> str:
         return ""
     pairs = ((cell.estimates["friction"].mean, cell.estimates["loss"].mean) for cell in cells)
     share = [friction / loss for friction, loss in pairs if loss > 0]
-    return f"; friction of receding edges is {_from_to(share)} of the loss" if share else ""
+    if not share:
+        return ""
+    return f"; friction of receding edges is {percent(min(share), max(share))} of the loss"
 
 
 def law(data: Aggregate) -> Iterator[str]:
@@ -119,10 +121,6 @@ def law(data: Aggregate) -> Iterator[str]:
             yield "Where the strength is inf, the range of adhesion is zero."
 
 
-def _from_to(shares: Sequence[float]) -> str:
-    return percent(min(shares), max(shares))
-
-
 def turning_point(data: Aggregate) -> str:
     """Return "Δ/h_max = 0.5 … 0.9": to where the finished loops were loaded."""
     cycle = data.campaign.cycle
@@ -152,8 +150,8 @@ def _statistical(data: Aggregate) -> str:
     if not errors:
         return f"{with_many}, the error of the mean is unknown."
     return (
-        f"{with_many}, the 95 % interval of the mean loss in J/m² reaches {_from_to(errors)} from "
-        "it, on the further side."
+        f"{with_many}, the 95 % interval of the mean loss in J/m² reaches "
+        f"{percent(min(errors), max(errors))} from it, on the further side."
     )
 
 
@@ -280,8 +278,7 @@ def _their(count: int) -> str:
 
 def warnings(data: Aggregate) -> list[str]:
     """Return what :func:`quality` warns of, to be said where the numbers stand."""
-    found = (text.partition("WARNING: ") for text in quality(data))
-    return [text for _, warning, text in found if warning]
+    return [text.removeprefix("WARNING: ") for text in quality(data) if text.startswith("WARNING")]
 
 
 def _doubtful_companions(data: Aggregate) -> Iterator[str]:
@@ -358,7 +355,7 @@ def _growth(data: Aggregate, of_paper: bool) -> Iterator[str]:
         return
     rest = [pair for pair in data.paired if not pair.loss.difference.low > 0]
     if not rest:
-        steps = len(data.cells) - len({(cell.hurst, cell.others) for cell in data.cells})
+        steps = len(data.cells) - len(alike(data.cells, {"work_of_adhesion"}))
         where = f"at every {'H and further axis' if data.further else 'H'}"
         if len(data.paired) < steps:
             unknown = steps - len(data.paired)
@@ -405,9 +402,9 @@ def _along(data: Aggregate, axis: Axis) -> Iterator[str]:
             "not reach their preload."
         )
         return
-    verbs = Counter(_verb(step, "grows", "falls", "stays the same") for step in steps)
-    order = ("grows", "falls", "stays the same", "is not monotone")
-    parts = [f"{verb} in {verbs[verb]}" for verb in order if verbs[verb]]
+    known = ("grows", "falls", "stays the same", "is not monotone")
+    verbs = Counter(_verb(step, *known) for step in steps)
+    parts = [f"{verb} in {verbs[verb]}" for verb in known if verbs[verb]]
     rest = f"; not counted, as loops did not reach their preload: {_listed(short)}" if short else ""
     yield (
         f"{along} the mean loss in J/m² {', '.join(parts)} of {len(steps)} series of cells that "
@@ -415,11 +412,10 @@ def _along(data: Aggregate, axis: Axis) -> Iterator[str]:
     )
 
 
-def _verb(steps: NDArray[np.float64], up: str, down: str, flat: str = "") -> str:
+def _verb(steps: NDArray[np.float64], up: str, down: str, flat: str, other: str) -> str:
     """Return how values behave, from their differences."""
-    signs = set(np.sign(steps).tolist())
-    known = {1.0: up, -1.0: down, 0.0: flat}
-    return (known.get(signs.pop()) if len(signs) == 1 else "") or "is not monotone"
+    signs = tuple(np.unique(np.sign(steps)).tolist())
+    return {(1.0,): up, (-1.0,): down, (0.0,): flat}.get(signs, other)
 
 
 def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
@@ -433,8 +429,8 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> Iterator[str]:
         if len(cells) > 2:
             cells.sort(key=lambda c: c.estimates["m2"].mean)
             steps = np.diff([c.estimates[quantity].mean for c in cells])
-            verb = _verb(steps, "grows with m2", "falls with m2")
-            verb = f"{verb} in m2" if verb == "is not monotone" else verb
+            neither = "is not monotone in m2"
+            verb = _verb(steps, "grows with m2", "falls with m2", neither, neither)
             found.setdefault(verb, []).append(gamma_text(gamma))
     parts = [f"{verb} at γ = {_listed(gammas, ', ')}" for verb, gammas in found.items()]
     rest = "; the paper's table is not monotone" if of_paper else ""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
+from adhesis.ensemble.aggregate.cells import Cell, alike
 from adhesis.ensemble.campaign.tables import Axis
 from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.quantities import common_unit, gamma_text
@@ -80,14 +80,9 @@ def own_axes(data: Aggregate) -> list[Axis]:
     return [axis for axis in data.further if not together(data, axis) & of_figures]
 
 
-def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
+def lines_along(data: Aggregate, axis: Axis) -> list[list[AveragedCell]]:
     """Finished cells that differ along one axis (and those that go with it) alone, ascending."""
-    moving = together(data, axis)
-    lines: dict[tuple[object, ...], list[Cell]] = {}
-    for cell in data.cells:
-        fixed = tuple(other for other in cell.others if other[0] not in moving)
-        if cell.done:
-            lines.setdefault((cell.hurst, cell.work_of_adhesion, fixed), []).append(cell)
+    lines = alike((cell for cell in data.cells if cell.done), together(data, axis))
     return [sorted(line, key=lambda c: c.at[axis.name]) for line in lines.values()]
 
 

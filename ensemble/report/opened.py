@@ -298,11 +298,11 @@ def _axes(results: Results) -> dict[str, NDArray[Any]]:
 
 
 def _frame(table: Table, index: Sequence[str]) -> pd.DataFrame:
-    plain = {column.name: column.name.partition(" [")[0] for column in table.columns}
-    names = [plain[name] if plain[name] in index else name for name in plain]
-    frame = pd.DataFrame([list(row) for row in table.rows], columns=names)
+    units = {}
+    for column in table.columns:
+        plain, _, unit = column.name.partition(" [")
+        units[plain if plain in index else column.name] = unit.rstrip("]").replace("^2", "²")
+    frame = pd.DataFrame([list(row) for row in table.rows], columns=list(units))
     frame = frame.set_index(list(index)) if index else frame
-    bracketed = (column.name.partition(" [")[2].rstrip("]") for column in table.columns)
-    units = (unit.replace("^2", "²") for unit in bracketed)
-    frame.attrs["units"] = dict(zip(names, units, strict=True))
+    frame.attrs["units"] = units
     return frame

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.tables import Campaign
@@ -49,9 +50,22 @@ FIGURE_4 = PaperFigure(0.8, (0.01, 0.04), 0.4)
 FIGURE_5 = PaperFigure(0.8, (0.04,))
 FIGURE_8 = PaperFigure(0.7, (0.04,), 0.7)
 
-_PERIOD, _N0, _H_RMS, _C0 = 2e-3 * math.pi, 10, 1e-6, 1e-13
+# By key, what all readings have in common.
+_COMMON = {
+    "profile.period": 2e-3 * math.pi,
+    "profile.n0": 10,
+    "profile.amplitudes": "deterministic",
+    "profile.rolloff": 1,
+    "material.young": 1e6,
+    "material.poisson": 0.5,
+    "material.work_of_adhesion_open": None,
+    "material.stripes": None,
+    "material.opens": False,
+    "cycle.stiffness": None,
+    "cycle.preload": None,
+}
 _RATIOS = (100, 200)
-_YOUNG, _POISSON = 1e6, 0.5
+_H_RMS, _C0 = 1e-6, 1e-13
 _TURNING_POINTS = (0.80, 0.93)
 _NEAR = 1e-3  # values are the paper's if they agree with its digits
 
@@ -88,24 +102,10 @@ def are_its_cells(cells: Sequence[Cell]) -> bool:
 
 def is_reading(campaign: Campaign, hursts: Sequence[float]) -> bool:
     """Whether profile, material and path of a campaign are a reading of the paper's."""
-    profile, material, cycle = campaign.profile, campaign.material, campaign.cycle
-    low, high = _TURNING_POINTS
-    return (
-        _is(profile.period, _PERIOD)
-        and profile.n0 == _N0
-        and profile.amplitudes == "deterministic"
-        and profile.rolloff == 1
-        and cycle.stiffness is None
-        and cycle.preload is None
-        and cycle.max_penetration is not None
-        and _is_spectrum(campaign, hursts)
-        and _is(material.young, _YOUNG)
-        and _is(material.poisson, _POISSON)
-        and material.work_of_adhesion_open is None
-        and material.stripes is None
-        and not material.opens
-        and low - _NEAR <= cycle.max_penetration <= high + _NEAR
-    )
+    top, (low, high) = campaign.cycle.max_penetration, _TURNING_POINTS
+    is_path = top is not None and low - _NEAR <= top <= high + _NEAR
+    alike = (_is(campaign.value(key), of_paper) for key, of_paper in _COMMON.items())
+    return is_path and all(alike) and _is_spectrum(campaign, hursts)
 
 
 def _is_spectrum(campaign: Campaign, hursts: Sequence[float]) -> bool:
@@ -116,9 +116,10 @@ def _is_spectrum(campaign: Campaign, hursts: Sequence[float]) -> bool:
         return _is(profile.h_rms, _H_RMS)
     if profile.c0 is not None:
         return _is(profile.c0, _C0) and profile.ratio == _RATIOS[0]
-    quoted = [m2(hurst) for hurst in hursts]
-    return profile.m2 is not None and all(q is not None and _is(profile.m2, q) for q in quoted)
+    return profile.m2 is not None and all(_is(profile.m2, m2(hurst)) for hurst in hursts)
 
 
-def _is(value: float, of_paper: float) -> bool:
-    return math.isclose(value, of_paper, rel_tol=_NEAR)
+def _is(value: Any, of_paper: Any) -> bool:
+    if isinstance(of_paper, float):
+        return math.isclose(value, of_paper, rel_tol=_NEAR)
+    return bool(value == of_paper)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.escape import printable
@@ -15,15 +13,14 @@ from adhesis.ensemble.outputs import Writing, staged_folder, write_netcdf
 def write_report(
     path: Path | str,
     directory: Path | str,
-    stream: IO[str] | None = None,
     beside: Sequence[Path | str] = (),
     progress: Callable[[str], None] = lambda part: None,
 ) -> Aggregate:
     """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``.
 
-    ``beside`` are results files to compare with; tables are printed to ``stream``. ``progress`` is
-    called with the name of each part before it is made. InputError if there is nothing to report,
-    WriteError if the directory cannot be written; what was there is left as it was.
+    ``beside`` are results files to compare with; tables are printed. ``progress`` is called with
+    the name of each part before it is made. InputError if there is nothing to report, WriteError if
+    the directory cannot be written; what was there is left as it was.
     """
     progress("averages")
     data = aggregate(path, beside)
@@ -35,7 +32,7 @@ def write_report(
     ):
         _write_files(data, folder, progress)
     writing.finish()
-    _print_summary(data, directory, stream or sys.stdout)
+    _print_summary(data, directory)
     return data
 
 
@@ -86,14 +83,13 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
     (directory / "report.html").write_text(html_page(page, directory), encoding="utf-8")
 
 
-def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
+def _print_summary(data: Aggregate, directory: Path) -> None:
     from adhesis.ensemble.report import findings
     from adhesis.ensemble.report.tables import loss_tables, mechanisms
 
     for make in (loss_tables.losses, loss_tables.precision, mechanisms.mechanisms):
         if (table := make(data)).rows:
-            table.print(stream)
-            print(file=stream)
+            print(table, end="\n\n")
     for sentence in (
         *findings.verdict(data),
         *findings.law(data),
@@ -101,6 +97,6 @@ def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
         *findings.missing(data),
         *findings.quality(data),
     ):
-        print(printable(sentence), file=stream)
+        print(printable(sentence))
     pages = f"{directory / 'report.md'}, {directory / 'report.html'}"
-    print(f"report: {printable(pages)}", file=stream)
+    print(f"report: {printable(pages)}")

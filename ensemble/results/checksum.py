@@ -1,10 +1,9 @@
 """Checksums of the rows of a results file.
 
-The checksum of a row is the CRC-32 of what it holds, in the order
-that ``docs/results-file.md`` states. It finds every
-damage of up to 32 successive bits, and any other with a chance of all but one in 4·10⁹. Damage is
-an accident here, not an attack, so that no cryptographic digest is needed: readers compute the
-checksum of every row, and BLAKE2b takes more than four times as long.
+The checksum of a row is the CRC-32 of what it holds, in the order that ``docs/results-file.md``
+states. It finds every damage of up to 32 successive bits, and any other with a chance of all but
+one in 4·10⁹. Damage is an accident here, not an attack, so that no cryptographic digest is needed:
+readers compute the checksum of every row, and BLAKE2b takes more than four times as long.
 """
 
 from __future__ import annotations

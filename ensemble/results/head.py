@@ -14,6 +14,7 @@ that HDF5 sets while it writes.
 from __future__ import annotations
 
 import os
+import re
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,8 +35,6 @@ _PIECE = 2**20
 # HDF5 marks these bytes of its superblock (version 0) while a file is open for writing.
 _FLAGS = (20, 4)
 
-_Ranges = Sequence[tuple[int, int]]
-
 
 def reserve_head(file: h5py.File) -> None:
     """Make the attribute, before anything else, in a file that is laid out."""
@@ -46,19 +45,12 @@ def write_head(path: Path) -> None:
     """Fill the attribute of a file that is laid out."""
     with h5py.File(path, "r", locking=False) as file:
         found = [file[d.name].id for d in ROW_DATASETS]
-        rows = [
-            (place, dataset.get_storage_size())
-            for dataset in found
-            if (place := dataset.get_offset()) is not None
-        ]
-    size = path.stat().st_size
+        rows = [(d.get_offset(), d.get_storage_size()) for d in found if d.get_offset() is not None]
     with path.open("r+b") as handle:
         place = handle.read(_NEAR).index(_MARK)
-        ranges = sorted([_FLAGS, (place, _LENGTH), *rows])
-        table = f"{size} " + " ".join(f"{first}+{length}" for first, length in ranges) + " "
-        checksum = _checksum(handle, table.encode(), ranges, size)
+        text = _text(handle, sorted([_FLAGS, (place, _LENGTH), *rows]))
         handle.seek(place)
-        handle.write((_MARK + f"{checksum:08x} ".encode() + table.encode()).ljust(_LENGTH, b"."))
+        handle.write(text)
 
 
 def check_head(path: Path) -> bool:
@@ -69,22 +61,16 @@ def check_head(path: Path) -> bool:
     with open_regular(path) as handle:
         place = handle.read(_NEAR).index(_MARK)
         handle.seek(place)
-        text = handle.read(_LENGTH).removeprefix(_MARK)
-        try:
-            checksum, table = int(text[:8], 16), text[9:].rstrip(b".")
-            size, *words = table.split()
-            ranges = [(int(a), int(b)) for a, b in (word.split(b"+") for word in words)]
-            known = os.fstat(handle.fileno()).st_size
-            whole = (_MARK + text[:8] + b" " + table).ljust(_LENGTH, b".") == _MARK + text
-            if int(size) != known or not whole or (place, _LENGTH) not in ranges:
-                return False
-        except ValueError:
-            return False
-        return _checksum(handle, table, ranges, known) == checksum
+        text = handle.read(_LENGTH)
+        found = re.findall(rb"(\d{1,18})\+(\d{1,18})", text)
+        ranges = [(int(first), int(length)) for first, length in found]
+        return (place, _LENGTH) in ranges and _text(handle, ranges) == text
 
 
-def _checksum(handle: BinaryIO, table: bytes, ranges: _Ranges, size: int) -> int:
-    """Return the CRC-32 of the places of the rows, and of a file without them."""
+def _text(handle: BinaryIO, ranges: Sequence[tuple[int, int]]) -> bytes:
+    """Return the text of the attribute for a file with rows at these places."""
+    size = os.fstat(handle.fileno()).st_size
+    table = f"{size} {' '.join(f'{first}+{length}' for first, length in ranges)} ".encode()
     place, value = 0, zlib.crc32(table)
     for first, length in [*ranges, (size, 0)]:
         handle.seek(place)
@@ -92,4 +78,4 @@ def _checksum(handle: BinaryIO, table: bytes, ranges: _Ranges, size: int) -> int
             value = zlib.crc32(piece, value)
             place += len(piece)
         place = max(place, first + length)
-    return value
+    return (_MARK + f"{value:08x} ".encode() + table).ljust(_LENGTH, b".")

@@ -156,10 +156,6 @@ class Source:
         # A task that kept its fields does so in a grown campaign: realisations are only added.
         self._kept = np.searchsorted(schema.kept_rows(campaign), self.target[self._kept_rows])
 
-    def row_of(self, target: int) -> int:
-        """Row of a task, by its row in the merged file."""
-        return int(np.searchsorted(self.target, target))
-
     def places(self, dataset: Dataset) -> tuple[Rows, NDArray[np.bool_]]:
         """Return the places of the rows of a dataset, and which of them are given."""
         if dataset.dims[0] == KEPT:
@@ -175,20 +171,11 @@ def copy_rows(sources: Sequence[Source], file: h5py.File) -> None:
         step = max(1, _BLOCK_BYTES // width)
         for start in range(0, there.shape[0], step):
             with signals_held():
-                _copy_block(sources, there, dataset, start, min(start + step, there.shape[0]))
-
-
-def _copy_block(
-    sources: Sequence[Source], there: h5py.Dataset, dataset: Dataset, start: int, stop: int
-) -> None:
-    block: NDArray[Any] | None = None
-    for source in sources:
-        target, taken = source.places(dataset)
-        low, high = np.searchsorted(target, (start, stop))
-        chosen = taken[low:high]
-        if np.any(chosen):
-            block = there[start:stop] if block is None else block
-            values = source.results.column(dataset.name, slice(int(low), int(high)))
-            block[target[low:high][chosen] - start] = values[chosen]
-    if block is not None:
-        there[start:stop] = block
+                block = there[start : start + step]
+                for source in sources:
+                    target, taken = source.places(dataset)
+                    part = slice(*np.searchsorted(target, (start, start + step)).tolist())
+                    if np.any(chosen := taken[part]):
+                        values = source.results.column(dataset.name, part)
+                        block[target[part][chosen] - start] = values[chosen]
+                there[start : start + step] = block

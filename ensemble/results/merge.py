@@ -123,12 +123,11 @@ def _assign(
 
 def _compare(one: Source, other: Source, row: int) -> None:
     """Refuse a row of the merged file that two files hold with different bits."""
-    here, there = one.row_of(row), other.row_of(row)
+    here, there = (np.searchsorted(source.target, [row]) for source in (one, other))
     for dataset in _COMPARED:
-        mine = one.results.column(dataset.name, slice(here, here + 1))
-        yours = other.results.column(dataset.name, slice(there, there + 1))
-        if mine.tobytes() != yours.tobytes():
+        mine = one.results.column(dataset.name, here)
+        if mine.tobytes() != other.results.column(dataset.name, there).tobytes():
             raise InputError(
                 f"{one.results.path} and {other.results.path} both hold "
-                f"{one.results.tasks()[here]}, and their {dataset.name} differs"
+                f"{one.results.tasks()[here.item()]}, and their {dataset.name} differs"
             )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import h5py
 import numpy as np
@@ -37,7 +38,7 @@ _MOST_NAMED = 10
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 
-class Results:
+class Results(AbstractContextManager["Results"]):
     """A results file, read with plain h5py, at any moment of a run.
 
     Opening it checks everything but the rows: the root attributes, the shapes and types of the
@@ -47,7 +48,6 @@ class Results:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        self._status: NDArray[np.uint8] | None = None
         with _damage(self.path), ExitStack() as stack:
             # HDF5 can crash over damaged bytes of its own: it reads none that are known to be.
             if not check_head(self.path):
@@ -180,9 +180,6 @@ class Results:
         """Return the sentence on what is beside the rows and cannot be computed again."""
         return InputError(f"{self.path} is damaged: its {what}; {_INSTEAD}")
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -209,9 +206,7 @@ class Results:
         DAMAGED is that of a row which does not have its checksum, or whose status is none. All rows
         with a result are read for it, once.
         """
-        if self._status is None:
-            self._status = self._checked_status()
-        return self._status.copy()
+        return self._checked_status.copy()
 
     def damaged(self) -> NDArray[np.intp]:
         """Return the rows that are damaged."""
@@ -241,6 +236,7 @@ class Results:
             out.append(f"{self.path} {mixed}")
         return tuple(out)
 
+    @cached_property
     def _checked_status(self) -> NDArray[np.uint8]:
         suspects, status = np.arange(len(self)), np.zeros(len(self), np.uint8)
         # A row that a run empties and computes again at this moment looks damaged, once.

@@ -5,12 +5,11 @@ So a row whose status is not "pending" is a whole one, and its checksum is that 
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import h5py
 import numpy as np
@@ -25,16 +24,16 @@ from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row
 from adhesis.solver.runtime.uninterrupted import signals_held
 
-_KEPT_NAMES = frozenset(d.name for d in OF_KEPT)
 _NAMES = frozenset(d.name for d in RESULT_DATASETS)
+_KEPT_NAMES = frozenset(d.name for d in OF_KEPT)
 
 # Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
 _LONGEST_NAME = 200
-_BLOCK_BYTES = 16 * 2**20  # of rows that are emptied at once
+_EMPTIED_AT_ONCE = 1000  # rows
 _DESCRIPTORS = Path("/proc/self/fd")  # of Linux
 
 
-class Writer:
+class Writer(AbstractContextManager["Writer"]):
     """Writes rows of a results file that exists.
 
     With a communicator every rank of it opens the file together (parallel HDF5) and writes rows on
@@ -43,10 +42,7 @@ class Writer:
     """
 
     def __init__(
-        self,
-        path: Path | str,
-        comm: Any = None,
-        origin: Callable[[int], str] = lambda rank: "",
+        self, path: Path | str, comm: Any = None, origin: Callable[[int], str] = lambda rank: ""
     ) -> None:
         self.path = Path(path)
         # HDF5's own lock would refuse readers; two writers are refused by
@@ -65,11 +61,8 @@ class Writer:
                 raise WriteError(f"{self.path} could not be opened: {reason(error)}") from error
             self._datasets = {d.name: DatasetRows(self._file[d.name]) for d in schema.ROW_DATASETS}
             self._kept_rows = self._file[KEPT][:]
-            self._kept = {int(row): place for place, row in enumerate(self._kept_rows)}
+            self._kept = {row: place for place, row in enumerate(self._kept_rows.tolist())}
         self._origin = origin
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         # Closing is collective: a rank that failed alone must not wait here for the others. And
@@ -97,7 +90,7 @@ class Writer:
         ValueError if the row has other datasets than the schema, or one has another shape.
         """
         wanted = _NAMES if row in self._kept else _NAMES - _KEPT_NAMES
-        if wanted - result.keys() or result.keys() - _NAMES:
+        if not wanted <= result.keys() <= _NAMES:
             raise ValueError(f"a row of {sorted(result)} where {sorted(wanted)} is wanted")
         return self._write(row, {**result, "rank": rank, **self._origin_of(rank)}, schema.DONE)
 
@@ -108,22 +101,19 @@ class Writer:
 
     def reset(self, rows: Iterable[int]) -> None:
         """Empty rows (ascending), which are to be computed; what they held is lost."""
-        width = sum(rows_of.nbytes for rows_of in self._datasets.values())
-        most = max(1, _BLOCK_BYTES // width)
         for stretch in stretches(np.fromiter(rows, np.intp)):
-            for first in range(stretch.start, stretch.stop, most):
-                last = min(first + most, stretch.stop)
+            for first in range(stretch.start, stretch.stop, _EMPTIED_AT_ONCE):
+                last = min(first + _EMPTIED_AT_ONCE, stretch.stop)
+                kept = np.searchsorted(self._kept_rows, (first, last)).tolist()
                 with self._writing(first):
                     # First the status: a row that is being emptied is not to be taken for whole.
                     self._put(schema.STATUS, first, [schema.PENDING] * (last - first))
-                    kept = np.searchsorted(self._kept_rows, (first, last)).tolist()
                     for dataset in (*OF_TASKS, *OF_KEPT):
-                        if dataset is not schema.STATUS:
-                            start, stop = kept if dataset.dims[0] == KEPT else (first, last)
-                            rows_of = self._datasets[dataset.name]
-                            shape = (stop - start, *rows_of.shape)
-                            rows_of.write(start, np.full(shape, dataset.fill, rows_of.dtype))
-                    self._put(schema.CHECKSUM, first, [schema.CHECKSUM.fill] * (last - first))
+                        start, stop = kept if dataset.dims[0] == KEPT else (first, last)
+                        rows_of = self._datasets[dataset.name]
+                        empty = np.full((stop - start, *rows_of.shape), dataset.fill, rows_of.dtype)
+                        rows_of.write(start, empty)
+                    self.flush()
 
     def mark(self, rows: Iterable[int], status: int) -> None:
         """Mark rows (ascending) without a result as pending, or as not needed.
@@ -226,11 +216,6 @@ class DatasetRows:
         self.dtype = dataset.dtype
         self._space = self._id.get_space()
         self._rest = (0,) * len(self.shape)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of a row."""
-        return int(math.prod(self.shape) * self.dtype.itemsize)
 
     def block(self, value: Any) -> NDArray[Any]:
         """Return the bytes that a value of a row has in the file, shape (1, …)."""

@@ -155,15 +155,15 @@ def test_a_merge_that_the_disk_refuses_leaves_the_old_file(tmp_path, monkeypatch
     out = tmp_path / "all.h5"
     merge([one], out)
     before = out.read_bytes()
-    copy = layout._copy_block
+    places = layout.Source.places
 
-    def full(sources, there, dataset, start, stop):
+    def full(source, dataset):
         if dataset.name == "loss":
             raise OSError(errno.ENOSPC, "No space left on device")
-        copy(sources, there, dataset, start, stop)
+        return places(source, dataset)
 
     with monkeypatch.context() as then:
-        then.setattr(layout, "_copy_block", full)
+        then.setattr(layout.Source, "places", full)
         with pytest.raises(WriteError, match=r"all\.h5 cannot be written: No space left on device"):
             merge([two], out)
     assert out.read_bytes() == before

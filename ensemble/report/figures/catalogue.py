@@ -12,10 +12,7 @@ from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loss_figures
 from adhesis.ensemble.report.figures import shapes_and_spectra as fields
 from adhesis.ensemble.report.figures.along import along
-from adhesis.ensemble.report.figures.loops import (
-    contact_against_stress,
-    loop_against_penetration,
-)
+from adhesis.ensemble.report.figures.loops import contact_against_stress, loop_against_penetration
 from adhesis.ensemble.report.figures.loss_figures import FEWEST_FOR_A_LINE, hollow_handle
 from adhesis.ensemble.report.figures.shapes_and_spectra import (
     cells_with_shape,
@@ -59,6 +56,7 @@ def _several(name: str) -> Callable[[Aggregate], bool]:
     return lambda data: len({getattr(cell, name) for cell in data.cells if cell.done}) > 1
 
 
+_CARET = "A caret at 0 marks an interval that goes on below."
 _ENDS = (
     "Loops that turn at one mean stress turn at different penetrations: a curve ends where the "
     "first of its realisations turns, and its branches need not meet."
@@ -88,8 +86,7 @@ LOSSES = (
     Illustration(
         "table1_losses",
         "Loss of each H and work of adhesion",
-        "Means with 95 % intervals, a panel for each γ. A caret at 0 marks an interval that goes "
-        "on below.",
+        f"Means with 95 % intervals, a panel for each γ. {_CARET}",
         loss_figures.loss_against_hurst,
         "Table 1",
         beside_paper="Stars: the paper's values, which have no error.",
@@ -98,8 +95,7 @@ LOSSES = (
     Illustration(
         "loss_against_m2",
         "Loss against mean square slope",
-        "Means with 95 % intervals, a panel for each γ, a point for each H. A caret at 0 marks an "
-        "interval that goes on below.",
+        f"Means with 95 % intervals, a panel for each γ, a point for each H. {_CARET}",
         loss_figures.loss_against_slope,
         beside_paper="Stars: the paper's values, at the m2 that it quotes.",
         is_worth=_several("hurst"),
@@ -180,8 +176,7 @@ MECHANISMS = (
         "Loss by mechanism",
         "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
         "large scale: patches appear, merge, split, open, vanish or pull off. Above the bars: "
-        "share of the small scale. Error bars: 95 % interval of the mean of either part. A caret "
-        "at 0 marks an interval that goes on below.",
+        f"share of the small scale. Error bars: 95 % interval of the mean of either part. {_CARET}",
         loss_figures.loss_by_mechanism,
     ),
     Illustration(
@@ -196,8 +191,8 @@ MECHANISMS = (
     Illustration(
         "pull_off_stress",
         "Pull-off stress",
-        "Largest mean tension on unloading, means with 95 % intervals. A caret at 0 marks an "
-        "interval that goes on below. The marks are moved apart a little.",
+        f"Largest mean tension on unloading, means with 95 % intervals. {_CARET} The marks are "
+        "moved apart a little.",
         loss_figures.pull_off,
         is_worth=_several("work_of_adhesion"),
     ),
@@ -226,8 +221,8 @@ def _along_axis(data: Aggregate, axis: Axis) -> Illustration:
     further = {other.name for other in data.further} - {*with_it, axis.name}
     caption = (
         "Means with 95 % intervals. The profiles have the same phases in every cell (paired): "
-        "differences between cells are as a rule known better than overlapping bars suggest. A "
-        "caret at 0 marks an interval that goes on below."
+        "differences between cells are as a rule known better than overlapping bars suggest. "
+        + _CARET
     )
     if further or len(data.works_of_adhesion) > 1:
         of_each = "each value of the other axis" if further else "each γ"

@@ -40,12 +40,9 @@ def _shade(axes: Axes, x: Array, low: Array, high: Array, k: int) -> None:
     points = np.stack([x, low, high], axis=1)[known]
     ends = np.stack([points[:-1], points[1:]])
     back = ends[0, :, 0] > ends[1, :, 0]
-    ends[:, back] = ends[
-        ::-1, back
-    ]  # all quadrilaterals turn one way, so that none cancels another
-    corners = [
-        end[:, [0, side]] for end, side in zip(ends[[0, 1, 1, 0]], (1, 1, 2, 2), strict=True)
-    ]
+    ends[:, back] = ends[::-1, back]  # all quadrilaterals turn one way: none cancels another
+    (left, right), low_end, high_end = ends, [0, 1], [0, 2]
+    corners = (left[:, low_end], right[:, low_end], right[:, high_end], left[:, high_end])
     path = Path.make_compound_path_from_polys(np.stack(corners, axis=1))
     axes.add_patch(PathPatch(path, color=style.colour(k), alpha=0.15, linewidth=0))
 

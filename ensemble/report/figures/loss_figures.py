@@ -166,10 +166,7 @@ def jump_energies(data: Aggregate) -> style.PublishedFigure:
     figure.label("energy drop of one jump (J/m²)", "jumps per loop and decade")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
-    handles = [
-        style.key(gamma_label(g), color=style.colour(k), linestyle=style.LINES[k])
-        for k, g in style.shown_gammas(data)
-    ]
+    handles = [style.key(gamma_label(g), **style.line(k)) for k, g in style.shown_gammas(data)]
     figure.legend_above(handles, len(handles))
     return figure
 
@@ -183,9 +180,8 @@ def _jump_density(axes: Axes, cell: AveragedCell, small: bool, k: int, part: sli
     band: Any = {"fill": True, "color": style.colour(k), "alpha": 0.1, "linewidth": 0, "label": "_"}
     axes.stairs((density + scatter)[part], edges, baseline=below, **band)
     shown = np.where(density > 0, density, np.nan)[part]
-    line: Any = {"color": style.colour(k), "linestyle": style.LINES[k], "linewidth": 1.4}
-    label = gamma_label(cell.work_of_adhesion)
-    axes.stairs(shown, edges, baseline=None, label=label, **line)
+    label: Any = {"baseline": None, "label": gamma_label(cell.work_of_adhesion)}
+    axes.stairs(shown, edges, linewidth=1.4, **label, **style.line(k))
 
 
 def pull_off(data: Aggregate) -> style.PublishedFigure:

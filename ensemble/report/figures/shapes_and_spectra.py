@@ -119,14 +119,14 @@ def gap_density(data: Aggregate) -> style.PublishedFigure:
                 values = cell.fields.gap_density[b, k][1:-1]
                 if np.any(values > 0):
                     y, depth = np.where(values > 0, values, np.nan), cell.plan.penetration[k]
-                    line: Any = {"color": style.colour(place), "linestyle": style.LINES[place]}
-                    axes.plot(GAP_BINS[1:-1], y, label=f"{depth:.2f}", **line)
+                    axes.plot(GAP_BINS[1:-1], y, label=f"{depth:.2f}", **style.line(place))
             style.label_panel(axes, f"{cell_label(cell)}, {branch}")
     for axes in figure.panels:
         axes.set(xscale="log", yscale="log")
         axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
     figure.label(r"gap $t/h_\mathrm{max}$", r"density of $t/h_\mathrm{max}$")
-    figure.legend_above(_penetration_handles(data, chosen, markers=False), len(chosen))
+    looks = [style.line(place) for place in range(len(chosen))]
+    figure.legend_above(_penetration_handles(data, chosen, looks), len(chosen))
     return figure
 
 
@@ -163,14 +163,14 @@ def shown_penetrations(data: Aggregate, most: int) -> list[int]:
 def _spectra_of_branch(data: Aggregate, b: int) -> style.PublishedFigure:
     """Spectral densities on one branch, a panel for each H."""
     chosen = shown_penetrations(data, 3)
-    looks = [{**style.look(n), "linestyle": style.LINES[n]} for n in range(len(chosen))]
+    looks = [style.look(n) | style.line(n) for n in range(len(chosen))]
     panels: list[Panel] = []
     for hurst in style.spread_out(data.hursts, style.MOST_PANELS):
         (cell,) = nearest(data.finished([hurst], data.works_of_adhesion), paper.FIGURE_5) or (None,)
         depths = [] if cell is None else [f"{cell.plan.penetration[k]:.2f}" for k in chosen]
         lines = [(b, *line) for line in zip(chosen, depths, looks, strict=False)]
         panels.append((cell, "", lines))
-    return _spectra(panels, _penetration_handles(data, chosen))
+    return _spectra(panels, _penetration_handles(data, chosen, looks))
 
 
 def _spectra(panels: Sequence[Panel], handles: list[Line2D]) -> style.PublishedFigure:
@@ -228,7 +228,7 @@ def _draw_shape(
 
 
 def _penetration_handles(
-    data: Aggregate, chosen: list[int], *, markers: bool = True
+    data: Aggregate, chosen: list[int], looks: list[dict[str, Any]]
 ) -> list[Line2D]:
     # Where the largest penetration varies with H or γ, only its share is the same for all.
     tops = {cell.campaign.cycle.turning_point for cell in data.cells}
@@ -237,12 +237,8 @@ def _penetration_handles(
         unit = r"\Delta/\Delta"
     penetration = (data.cells[0].plan if len(tops) == 1 else field_plan(data.campaign)).penetration
     return [
-        style.key(
-            rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
-            **{**style.look(place), "linestyle": style.LINES[place]}
-            | ({} if markers else {"marker": ""}),
-        )
-        for place, k in enumerate(chosen)
+        style.key(rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}", **look)
+        for k, look in zip(chosen, looks, strict=True)
     ]
 
 

@@ -29,7 +29,6 @@ from adhesis.ensemble.aggregate.average import Aggregate, AveragedCell
 from adhesis.ensemble.outputs import whole_file
 from adhesis.solver.checks import counted, shown
 
-STYLE = Path(__file__).parent / "adhesis.mplstyle"
 Shown = TypeVar("Shown")
 
 MM = 1 / 25.4  # inches
@@ -71,13 +70,18 @@ _LOOKS = (
 @contextmanager
 def style() -> Iterator[None]:
     """Use the style file inside the block only."""
-    with mpl.rc_context(fname=str(STYLE)):
+    with mpl.rc_context(fname=str(Path(__file__).with_name("adhesis.mplstyle"))):
         yield
 
 
 def look(k: int) -> dict[str, Any]:
     """Return colour and marker of the k-th curve of a panel, as options of matplotlib."""
     return {"color": colour(k), "marker": _LOOKS[k % len(_LOOKS)][1]}
+
+
+def line(k: int) -> dict[str, Any]:
+    """Return colour and line style of the k-th curve of a panel, as options of matplotlib."""
+    return {"color": colour(k), "linestyle": LINES[k]}
 
 
 def colour(k: int) -> str:

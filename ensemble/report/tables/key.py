@@ -12,18 +12,16 @@ from adhesis.ensemble.report.tables.table import Format, TableColumn, number
 _SIGNS = {"hurst": "H", "work_of_adhesion": "γ"}
 
 
-def key_columns(data: Aggregate, cell: str = "") -> list[TableColumn]:
-    """Return the columns of what a row is about: H, γ, and every further axis.
-
-    ``cell`` is the path to the cell, "cell.", if a row is not about the cell itself.
-    """
-    return [axis_column(axis, cell) for axis in data.campaign.axes]
+def key_columns(data: Aggregate) -> list[TableColumn]:
+    """Return the columns of the cell that a row is about: H, γ, and every further axis."""
+    return [axis_column(axis) for axis in data.campaign.axes]
 
 
 def axis_column(axis: Axis, cell: str = "", suffix: str = "", heading: str = "") -> TableColumn:
     """Return the column of an axis, for people in the unit of the campaign.
 
-    ``cell`` as in :func:`key_columns`; ``suffix`` and ``heading`` tell two cells of a row apart.
+    Of two cells of a row, ``cell`` is the path ("upper."), ``suffix`` and ``heading`` tell them
+    apart.
     """
     shown, size = common_unit(axis.name, axis.values)
     unit = UNITS.get(axis.name, "").replace("²", "^2")

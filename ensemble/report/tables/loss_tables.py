@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.cells import Cell, alike
 from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
@@ -299,12 +299,9 @@ def profiles(data: Aggregate) -> Table:
         TableColumn("m2_paper", _papers_m2, "m2, paper", number(2), only_if_any=True),
         *estimated("m4", "mean", "m4 (1/µm²)", size=1e12),
     ]
-    best: dict[tuple[float, ...], Cell] = {}  # all cells of a key have the same profiles
-    for cell in data.cells:
-        at = tuple(cell.at[axis.name] for axis in of_profiles)
-        if at not in best or cell.done > best[at].done:
-            best[at] = cell
-    return make_table("Profiles", columns, best.values())
+    same_profiles = alike(data.cells, {a.name for a in data.campaign.axes if a not in of_profiles})
+    best = (max(cells, key=lambda cell: cell.done) for cells in same_profiles.values())
+    return make_table("Profiles", columns, best)
 
 
 def companions(data: Aggregate) -> Table:
@@ -316,24 +313,20 @@ def companions(data: Aggregate) -> Table:
             lambda row: "; ".join(row["companion"].differs) or "nothing",
             "where it differs",
         ),
-        *key_columns(data, "cell."),
+        *key_columns(data),
         TableColumn("pairs", "loss.difference.n", "pairs"),
         TableColumn("loss_dimensionless_here", "loss.here.mean", "W~ here", number()),
         TableColumn("loss_dimensionless_there", "loss.there.mean", "there", number()),
         *estimated("difference", _DIFFERENCE, "difference", number(3), of="loss.difference"),
-        TableColumn(
-            "loss_dimensionless_paper",
-            lambda row: paper.table_1(row["cell"]) if paper.is_cell_of(row["other"]) else None,
-            *("paper", fixed(2)),
-            only_if_any=True,
-        ),
+        TableColumn("loss_dimensionless_paper", "paper", "paper", fixed(2), only_if_any=True),
     ]
-    rows = [
-        {"companion": companion, "cell": cell, "other": companion.like(cell), "loss": loss}
-        for companion in data.companions
-        for cell in data.cells
-        if (loss := difference(cell, companion.like(cell))) is not None
-    ]
+    rows = []
+    for companion in data.companions:
+        for cell in data.cells:
+            other = companion.like(cell)
+            if other is not None and (loss := difference(cell, other)) is not None:
+                value = paper.table_1(cell) if paper.is_cell_of(other) else None
+                rows.append({"companion": companion, "at": cell.at, "loss": loss, "paper": value})
     return make_table("Beside other campaigns", columns, rows)
 
 

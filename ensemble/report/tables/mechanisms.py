@@ -27,7 +27,7 @@ def jumps(data: Aggregate) -> Table:
     """One row for each cell and kind: how many jumps, and their share of all drops."""
     rows = [
         {
-            "cell": cell,
+            "at": cell.at,
             "kind": JUMP_KINDS[k],
             "scale": "small" if SMALL[k] else "large",
             "number": float(cell.jumps.number[k]) / cell.done,
@@ -38,7 +38,7 @@ def jumps(data: Aggregate) -> Table:
         for k in np.flatnonzero(cell.jumps.number).tolist()
     ]
     columns = [
-        *key_columns(data, "cell."),
+        *key_columns(data),
         TableColumn("kind", "kind", "kind"),
         TableColumn("scale", "scale", "scale"),
         TableColumn("jumps_per_loop", "number", "jumps a loop", number(3)),
@@ -83,14 +83,16 @@ def mechanisms(data: Aggregate) -> Table:
 def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
     columns = [
-        *key_columns(data, "cell."),
+        *key_columns(data),
         TableColumn("branch", "branch", "branch"),
         TableColumn("penetration", "penetration", state_sign(data), fixed(2)),
         TableColumn("realisations", "realisations", "n"),
         TableColumn("slope", "slope", "slope", fixed(2)),
         TableColumn("slope_sem", "error", "s.e.", number(1)),
-        TableColumn("slope_persson", lambda row: -(2 + row["cell"].hurst), "-(2+H)", fixed(2)),
-        TableColumn("slope_profile", lambda row: -(2 * row["cell"].hurst + 1), "-(2H+1)", fixed(2)),
+        TableColumn("slope_persson", lambda row: -(2 + row["at"]["hurst"]), "-(2+H)", fixed(2)),
+        TableColumn(
+            "slope_profile", lambda row: -(2 * row["at"]["hurst"] + 1), "-(2H+1)", fixed(2)
+        ),
     ]
     rows = []
     for cell in data.cells:
@@ -100,7 +102,7 @@ def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
                 slope, error = fitted_slope(cell.plan, cell.fields.psd_displacement[b, k])
                 rows.append(
                     {
-                        "cell": cell,
+                        "at": cell.at,
                         "branch": branch,
                         "penetration": float(cell.plan.penetration[k]),
                         "realisations": int(cell.fields.in_contact[b, k]),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import compress
 from operator import itemgetter
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from adhesis.ensemble.escape import markdown, markdown_table
 
@@ -90,14 +90,12 @@ class Table:
         shown = sorted(self._shown(), key=itemgetter(0))
         return "; ".join(column.note for _, column in shown if column.note) + "."
 
-    def print(self, stream: IO[str]) -> None:
-        """Print the columns that have a heading as lines, of which no terminal cuts a number."""
+    def __str__(self) -> str:
+        """Return the columns that have a heading as lines, of which no terminal cuts a number."""
         shown = self._texts()
-        widths = [max(len(cell) for cell in column) for column in zip(*shown, strict=True)]
-        print(self.title, file=stream)
-        for row in shown:
-            cells = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))
-            print("  ".join(cells).rstrip(), file=stream)
+        widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
+        lines = ("  ".join(map(str.rjust, row, widths)).rstrip() for row in shown)
+        return "\n".join((self.title, *lines))
 
     def _shown(self) -> list[tuple[int, TableColumn]]:
         """Return the columns for people, each with its place in the rows."""
