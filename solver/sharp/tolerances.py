@@ -51,6 +51,11 @@ EQUAL = 1e-3
 each other may differ and count as equal: of equal edges the first one leads. So much of the largest
 stiffness a mode may have, too, that has softened at a fold: there the error of the field decides
 its sign, and with that losses of equal crests differed by up to 4 %."""
+MOVED_ON = 2.0
+"""λ_min per relative error of the field: so far an edge of one mirrored patch is moved off a fold,
+with two works of adhesion. It stays ahead by that: with 1e-3 λ_min losses were off by up to 13
+times their ``loss_error``. Of several patches one is moved by 1e-3 λ_min still, or that error would
+choose which of them goes first."""
 
 # ---------------------------------------------------------------- nucleation
 

@@ -46,6 +46,16 @@ def test_the_error_of_a_loss_counts_the_whole_way_beyond_a_fold(number):
     assert 0.1 * loop.loss_error < abs(loop.loss - exact.loss) < loop.loss_error
 
 
+def test_the_error_counts_how_a_mirrored_patch_leaves_its_symmetry():
+    """One of its edges goes first, without a jump: the loss was off by four times its error."""
+    profile = Profile(PERIOD, A * np.array([0, 0.24, -0.22, -0.11, 0.05, 0.05, -0.02], complex))
+    problem = Problem(profile, SOLID, 0.042, work_of_adhesion_open=0.0525)
+    path = {"max_penetration": 0.57, "load_steps": 8}
+    loop, exact = (loop_of(problem, accuracy=a, **path) for a in (1e-3, 3e-5))
+    assert (loop.races, loop.patches.max()) == (0, 1)
+    assert abs(loop.loss - exact.loss) < loop.loss_error
+
+
 @pytest.mark.parametrize("depth", [0.3, 0.6])
 @pytest.mark.parametrize("ratio", [1.1, 2.0, 4.0])
 def test_loss_of_a_wave_is_the_closed_form(ratio, depth):

@@ -219,6 +219,8 @@ class StableBranch:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.append(point)
         self.point, self._predictor = point, beyond(point)
+        if self._edges.adhesion.pins:
+            self.smallest_step = self._resolution.jump
 
     def _next_step(self) -> float:
         """Return the next step in d: the leading edge is not to move far, nor the target be passed.

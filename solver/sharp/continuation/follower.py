@@ -32,7 +32,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.crack import Crack, Cracks
 from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation, Touch, locate
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import EQUAL, SECOND_FOLD_DISPLACED
+from adhesis.solver.sharp.tolerances import EQUAL, MOVED_ON, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 
@@ -256,7 +256,11 @@ class Follower:
         self, last: ContactState | None, fold: Fold, target: Target, located: float
     ) -> ComputedJump | None:
         """Compute the jump at a fold; None if it was found too late for its drop."""
-        point = fold.point
+        point, pins = fold.point, self.edges.adhesion.pins
+        refined = located <= self.resolution.field_limit
+        # two works of adhesion keep by how much too late a symmetry was lost
+        if pins and not refined and self.edges.symmetry.is_symmetric(point.gaps):
+            return None
         states: tuple[ContactState, ...] = ()
         if last is None or last.internal.gaps is not point.field.gaps:
             states = (self.states.of_point(point),)
@@ -267,7 +271,7 @@ class Follower:
         after, drop = jump.states[-1], jump.jump.energy_drop
         # a branch that is steep, and does not fold, falls by half of the work that it is late by
         allowed = min(self.resolution.late * max(drop, self.resolution.least_drop), drop)
-        if jump.misplaced > allowed and located > self.resolution.field_limit:
+        if jump.misplaced > allowed and not refined:
             return None
         displaced = self.edges.fold_displacement(point, fold.d - point.d)
         displaced = self.states.work(before, after, displaced)
@@ -310,7 +314,10 @@ class Follower:
         away = positions(point.gaps, self.edges.source.highest)[fastest]
         edge = int(fastest[np.argmin(away)])
         way = np.sign(point.rate[edge] * (fold.d - point.d))
-        moved = self._moved_on(point.gaps, edge, way * self.edges.law.rest_step)
+        length = self.edges.law.rest_step
+        if self.edges.adhesion.pins and len(point.gaps) == 1:  # it stays ahead by as much
+            length = MOVED_ON * self.edges.tolerance * self.edges.wave
+        moved = self._moved_on(point.gaps, edge, way * length)
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
         if saddle is not None:
