@@ -40,9 +40,8 @@ def growth(
             here_there = ("not given" if v is None else shown(v) for v in (value, was))
             other.append(f"{key} is {' here and '.join(here_there)} there")
     if other:
-        raise InputError(
-            f"{path} holds another campaign: {'; '.join(other)} (here: {here}, there: {path})"
-        )
+        keys = "; ".join(other)
+        raise InputError(f"{path} holds another campaign: {keys} (here: {here}, there: {path})")
     return tuple(grown)
 
 
@@ -50,17 +49,14 @@ def _extends(key: str, was: Any, now: Any) -> bool:
     if key in ("sweep.realisations", "stop.most"):
         return bool(now > was)
     if key == "stop.relative_error":
-        return was is not None and now is not None and bool(now < was)
+        return None not in (was, now) and bool(now < was)
     if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not KEYS[key].metadata["axis"]:
         return False
     # All turning points of a profile belong together: they do not become more.
     if key in [f"cycle.{name}" for name in TURNING_POINTS]:
         return False
-    return _values(was) < _values(now)
-
-
-def _values(value: Any) -> set[Any]:
-    return set(value) if isinstance(value, list) else {value}
+    old, new = (set(v) if isinstance(v, list) else {v} for v in (was, now))
+    return old < new
 
 
 def _cells(campaign: Campaign) -> set[Any]:
