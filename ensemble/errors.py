@@ -134,9 +134,8 @@ def parameter(name: str, command: str = "") -> str:
     Of an option that callers from Python do not have, they get the ``command``, too.
     """
     option = f"--{name.replace('_', '-')}"
-    if _of_a_command.get():
-        return option
-    return f"{command} {option}" if command else name
+    outside = f"{command} {option}" if command else name
+    return option if _of_a_command.get() else outside
 
 
 @contextmanager

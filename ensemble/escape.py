@@ -43,8 +43,7 @@ def markdown_table(head: Sequence[str], *rows: Sequence[str], left_columns: int 
 def code_span(text: str) -> str:
     """Quote a text as code in Markdown."""
     text = one_line(text)
-    ticks = fence(text, 1)
-    space = " " if "`" in text else ""
+    ticks, space = fence(text, 1), " " if "`" in text else ""
     return f"{ticks}{space}{text}{space}{ticks}"
 
 

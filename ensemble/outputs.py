@@ -67,9 +67,6 @@ def _check_link(path: Path, link: Path) -> None:
         )
 
 
-# ---------------------------------------------------------------------- before the work
-
-
 def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> None:
     """Refuse outputs, by option, that cannot be written or overwrite a file (InputError)."""
     seen: dict[str, Path] = {}
@@ -84,9 +81,8 @@ def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> No
                     )
             for name, other in seen.items():
                 if _same_file(path, other) and os.path.realpath(path) != os.devnull:
-                    raise InputError(
-                        f"{name} and {option} are both {path}: each output needs a file of its own"
-                    )
+                    rule = "each output needs a file of its own"
+                    raise InputError(f"{name} and {option} are both {path}: {rule}")
         seen[option] = path
 
 
@@ -133,9 +129,8 @@ def _refusing(option: str, path: Path) -> Iterator[None]:
     except InputError:
         raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise refusal(error)(
-            f"{option} is {path}: it cannot be written ({reason(error)})"
-        ) from None
+        why = reason(error)
+        raise refusal(error)(f"{option} is {path}: it cannot be written ({why})") from None
 
 
 def _check_file(option: str, path: Path) -> None:
@@ -159,9 +154,8 @@ def _check_file(option: str, path: Path) -> None:
 
 
 def _check_name(path: Path) -> None:
-    """Let the system refuse a name that is too long (OSError)."""
     with suppress(FileNotFoundError, NotADirectoryError):
-        path.lstat()
+        path.lstat()  # the system refuses a name that is too long (OSError)
 
 
 def _same_file(one: Path, other: Path) -> bool:
@@ -173,9 +167,6 @@ def _same_file(one: Path, other: Path) -> bool:
         if os.path.samefile(one, other):
             return True
     return os.path.realpath(one) == os.path.realpath(other)
-
-
-# ---------------------------------------------------------------------- writing
 
 
 class Writing:

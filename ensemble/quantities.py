@@ -87,9 +87,8 @@ class Quantity:
         """Return the unit of a name ("um" is "µm"), or raise InputError."""
         unit = self.spellings.get(self._compared(name))
         if unit is None:
-            raise InputError(
-                f"{parameter('unit')} is {quoted(name)}: it must be one of {', '.join(self.units)}"
-            )
+            units, option = ", ".join(self.units), parameter("unit")
+            raise InputError(f"{option} is {quoted(name)}: it must be one of {units}")
         return unit
 
     def check(self, number: float) -> None:
@@ -141,40 +140,28 @@ class Quantity:
         return f"{value / self.units[unit]:.{digits}g} {unit}"
 
 
+# Unit, its size in m, and its further names
+_LENGTHS = (
+    ("m", 1.0, "meter meters metre metres метр"),
+    ("cm", 1e-2, "centimeter centimeters centimetre centimetres zentimeter"),
+    ("mm", 1e-3, "millimeter millimeters millimetre millimetres millimètre millimètres мм 毫米"),
+    ("µm", 1e-6, "um micron microns micrometer micrometers micrometre micrometres mikrometer"),
+    ("µm", 1e-6, "мкм 微米"),
+    ("nm", 1e-9, "nanometer nanometers nanometre nanometres нм 纳米"),
+    ("Å", 1e-10, "a angstrom angstroms ångström angström angstroem"),
+    ("inch", 25.4e-3, "in inches zoll pouce pouces дюйм 英寸"),
+    ("mil", 25.4e-6, "mils thou"),
+    ("µin", 25.4e-9, "uin uinch µinch microinch microinches"),
+)
 LENGTH = Quantity(
     "length",
-    {
-        "m": 1.0,
-        "cm": 1e-2,
-        "mm": 1e-3,
-        "µm": 1e-6,
-        "nm": 1e-9,
-        "Å": 1e-10,
-        "inch": 25.4e-3,
-        "mil": 25.4e-6,
-        "µin": 25.4e-9,
-    },
+    {unit: size for unit, size, _ in _LENGTHS},
     "2 mm",
     "a length, as in 5e-6 (m) or 0.5um",
     ("m", "mm", "µm", "nm"),
     1.0,
     'as in "{0}um" ("{0}m", if metres are meant)',
-    {
-        name: unit
-        for unit, names in {
-            "m": "meter meters metre metres метр",
-            "cm": "centimeter centimeters centimetre centimetres zentimeter",
-            "mm": "millimeter millimeters millimetre millimetres millimètre millimètres мм 毫米",
-            "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer мкм "
-            "微米",
-            "nm": "nanometer nanometers nanometre nanometres нм 纳米",
-            "Å": "a angstrom angstroms ångström angström angstroem",
-            "inch": "in inches zoll pouce pouces дюйм 英寸",
-            "mil": "mils thou",
-            "µin": "uin uinch µinch microinch microinches",
-        }.items()
-        for name in names.split()
-    },
+    {name: unit for unit, _, names in _LENGTHS for name in names.split()},
 )
 HEIGHT = replace(LENGTH, largest=1e-3)
 """A height of a roughness."""
@@ -217,39 +204,32 @@ _WHOLE = re.compile(r"[+\-]?\d+")
 _DIGITS = re.compile(r"(\d+)(?![\d.])(e[+\-]?\d+)?(.*)", re.IGNORECASE)
 
 
-def words_of(option: str, text: str) -> list[str]:
-    """Return the words of an option that is a list, such as "0.3,0.6".
+def read_list(
+    option: str,
+    text: str,
+    read: Callable[[str], float] = float,
+    rule: str = "",
+    given: str | None = None,
+) -> tuple[float, ...]:
+    """Read the numbers of an option that is a list, such as "0.3,0.6" (InputError).
 
-    A whole number, a comma and digits can be one number with a decimal comma, and are refused
-    (InputError). A list of whole numbers has decimals ("1.0,5.0") or blanks ("1, 5").
+    A whole number, a comma and digits can be one number with a decimal comma, and are refused. A
+    list of whole numbers has decimals ("1.0,5.0") or blanks ("1, 5"). ``rule`` says what the list
+    must be, for a ``read`` whose ValueError has no sentence; ``given`` is the option as it was
+    given, if it holds more than the list.
     """
+    given = quoted(text if given is None else given)
     words = text.split(",")
     for whole, rest in pairwise(words):
         found = _DIGITS.fullmatch(rest)
         if _WHOLE.fullmatch(whole.strip()) and found is not None:
             digits, exponent, unit = found.groups("")
             raise InputError(
-                f"{option} is {quoted(text)}: numbers have a decimal point, as in {whole}.{rest}; "
-                f"if two are meant, write {float(whole):.1f}{unit},{int(digits)}.0{exponent}{unit}"
+                f"{option} is {given}: numbers have a decimal point, as in {whole}.{rest}; if two "
+                f"are meant, write {float(whole):.1f}{unit},{int(digits)}.0{exponent}{unit}"
             )
-    return [word.strip() for word in words]
-
-
-def read_words(
-    option: str,
-    words: Sequence[str],
-    read: Callable[[str], float] = float,
-    rule: str = "",
-    text: str | None = None,
-) -> tuple[float, ...]:
-    """Read the numbers of an option that is a list (InputError).
-
-    ``rule`` says what the list must be, for a ``read`` whose ValueError has no sentence; ``text``
-    is the option as it was given, if it holds more than the words.
-    """
-    given = quoted(",".join(words) if text is None else text)
     try:
-        numbers = tuple(read(word) for word in words)
+        numbers = tuple(read(word.strip()) for word in words)
     except InputError as error:
         raise InputError(f"{option} {error}") from None
     except ValueError:

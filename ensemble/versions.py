@@ -7,6 +7,7 @@ import platform
 import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -61,30 +62,21 @@ def installed() -> dict[str, str]:
     }
 
 
-def first_lines(text: str) -> str:
-    """Join the first four lines of a message that hold letters or digits, as a launcher's page."""
-    return _joined(text, slice(4))
+LAST = slice(-2, None)
 
 
-def last_lines(text: str) -> str:
-    """Join the last two lines of a message that hold letters or digits."""
-    return _joined(text, slice(-2, None))
-
-
-def _joined(text: str, chosen: slice) -> str:
-    lines = [" ".join(line.split()) for line in text.splitlines()]
+def gist(text: object, lines: slice = LAST) -> str:
+    """Join some lines of a message that hold letters or digits, by default the last two."""
+    joined = [" ".join(line.split()) for line in str(text).splitlines()]
     # A launcher's message ends with rulers and empty lines.
-    filled = [line for line in lines if any(c.isalnum() for c in line)]
-    return " / ".join(filled[chosen])[:300] or "no message"
+    filled = [line for line in joined if any(c.isalnum() for c in line)]
+    return " / ".join(filled[lines])[:300] or "no message"
 
 
 def commit() -> str:
     """Return the commit that this code runs from or was built from; or "unknown"."""
-    known = _checked_out()
-    if known is None:
-        built = Path(__file__).with_name("commit.txt")  # CMake writes it into what it builds
-        known = built.read_text().strip() if built.exists() else "unknown"
-    return known
+    built = Path(__file__).with_name("commit.txt")  # CMake writes it into what it builds
+    return _checked_out() or (built.read_text().strip() if built.exists() else "unknown")
 
 
 def _checked_out() -> str | None:
@@ -128,12 +120,11 @@ def _mpi() -> str:
 
 def processor() -> str:
     """Return the name of this processor, as the system knows it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:  # not Linux
-        lines = []
-    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(named, platform.processor() or platform.machine())
+    with suppress(OSError):  # not Linux
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
 
 
 def _kernels() -> str:
@@ -160,7 +151,7 @@ def _or_reason(text: Callable[[], str]) -> str:
     try:
         return text()
     except (ImportError, RuntimeError, OSError, AttributeError) as error:
-        return f"does not load: {last_lines(str(error))}"
+        return f"does not load: {gist(error)}"
 
 
 def _short(library: str) -> str:

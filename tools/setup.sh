@@ -353,9 +353,9 @@ required adhesis
 import_all() {
     "$venv/bin/python" -c '
 from importlib import import_module
-from adhesis.ensemble.command.main import COMMANDS, module_of
+from adhesis.ensemble.command.main import COMMANDS
 for name in COMMANDS:
-    import_module(module_of(name))
+    import_module(f"adhesis.ensemble.command.{name}")
 import adhesis.ensemble.bench.benchmark, adhesis.solver.validate.claims
 import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, rich.progress, xarray'
 }

@@ -19,7 +19,7 @@ from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
 from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
-from adhesis.ensemble.task.fields import FieldPlan, field_plan
+from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.ensemble.task.row import JUMP_COUNT, NUMBERS, TIMES
 from adhesis.solver.loading.zero_range import RANGES, least_range
 from adhesis.solver.model import problem
@@ -219,7 +219,7 @@ def read_cells(results: Results) -> list[Cell]:
                 others=task.others,
                 campaign=of_cell,
                 penetration=campaign.curve_axes(task),
-                plan=field_plan(campaign, task),
+                plan=FieldPlan(campaign, task),
                 **{name: int(np.sum(of_rows == code)) for name, code in COUNTS.items()},
                 rows=rows,
                 seed=seed[rows],

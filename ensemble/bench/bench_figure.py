@@ -30,9 +30,8 @@ def draw(lines: Sequence[Line]) -> Figure:
     columns = min(len(scenes), _PANELS_IN_A_ROW)
     rows = math.ceil(len(scenes) / columns)
     with style.style():
-        figure = style.new_figure(
-            rows, columns, style.TWO_COLUMNS, 8 * style.MM + rows * _PANEL_HEIGHT
-        )
+        height = 8 * style.MM + rows * _PANEL_HEIGHT
+        figure = style.new_figure(rows, columns, style.TWO_COLUMNS, height)
         shown: dict[str, Line2D] = {}
         finished = [line for line in lines if math.isfinite(line.error)]
         for axes, scene in zip(figure.axes, scenes, strict=False):
@@ -61,21 +60,15 @@ def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
     errors = [_plotted_error(line) for line in lines]
     (drawn,) = axes.plot(seconds, errors, label=method, **_LOOKS[method])
     for number, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
-        # Left below for sharp; right for the others, alternately above and below, as they lie
-        # close.
+        # Left below for sharp; right for grid, alternately above and below, as its runs lie close.
         left = method == "sharp"
         below = left or number % 2 == 1
-        ha, va = ("right" if left else "left"), ("top" if below else "bottom")
-        look_of_text: Any = {"ha": ha, "va": va, "fontsize": 5, "color": "0.25"}
-        aside = (-3 if left else 3, -3 if below else 3)
-        axes.annotate(_short(line), (x, y), aside, textcoords="offset points", **look_of_text)
+        look: Any = {"ha": "right" if left else "left", "va": "top" if below else "bottom"}
+        look |= {"textcoords": "offset points", "fontsize": 5, "color": "0.25"}
+        setting = f"{line.run.setting:{'.0e' if left else 'g'}}".replace("e-0", "e-")
+        axes.annotate(setting, (x, y), (-3 if left else 3, -3 if below else 3), **look)
     return drawn
 
 
 def _plotted_error(line: Line) -> float:
     return max(abs(line.error), _MIN_ERROR)
-
-
-def _short(line: Line) -> str:
-    setting = line.run.setting
-    return f"{setting:.0e}".replace("e-0", "e-") if line.run.method == "sharp" else f"{setting:g}"

@@ -75,10 +75,9 @@ def benchmark(scenes: Sequence[Scene], *, seconds: float) -> Iterator[Line]:
         reference, before = _reference(scene, seconds), 0.0
         for nodes in scene.grids:
             run = Run(scene, "grid", nodes, scene.load_steps, seconds)
+            measured = Measurement(note=f"left out: it would take more than {seconds:g} s")
             if before * _COST_OF_DOUBLING <= seconds:
                 measured = measure(run)
-            else:
-                measured = Measurement(note=f"left out: it would take more than {seconds:g} s")
             before = measured.cpu_seconds  # NaN if the run did not finish
             yield Line(run, reference, measured)
         for accuracy in scene.accuracies:

@@ -18,20 +18,13 @@ from dataclasses import asdict, dataclass, replace
 from time import process_time
 
 from adhesis.ensemble.bench.scenes import SMALL_ROUGH, Scene
-from adhesis.ensemble.run.launch import (
-    ONE_THREAD,
-    end_with_parent,
-    peak_bytes,
-    python,
-    python_environment,
-)
+from adhesis.ensemble.run import launch
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.registry import MethodName, make_method
 
 _SOLUTIONS = {"grid": "solves", "sharp": "fields"}
-# Accuracy of the load path of ``grid``: it costs little and leaves the nodes as the source of
-# error.
+# Of the load path of ``grid``: it costs little and leaves the nodes as the source of error.
 _GRID_ACCURACY = 1e-3
 _WARM_UP = {"grid": 8, "sharp": 1e-2}
 # CPU seconds for start and warm-up, before the limit of the run applies.
@@ -60,17 +53,14 @@ class Measurement:
     """Cost and result of a run; NaN and zero if it did not finish."""
 
     cpu_seconds: float = float("nan")  # time from the problem to the finished loop
-    # megabytes, megabytes_before: largest resident memory of the process, and the same before the
-    # loop: interpreter, libraries
-    megabytes: float = float("nan")
-    megabytes_before: float = float("nan")
+    megabytes: float = float("nan")  # largest resident memory of the process
+    megabytes_before: float = float("nan")  # the same before the loop: interpreter, libraries
     loss: float = float("nan")  # loop integral in J/m² of nominal area
     loss_dimensionless: float = float("nan")  # W~
     audit_residual: float = float("nan")  # (loop integral - sum of drops) / loop integral
     solutions: int = 0  # number of elastic solutions for given edges or contact sets
-    # jumps, patches: number of jumps, and most patches at a time
     jumps: int = 0
-    patches: int = 0
+    patches: int = 0  # most at a time
     note: str = ""  # reason why the run did not finish; else empty
 
 
@@ -80,13 +70,9 @@ def measure(run: Run) -> Measurement:
     A run that fails or takes too long is a :class:`Measurement` with a note, not an exception.
     """
     # One thread: on matrices of a few dozen rows, threads of the linear algebra only add CPU time.
-    child = subprocess.run(
-        python("-m", "adhesis.ensemble.bench.measure", pickle.dumps(run).hex()),
-        env=python_environment() | ONE_THREAD,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = launch.python("-m", "adhesis.ensemble.bench.measure", pickle.dumps(run).hex())
+    environment = launch.python_environment() | launch.ONE_THREAD
+    child = subprocess.run(command, env=environment, capture_output=True, text=True)
     if child.returncode == -signal.SIGXCPU:
         return Measurement(note=f"given up after {run.seconds:g} s")
     if child.returncode:
@@ -101,12 +87,12 @@ def main() -> None:
     _limit(_START_LIMIT)
     # Touch, jumps, merging and vanishing in well below a second: a method loads all it uses.
     _loop(replace(run, scene=SMALL_ROUGH, setting=_WARM_UP[run.method], load_steps=4))
-    before = peak_bytes()
+    before = launch.peak_bytes()
     _limit(run.seconds)
     started = process_time()
     loop = _loop(run)
     measured = Measurement(
-        *(process_time() - started, max(before, peak_bytes()) / _MB, before / _MB),
+        *(process_time() - started, max(before, launch.peak_bytes()) / _MB, before / _MB),
         *(loop.loss, loop.loss_dimensionless, loop.audit_residual),
         solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
         jumps=len(loop.jumps),
@@ -131,5 +117,5 @@ def _limit(seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    end_with_parent()
+    launch.end_with_parent()
     main()

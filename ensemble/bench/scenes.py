@@ -39,9 +39,8 @@ class Scene:
     problem: Callable[[], Problem]
     max_penetration: float = 0.9
     load_steps: int = 40  # steps from first touch to ``max_penetration`` (Δ~max)
-    # Lower bounds of the nodes per shortest wave, coarse to fine
-    grids: tuple[int, ...] = (8, 16, 32, 64)
-    # Requested accuracies of the loss, low to high
+    grids: tuple[int, ...] = (8, 16, 32, 64)  # lower bounds of the nodes per shortest wave
+    # Of the loss
     accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
     # Accuracies of the reference run of ``sharp``, best first; the first that succeeds is used.
     # Empty if the loss is known exactly.

@@ -41,9 +41,8 @@ def growth(
             here_there = ("not given" if v is None else shown(v) for v in (value, was))
             other.append(f"{key} is {' here and '.join(here_there)} there")
     if other:
-        raise InputError(
-            f"{path} holds another campaign: {'; '.join(other)} (here: {here}, there: {path})"
-        )
+        keys = "; ".join(other)
+        raise InputError(f"{path} holds another campaign: {keys} (here: {here}, there: {path})")
     return tuple(grown)
 
 
@@ -51,7 +50,7 @@ def _extends(key: str, was: Any, now: Any) -> bool:
     if key in ("sweep.realisations", "stop.most"):
         return bool(now > was)
     if key == "stop.relative_error":
-        return was is not None and now is not None and bool(now < was)
+        return None not in (was, now) and bool(now < was)
     if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not KEYS[key].metadata["axis"]:
         return False
     # All turning points of a profile belong together: they do not become more.

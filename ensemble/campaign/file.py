@@ -29,6 +29,7 @@ from adhesis.solver.registry import check_law, check_nodes
 _LONGEST_TEXT = 60_000
 _MOST_TASKS = 10_000_000
 _LONGEST_AXIS = 1_000_000
+_IN_CELLS = "in every cell of the sweep (zip joins lists whose values belong together)"
 
 
 def load_campaign(path: Path | str) -> Campaign:
@@ -80,9 +81,9 @@ def parse_campaign(text: str, source: str = "campaign", *, is_stored: bool = Fal
         campaign = _campaign_of(document, text)
         if not is_stored:
             _check_lists(campaign, document)
+        return campaign
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
-    return campaign
 
 
 def _campaign_of(document: dict[str, Any], text: str) -> Campaign:
@@ -197,27 +198,22 @@ def _check_zip(sweep: SweepTable, lists: dict[str, tuple[float, ...]]) -> None:
     length = {key.partition(".")[2]: len(values) for key, values in lists.items()}
     length |= {"hurst": len(sweep.hurst), "work_of_adhesion": len(sweep.work_of_adhesion)}
     for group in sweep.zip:
-        for name in group:
-            if name not in length:
-                raise InputError(
-                    f"[sweep] zip names {shown(name)}: it must name keys that are lists "
-                    f"of several values, here {', '.join(sorted(length))}"
-                )
+        for name in sorted(set(group) - length.keys()):
+            raise InputError(
+                f"[sweep] zip names {shown(name)}: it must name keys that are lists of several "
+                f"values, here {', '.join(sorted(length))}"
+            )
         if len({length[name] for name in group}) > 1:
             lengths = ", ".join(f"{name} {length[name]}" for name in group)
-            raise InputError(
-                f"[sweep] zip joins lists of different lengths ({lengths}): they must have as many "
-                "values each"
-            )
+            rule = "they must have as many values each"
+            raise InputError(f"[sweep] zip joins lists of different lengths ({lengths}): {rule}")
 
 
 def _check_together(campaign: Campaign) -> None:
     profile, cycle = campaign.profile, campaign.cycle
-    given = list(profile.normalisation)
-    if campaign.task_count > _MOST_TASKS:
-        raise InputError(
-            f"[sweep] makes {campaign.task_count} tasks: it must make at most {_MOST_TASKS}"
-        )
+    given, count = list(profile.normalisation), campaign.task_count
+    if count > _MOST_TASKS:
+        raise InputError(f"[sweep] makes {count} tasks: it must make at most {_MOST_TASKS}")
     _check_turning_point(campaign)
     if len(given) != 1:
         raise InputError(
@@ -232,34 +228,25 @@ def _check_together(campaign: Campaign) -> None:
         )
     _check_stripes(campaign)
     pins, solver = _check_open(campaign), campaign.solver
-    try:
-        check_law(solver.method, solver.nodes_per_wave, pins=pins, has_range=material.opens)
-    except ValueError as error:
-        raise InputError(f"[solver] {error}") from None
-    waves = campaign.finest_harmonic
-    if waves > MOST_WAVES:
-        raise InputError(
-            f"[profile] n0 · ratio is {waves}: it must be at most {MOST_WAVES} harmonics"
-        )
+    waves, most = campaign.finest_harmonic, MOST_WAVES
+    if waves > most:
+        raise InputError(f"[profile] n0 · ratio is {waves}: it must be at most {most} harmonics")
     for ratio, rolloff in campaign.in_cells("profile.ratio", "profile.rolloff"):
         if rolloff > ratio:
-            raise InputError(
-                f"[profile] rolloff is {rolloff:g}: it must be at most ratio ({ratio}) in every "
-                "cell of the sweep (zip joins lists whose values belong together)"
-            )
+            rule = f"at most ratio ({ratio}) {_IN_CELLS}"
+            raise InputError(f"[profile] rolloff is {rolloff:g}: it must be {rule}")
     _check_slopes(campaign)
-    if campaign.solver.nodes_per_wave is not None:
-        try:
-            check_nodes(campaign.solver.nodes_per_wave, waves)
-        except ValueError as error:
-            raise InputError(f"[solver] {error}") from None
-    if (
-        campaign.stop.relative_error is not None
-        and campaign.stop.most < campaign.sweep.realisations
-    ):
+    try:
+        check_law(solver.method, solver.nodes_per_wave, pins=pins, has_range=material.opens)
+        if solver.nodes_per_wave is not None:
+            check_nodes(solver.nodes_per_wave, waves)
+    except ValueError as error:
+        raise InputError(f"[solver] {error}") from None
+    stop, first = campaign.stop, campaign.sweep.realisations
+    if stop.relative_error is not None and stop.most < first:
         raise InputError(
-            f"[stop] most is {campaign.stop.most}: it must be at least realisations, the "
-            f"number that every cell gets ({campaign.sweep.realisations})"
+            f"[stop] most is {stop.most}: it must be at least realisations, the number that every "
+            f"cell gets ({first})"
         )
     for holds, where, turn in (
         (campaign.has_axis("max_penetration"), "beside several max_penetration", "each"),
@@ -311,17 +298,15 @@ def _check_open(campaign: Campaign) -> bool:
             least = f"at least the work of adhesion, {at_least(gamma, 6)}"
             rule = least if gamma else "left out, as γ is 0"
             raise InputError(
-                f"[material] work_of_adhesion_open is {found:g}: it must be {rule}, in "
-                "every cell of the sweep (zip joins lists whose values belong together)"
+                f"[material] work_of_adhesion_open is {found:g}: it must be {rule}, {_IN_CELLS}"
             )
-    if all(found == gamma for gamma, found in works):
-        return False
-    if material.opens:
+    pins = any(found != gamma for gamma, found in works)
+    if pins and material.opens:
         raise InputError(
             "[material] gives work_of_adhesion_open and a range or strength: at most "
             "one of them can be given, as edges of two works of adhesion have no range"
         )
-    return True
+    return pins
 
 
 def _check_slopes(campaign: Campaign) -> None:
@@ -337,10 +322,8 @@ def _check_slopes(campaign: Campaign) -> None:
         try:
             check_slope(math.sqrt(self_affine_profile(hurst, seed=0, **spectrum).m2))
         except ValueError as error:
-            raise InputError(
-                f"[profile] {norm} is {shown(spectrum[norm])} with period "
-                f"{shown(spectrum['period'])}, so the {error}"
-            ) from None
+            given = f"{shown(spectrum[norm])} with period {shown(spectrum['period'])}"
+            raise InputError(f"[profile] {norm} is {given}, so the {error}") from None
 
 
 def _check_turning_point(campaign: Campaign) -> None:

@@ -17,7 +17,7 @@ class Rule:
     """Rule for a value."""
 
     text: str  # the rule in words, after "it must be"
-    # Returns the value as it will be used; ValueError if it breaks the rule
+    # Returns the value as it will be used; TypeError or ValueError if it breaks the rule
     read: Callable[[object], Any]
     bounds: Bounds | None = None  # of the number, or of each one of a list
 
@@ -27,7 +27,7 @@ class Rule:
             return self.read(value)
         except UnitError as error:
             raise InputError(f"{where} {error}") from None
-        except ValueError:
+        except (TypeError, ValueError):
             raise InputError(f"{where} is {shown(value)}: it must be {self.text}") from None
 
 
@@ -46,9 +46,7 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
     def read(value: object) -> float:
         if quantity is not None and isinstance(value, str):
             value = quantity.read_with_unit(value)
-        # TOML has numbers of two types and bool; Python takes the latter for a number too.
-        kinds = int if bounds.whole else int | float
-        if isinstance(value, bool) or not isinstance(value, kinds):
+        if bounds.whole and isinstance(value, float):  # to the solver 10.0 is a whole number
             raise ValueError
         number = (checks.whole if bounds.whole else checks.real)("", value, bounds)
         if isinstance(value, Written):
@@ -61,20 +59,10 @@ def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
     return Rule(bounds.text + example, read, bounds)
 
 
-def whole_number(least: int, most: int = 2**63 - 1) -> Rule:
-    """Least ≤ value ≤ most, an integer."""
-    return number_in(Bounds(least, most, whole=True))
-
-
 def choice(*names: str) -> Rule:
     """One of the names."""
-
-    def read(value: object) -> str:
-        if not isinstance(value, str) or value not in names:
-            raise ValueError
-        return value
-
-    return Rule("one of " + ", ".join(f'"{name}"' for name in names), read)
+    text = "one of " + ", ".join(f'"{name}"' for name in names)
+    return Rule(text, lambda value: checks.choice("", value, names))
 
 
 def list_of(rule: Rule, *, may_be_empty: bool = False) -> Rule:

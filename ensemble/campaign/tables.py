@@ -16,14 +16,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.rules import (
-    Rule,
-    choice,
-    list_of,
-    list_of_names,
-    number_in,
-    whole_number,
-)
+from adhesis.ensemble.campaign.rules import Rule, choice, list_of, list_of_names, number_in
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.quantities import HEIGHT
 from adhesis.solver import checks
@@ -38,54 +31,53 @@ _UDUNITS = {"m": "m", "m²": "m2", "Pa": "Pa", "Pa/m of nominal area": "Pa m-1",
 
 
 def _key(
-    rule: Rule | Bounds,
-    meaning: str,
-    default: Any = MISSING,
-    *,
-    free: bool = False,
-    axis: bool = False,
+    rule: Rule | Bounds | tuple[str, ...], meaning: str, default: Any = MISSING, **marks: bool
 ) -> Any:
-    """Return a dataclass field for one key; its rule is that of a number if bounds are given.
+    """Return a dataclass field for one key; its rule may be given as bounds, or as a choice.
 
-    ``free`` marks a key that cannot change a result: it may differ when a file is resumed.
-    ``axis`` marks a number that may be a list, and then is an axis.
+    The mark ``free`` is that of a key which cannot change a result: it may differ when a file is
+    resumed. ``axis`` is that of a number that may be a list, and then is an axis.
     """
     rule = number_in(rule) if isinstance(rule, Bounds) else rule
-    metadata = {"rule": rule, "meaning": meaning, "free": free, "axis": axis}
-    return field(default=default, metadata=metadata)
+    rule = choice(*rule) if isinstance(rule, tuple) else rule
+    metadata = {"rule": rule, "meaning": meaning, "free": False, "axis": False}
+    return field(default=default, metadata=metadata | marks)
+
+
+def _axis(rule: Rule | Bounds, meaning: str, default: Any = None) -> Any:
+    return _key(rule, meaning, default, axis=True)
+
+
+def _whole(low: int, high: int, meaning: str, default: Any = MISSING) -> Any:
+    return _key(Bounds(low, high, whole=True), meaning, default)
 
 
 # The far side of a stiffness may go beyond 1; at a fixed separation the file's rules refuse that.
 _DISPLACEMENT = Bounds(0.0, checks.FAR_DISPLACEMENT.high, without_low=True)
-# Penetrations at which fields are stored.
-_STORED = Bounds(-1000, 1, without_low=True, without_high=True)
+_STORED = Bounds(-1000, 1, without_low=True, without_high=True)  # penetrations of fields
 
 
 @dataclass(frozen=True)
 class ProfileTable:
     """``[profile]``: the rough profile, by the spectral method."""
 
-    period: float = _key(checks.LENGTH, "period λ in m", axis=True)
-    n0: int = _key(checks.HARMONIC, "lowest harmonic: its wave number is n0 · 2π/λ", axis=True)
-    ratio: int = _key(checks.HARMONIC, "highest over lowest wave number, q_max/q_min", axis=True)
-    rolloff: float = _key(
+    period: float = _axis(checks.LENGTH, "period λ in m", MISSING)
+    n0: int = _axis(checks.HARMONIC, "lowest harmonic: its wave number is n0 · 2π/λ", MISSING)
+    ratio: int = _axis(checks.HARMONIC, "highest over lowest wave number, q_max/q_min", MISSING)
+    rolloff: float = _axis(
         checks.ROLLOFF,
         "roll-off over lowest wave number, q_r/q_min: the spectrum is flat below",
         1.0,
-        axis=True,
     )
-    h_rms: float | None = _key(
-        number_in(NORMALISATIONS["h_rms"], HEIGHT), "root mean square height in m", None, axis=True
+    h_rms: float | None = _axis(
+        number_in(NORMALISATIONS["h_rms"], HEIGHT), "root mean square height in m"
     )
-    m2: float | None = _key(NORMALISATIONS["m2"], "mean square slope", None, axis=True)
-    c0: float | None = _key(
-        NORMALISATIONS["c0"],
-        "|a_n0|² in m², the same for every H (C0 of the spectrum)",
-        None,
-        axis=True,
+    m2: float | None = _axis(NORMALISATIONS["m2"], "mean square slope")
+    c0: float | None = _axis(
+        NORMALISATIONS["c0"], "|a_n0|² in m², the same for every H (C0 of the spectrum)"
     )
-    amplitudes: Amplitudes = _key(  # noqa: RUF009  # a field
-        choice(*get_args(Amplitudes)),
+    amplitudes: Amplitudes = _key(
+        get_args(Amplitudes),
         "amplitudes fixed by the power law, or scattered about it (a Gaussian process)",
         "deterministic",
     )
@@ -101,44 +93,29 @@ class ProfileTable:
 class MaterialTable:
     """``[material]``: the elastic half-space, and the strength of the interface."""
 
-    young: float = _key(checks.YOUNG, "Young's modulus E in Pa", axis=True)
-    poisson: float = _key(checks.POISSON, "Poisson's ratio ν", axis=True)
-    adhesion_range: float | None = _key(
+    young: float = _axis(checks.YOUNG, "Young's modulus E in Pa", MISSING)
+    poisson: float = _axis(checks.POISSON, "Poisson's ratio ν", MISSING)
+    adhesion_range: float | None = _axis(
         checks.ADHESION_RANGE,
         "range δ of adhesion in m: surfaces touch at a gap of δ, and patches open from inside at "
-        "the strength γ/δ (method sharp alone); by default zero, "
-        "so that they never do",
-        None,
-        axis=True,
+        "the strength γ/δ (method sharp alone); by default zero, so that they never do",
     )
-    strength: float | None = _key(
-        checks.STRENGTH, "instead of adhesion_range, the strength in Pa", None, axis=True
-    )
-    work_of_adhesion_open: float | None = _key(
+    strength: float | None = _axis(checks.STRENGTH, "instead of adhesion_range, the strength in Pa")
+    work_of_adhesion_open: float | None = _axis(
         checks.WORK_OF_ADHESION,
         "work of adhesion in J/m² where an edge recedes, at least γ, at which it advances; between "
         "both it is pinned. By default γ",
-        None,
-        axis=True,
     )
-    measure: Measure = _key(  # noqa: RUF009  # a field
-        choice(*get_args(Measure)),
-        "adhesion acts on the length of the profile, or on its projection",
-        "arc",
+    measure: Measure = _key(
+        get_args(Measure), "adhesion acts on the length of the profile, or on its projection", "arc"
     )
-    stripes: int | None = _key(
+    stripes: int | None = _axis(
         checks.HARMONIC,
         "the work of adhesion varies so many times along the period, about γ: "
         "γ (1 + stripe_amplitude cos(2π stripes x/λ + stripe_phase))",
-        None,
-        axis=True,
     )
-    stripe_amplitude: float | None = _key(
-        checks.SHARE, "share of γ by which it varies", None, axis=True
-    )
-    stripe_phase: float = _key(
-        checks.FINITE, "phase of the stripes at x = 0, in rad", 0.0, axis=True
-    )
+    stripe_amplitude: float | None = _axis(checks.SHARE, "share of γ by which it varies")
+    stripe_phase: float = _axis(checks.FINITE, "phase of the stripes at x = 0, in rad", 0.0)
 
     @property
     def opens(self) -> bool:
@@ -154,10 +131,10 @@ class SweepTable:
     work_of_adhesion: tuple[float, ...] = _key(
         list_of(number_in(checks.WORK_OF_ADHESION)), "works of adhesion γ in J/m²"
     )
-    realisations: int = _key(
-        whole_number(1, 2**31 - 1), "profiles for every cell; with [stop] the first of them"
+    realisations: int = _whole(
+        1, 2**31 - 1, "profiles for every cell; with [stop] the first of them"
     )
-    seed: int = _key(whole_number(0), "seed of all profiles", 0)
+    seed: int = _whole(0, 2**63 - 1, "seed of all profiles", 0)
     zip: tuple[tuple[str, ...], ...] = _key(
         list_of_names(),
         "groups of keys whose lists vary together, instead of in all combinations",
@@ -172,37 +149,29 @@ PathControl = Literal["separation", "load"]
 class CycleTable:
     """``[cycle]``: the loading path."""
 
-    max_penetration: float | None = _key(
+    max_penetration: float | None = _axis(
         Rule(number_in(checks.MAX_PENETRATION).text, number_in(_DISPLACEMENT).read),
         "Δ~max, the penetration in units of h_max at which unloading starts; with a preload, at "
         "which it starts at the latest",
-        None,
-        axis=True,
     )
-    max_stress: float | None = _key(
+    max_stress: float | None = _axis(
         checks.MAX_STRESS,
         "mean stress in Pa at which unloading starts under a load, instead of max_penetration",
-        None,
-        axis=True,
     )
-    preload: float | None = _key(
+    preload: float | None = _axis(
         checks.MAX_STRESS,
         "mean stress in Pa that a machine reaches before it unloads; max_penetration is then the "
         "latest turning point, and the end of the curves (by default 0.999; needed with a "
         "stiffness)",
-        None,
-        axis=True,
     )
-    control: PathControl = _key(  # noqa: RUF009  # a field
-        choice(*get_args(PathControl)), "what is prescribed along the path", "separation"
+    control: PathControl = _key(
+        get_args(PathControl), "what is prescribed along the path", "separation"
     )
     load_steps: int = _key(checks.LOAD_STEPS, "equal steps of the loading branch")
-    stiffness: float | None = _key(
+    stiffness: float | None = _axis(
         checks.SPRING,
         "stiffness k of what holds the half-space, in Pa/m of nominal area; by default the "
         "separation is fixed. With it, penetrations of the path and of curves are u_tot/h_max",
-        None,
-        axis=True,
     )
     unloading_until: float = _key(
         Bounds(-1000, 0.0, without_high=True),
@@ -239,9 +208,7 @@ class CycleTable:
 class SolverTable:
     """``[solver]``: the method and its accuracy."""
 
-    method: MethodName = _key(  # noqa: RUF009  # a field
-        choice(*METHOD_NAMES), "how contact states are found; auto chooses", "auto"
-    )
+    method: MethodName = _key(METHOD_NAMES, "how contact states are found; auto chooses", "auto")
     accuracy: float = _key(checks.ACCURACY, "wanted relative error of the loss", 1e-3)
     nodes_per_wave: int | None = _key(
         checks.NODES_PER_WAVE, "nodes per shortest wave, instead of those of accuracy", None
@@ -255,18 +222,18 @@ class SolverTable:
 class OutputTable:
     """``[output]``: what is kept of a loop, besides losses and curves."""
 
-    jumps: int = _key(whole_number(1, 100_000), "places in the catalogue of jumps of a task", 512)
+    jumps: int = _whole(1, 100_000, "places in the catalogue of jumps of a task", 512)
     field_penetrations: tuple[float, ...] | None = _key(
         list_of(number_in(_STORED), may_be_empty=True),
         "penetrations Δ/h_max at which spectra and gaps are kept, on both branches; by default a "
         "third, two thirds and all of max_penetration",
         None,
     )
-    field_realisations: int = _key(
-        whole_number(0, 1000), "so many first realisations keep the fields themselves", 1
+    field_realisations: int = _whole(
+        0, 1000, "so many first realisations keep the fields themselves", 1
     )
-    field_nodes: int = _key(
-        whole_number(16, 65_536), "most nodes of a field that is kept (a power of two is)", 4096
+    field_nodes: int = _whole(
+        16, 65_536, "most nodes of a field that is kept (a power of two is)", 4096
     )
 
 
@@ -285,26 +252,19 @@ class StopTable:
         "how far the 95 % interval of the mean of the quantity may reach from it, over it",
         None,
     )
-    quantity: Steered = _key(  # noqa: RUF009  # a field
-        choice(*get_args(Steered)),
+    quantity: Steered = _key(
+        get_args(Steered),
         "column of the results file whose mean is to be known so well",
         "loss_dimensionless",
     )
-    batch: int = _key(whole_number(1), "realisations that a cell gets at a time", 8)
-    most: int = _key(whole_number(1, 2**31 - 1), "most realisations of a cell", 1000)
+    batch: int = _whole(1, 2**63 - 1, "realisations that a cell gets at a time", 8)
+    most: int = _whole(1, 2**31 - 1, "most realisations of a cell", 1000)
 
 
 Table = Literal["profile", "material", "sweep", "cycle", "solver", "output", "stop"]
 _SWEPT = ("sweep.hurst", "sweep.work_of_adhesion")
-TABLES: dict[Table, type] = {
-    "profile": ProfileTable,
-    "material": MaterialTable,
-    "sweep": SweepTable,
-    "cycle": CycleTable,
-    "solver": SolverTable,
-    "output": OutputTable,
-    "stop": StopTable,
-}
+_TABLES = (ProfileTable, MaterialTable, SweepTable, CycleTable, SolverTable, OutputTable, StopTable)
+TABLES: dict[Table, type] = dict(zip(get_args(Table), _TABLES, strict=True))
 KEYS: dict[str, Field[Any]] = {
     f"{table}.{entry.name}": entry for table in TABLES for entry in fields(TABLES[table])
 }
@@ -319,9 +279,8 @@ Value = float
 class Axis:
     """One key of a campaign that has several values (H and γ always are axes)."""
 
-    # table, name: where the key stands: "profile", "ratio"
-    table: str
-    name: str
+    table: str  # "profile"
+    name: str  # "ratio"
     # As they are combined: ascending, or, where keys vary together, in the order of the first
     values: tuple[Value, ...]
     unit: str
@@ -399,13 +358,10 @@ class Campaign:
 
     def in_cells(self, *keys: str) -> list[tuple[Any, ...]]:
         """Return the different values that these keys have together in a cell, ascending."""
-        place = {axis.key: number for number, axis in enumerate(self.axes)}
-        columns = [
-            [cell[place[key]] for cell in self.cells]
-            if key in place
-            else [self.value(key)] * len(self.cells)
-            for key in keys
-        ]
+        axes = dict(
+            zip((axis.key for axis in self.axes), zip(*self.cells, strict=True), strict=True)
+        )
+        columns = (axes.get(key) or [self.value(key)] * len(self.cells) for key in keys)
         return sorted(set(zip(*columns, strict=True)))
 
     def has_axis(self, name: str) -> bool:
@@ -435,10 +391,8 @@ class Campaign:
     @cached_property
     def _turning(self) -> Axis | None:
         """The axis of turning points, unless other keys vary with it."""
-        for group in self._groups:
-            if len(group) == 1 and group[0].name in TURNING_POINTS:
-                return group[0]
-        return None
+        alone = (group[0] for group in self._groups if len(group) == 1)
+        return next((axis for axis in alone if axis.name in TURNING_POINTS), None)
 
     def branch_of(self, task: Task) -> Task:
         """Return what the tasks that share a task's loading branch have in common.
@@ -455,11 +409,9 @@ class Campaign:
         """Return the tasks that share a task's loading branch, by turning point, and it itself."""
         if self._turning is None:
             return [task]
-        name, values = self._turning.name, self._turning.values
-        return [
-            replace(task, others=tuple((n, value if n == name else v) for n, v in task.others))
-            for value in values
-        ]
+        name, others = self._turning.name, dict(task.others)
+        turns = self._turning.values
+        return [replace(task, others=tuple((others | {name: turn}).items())) for turn in turns]
 
     def identity(self, task: Task) -> tuple[Any, ...]:
         """Return what identifies the cell of a task, also in a campaign that grew new axes."""

@@ -1,4 +1,5 @@
 """The command line: a module a command, with ``EXAMPLES``, ``add_arguments`` and ``execute``.
 
-Its docstring's first line is its help; :mod:`adhesis.ensemble.command.main` calls them.
+Its docstring's first line is its help. ``execute`` returns an exit code, or None for 0;
+:mod:`adhesis.ensemble.command.main` calls it.
 """

@@ -12,38 +12,29 @@ import platform
 import sys
 from pathlib import Path
 
-from adhesis.ensemble.command.parser import within
+from adhesis.ensemble.command.parser import declare, within
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.reporter import bar
 
 _DEFAULT = Path("out/benchmark")
-EXAMPLES = (
-    "adhesis bench --quick",
-    "adhesis bench --to out/benchmark --budget 60",
-)
+EXAMPLES = ("adhesis bench --quick", "adhesis bench --to out/benchmark --budget 60")
 _FILES = tuple(f"benchmark.{suffix}" for suffix in ("csv", "md", "png", "pdf"))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``adhesis bench``."""
-    parser.add_argument(
-        "--to",
-        type=Path,
-        default=_DEFAULT,
-        metavar="DIR",
-        help=f"directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})",
-    )
-    parser.add_argument("--quick", action="store_true", help="small scenes only, under a minute")
-    parser.add_argument(
-        "--budget",
-        type=within(1e-9, 1e9, "a positive number of seconds"),
-        default=360.0,
-        metavar="SECONDS",
-        help="CPU time after which a run is given up (default 360)",
+    to = f"directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})"
+    seconds = within(1e-9, 1e9, "a positive number of seconds")
+    budget = "CPU time after which a run is given up (default 360)"
+    declare(
+        parser,
+        ("--to DIR", Path, to, {"default": _DEFAULT}),
+        ("--quick", bool, "small scenes only, under a minute"),
+        ("--budget SECONDS", seconds, budget, {"default": 360.0}),
     )
 
 
-def execute(args: argparse.Namespace) -> int:
+def execute(args: argparse.Namespace) -> None:
     """Measure, print and write what came out."""
     from adhesis.ensemble.bench.benchmark import COLUMNS, benchmark, page
     from adhesis.ensemble.bench.scenes import FULL, QUICK
@@ -74,4 +65,3 @@ def execute(args: argparse.Namespace) -> int:
         save(draw(lines), folder / "benchmark")
     writing.finish()
     print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
-    return 0

@@ -7,11 +7,9 @@ For bash add ``source <(adhesis completion bash)`` to ~/.bashrc, for zsh
 from __future__ import annotations
 
 import argparse
+from itertools import chain
 
-EXAMPLES = (
-    "adhesis completion bash",
-    "adhesis completion zsh",
-)
+EXAMPLES = ("adhesis completion bash", "adhesis completion zsh")
 _SHELLS = ("bash", "zsh")
 # zsh runs the same function by its emulation of bash's completion.
 _ZSH = "autoload -U +X bashcompinit && bashcompinit\n"
@@ -36,25 +34,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("shell", metavar="SHELL", choices=_SHELLS, help=" or ".join(_SHELLS))
 
 
-def execute(args: argparse.Namespace) -> int:
-    """Print the script; returns 0."""
+def execute(args: argparse.Namespace) -> None:
+    """Print the script."""
     from adhesis.ensemble.command.main import COMMANDS, parser_of
 
     cases = "\n".join(_case(name, parser_of(name)) for name in COMMANDS)
     commands = " ".join([*COMMANDS, "--help", "--version"])
     start = _ZSH if args.shell == "zsh" else ""
     print(start + _SCRIPT.format(commands=commands, cases=cases), end="")
-    return 0
 
 
 def _case(name: str, parser: argparse.ArgumentParser) -> str:
     """Return the words that follow a command: options, if one is begun, or choices."""
     options = " ".join(sorted(o for a in parser._actions for o in a.option_strings))
-    choices = " ".join(
-        str(choice)
-        for action in parser._actions
-        if not action.option_strings
-        for choice in action.choices or ()
-    )
+    positional = (a.choices or () for a in parser._actions if not a.option_strings)
+    choices = " ".join(map(str, chain.from_iterable(positional)))
     by_word = f'case $word in -*) words="{options}" ;; *) words="{choices}" ;; esac'
     return f"            {name}) {by_word} ;;"

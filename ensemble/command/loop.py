@@ -11,29 +11,22 @@ from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.command.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 from adhesis.ensemble.loop import record
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import heights_warning, read_heights
-from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.outputs import Writing, check_ending, check_outputs, whole_file, write_json
-from adhesis.ensemble.trace.options import (
-    given,
-    pattern_of,
-    prepared_of,
-    refuse_several,
-    shown_while_read,
-    what_was_read,
-)
+from adhesis.ensemble.trace import options
 from adhesis.ensemble.versions import input_record, provenance
 from adhesis.solver import checks
 from adhesis.solver.checks import plain
 from adhesis.solver.loading.loop import run_loop, run_loops
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import field_nodes
-from adhesis.solver.loading.path import PathResult, run_path
+from adhesis.solver.loading.path import run_path
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
@@ -62,15 +55,14 @@ def execute(args: argparse.Namespace) -> int:
             adhesion_range=args.adhesion_range,
             measure=args.measure,
             work_of_adhesion_open=args.work_of_adhesion_open,
-            pattern=pattern_of(args),
+            pattern=options.pattern_of(args),
         )
         cycle.check(problem)
     _check_film(args, cycle)
     wanted, at_stresses = _wanted_fields(args, cycle)
     with refused_as_input(vars(args)):
-        method = make_method(
-            args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
-        )
+        settings = {"accuracy": args.accuracy, "nodes_per_wave": args.nodes_per_wave}
+        method = make_method(args.method, problem, **settings)
     nodes = _field_nodes(args, method, wanted) if wanted else 0
     fields: dict[str, Any] = {}
     try:
@@ -118,24 +110,20 @@ def execute(args: argparse.Namespace) -> int:
         print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
         print(f"wrote       {path}")
-    doubts = list(
-        dict.fromkeys([*warnings, *(text for result in results for text in result.warnings)])
-    )
+    doubts = dict.fromkeys([*warnings, *(t for result in results for t in result.warnings)])
     for text in doubts:
         print(f"adhesis loop: {text}", file=sys.stderr)
     writing.finish()
     return SOME_FAILED if doubts and args.strict else DONE
 
 
-def _run(
-    args: argparse.Namespace, method: Method, cycle: Cycle
-) -> tuple[LoopResult | PathResult, ...]:
-    options: dict[str, Any] = {"load_steps": cycle.load_steps, "progress": not args.quiet}
+def _run(args: argparse.Namespace, method: Method, cycle: Cycle) -> tuple[record.Result, ...]:
+    settings: dict[str, Any] = {"load_steps": cycle.load_steps, "progress": not args.quiet}
     if cycle.is_path:
-        return (run_path(method, cycle.points, out=cycle.out, **options),)
+        return (run_path(method, cycle.points, out=cycle.out, **settings),)
     if len(cycle.points) > 1:
-        return run_loops(method, **cycle.arguments(cycle.points), **options)
-    return (run_loop(method, **cycle.arguments(cycle.points[0]), **options),)
+        return run_loops(method, **cycle.arguments(cycle.points), **settings)
+    return (run_loop(method, **cycle.arguments(cycle.points[0]), **settings),)
 
 
 def _take_defaults(args: argparse.Namespace) -> list[str]:
@@ -197,65 +185,57 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
 
 def _profile(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
     """Return the profile of the one source that is given, what is doubtful, and how it was read."""
-    refuse_several(args, "hurst", "heights", "trace")
-    if not given(args, "hurst", "heights", "trace"):
+    options.refuse_several(args, "hurst", "heights", "trace")
+    if not options.given(args, "hurst", "heights", "trace"):
         raise InputError("no profile is given: give one of --hurst, --heights and --trace")
     if args.heights is not None and args.period is None:
         raise InputError("--heights needs --period, the length of the period, as in 2mm")
     if args.hurst is None:
         of_hurst = ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes")
-        for option in given(args, *of_hurst, *(() if args.trace is None else ("period",))):
-            other = " and --heights" if option == "--period" else ""
-            raise InputError(
-                f"{option} belongs to --hurst{other}: given heights are taken as they are"
-            )
+        for option in options.given(args, *of_hurst, *(() if args.trace is None else ("period",))):
+            those = "--hurst and --heights" if option == "--period" else "--hurst"
+            raise InputError(f"{option} belongs to {those}: given heights are taken as they are")
     if args.trace is None:
         of_heights = () if args.heights is None else ("--unit", "--delimiter", "--decimal")
-        for option in given(args):
+        for option in options.given(args):
             if option not in of_heights:
                 raise InputError(f"{option} belongs to --trace, which is not given")
     if args.hurst is not None:
         return _self_affine(args), [], []
     if args.heights is not None:
         return _given_heights(args)
-    prepared = prepared_of(args, args.trace)
-    print(what_was_read(prepared))
+    prepared = options.prepared_of(args, args.trace)
+    print(options.what_was_read(prepared))
     return prepared.profile(), list(prepared.warnings), list(prepared.trace.notes)
 
 
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str], list[str]]:
     period = checks.real("period", args.period, checks.LENGTH)
-    options = {name: getattr(args, name) for name in ("unit", "delimiter", "decimal")}
-    with shown_while_read(args.heights, args.quiet):
-        heights, said = read_heights(args.heights, period=period, **options)
+    form = {name: getattr(args, name) for name in ("unit", "delimiter", "decimal")}
+    with options.shown_while_read(args.heights, args.quiet):
+        heights, said = read_heights(args.heights, period=period, **form)
     warning = heights_warning(heights, f"{args.heights}")
     return profile_from_heights(heights, args.period), [warning] if warning else [], [said]
 
 
 def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
-    refuse_several(args, *norms)
-    return self_affine_profile(
-        args.hurst,
-        period=args.period,
-        n0=args.n0,
-        ratio=args.ratio,
-        seed=args.seed,
-        amplitudes=args.amplitudes or "deterministic",
-        **norms,
-    )
+    options.refuse_several(args, *norms)
+    shape = {name: getattr(args, name) for name in ("hurst", "period", "n0", "ratio", "seed")}
+    amplitudes: Any = args.amplitudes or "deterministic"
+    return self_affine_profile(**shape, amplitudes=amplitudes, **norms)
 
 
 def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float], bool]:
     """Return where fields are wanted, and whether these are mean stresses in Pa; else Δ/h_max."""
     if args.fields is None:
-        for option in given(args, "field_penetrations", "field_stresses", "field_nodes"):
+        for option in options.given(args, "field_penetrations", "field_stresses", "field_nodes"):
             raise InputError(f"{option} needs --fields, the file to which fields are written")
         return [], False
     if cycle.is_path or len(cycle.points) > 1:
         raise InputError("--fields belongs to one loop: give one turning point, and no --path")
     penetrations, stresses = args.field_penetrations, args.field_stresses
-    refuse_several(args, "field_penetrations", "field_stresses")
+    options.refuse_several(args, "field_penetrations", "field_stresses")
     at_preload, (top,) = cycle.are_preloads, cycle.points
     at_stresses = stresses is not None or (at_preload and penetrations is None)
     if not at_stresses and (at_preload or not cycle.control.is_fixed):
@@ -270,9 +250,8 @@ def _wanted_fields(args: argparse.Namespace, cycle: Cycle) -> tuple[list[float],
         if at_stresses and not np.isfinite(value):
             raise InputError(f"--field-stresses holds {value}: it must be a finite number, in Pa")
         if not at_stresses and not (np.isfinite(value) and value <= top):
-            raise InputError(
-                f"--field-penetrations holds {value}: the loop goes no deeper than {top:g}"
-            )
+            limit = f"the loop goes no deeper than {top:g}"
+            raise InputError(f"--field-penetrations holds {value}: {limit}")
     return list(dict.fromkeys(wanted)), at_stresses
 
 

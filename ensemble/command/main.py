@@ -41,16 +41,10 @@ COMMANDS: dict[str, str] = {
     "doctor": "report which MPI, HDF5, FFTW and writer this installation uses, and why",
     "completion": "print the code with which a shell completes commands and options",
 }
-EXAMPLES = (
-    "adhesis loop --hurst 0.8 --seed 1",
-    "adhesis run jobs/example.toml --ranks 3",
-)
+EXAMPLES = ("adhesis loop --hurst 0.8 --seed 1", "adhesis run jobs/example.toml --ranks 3")
 _WITHOUT_NUMERICS = ("new", "completion")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
-_OPTIONS = {
-    "loop": "adhesis.ensemble.loop.loop_arguments",
-    "trace": "adhesis.ensemble.trace.trace_arguments",
-}
+_OPTIONS = {"loop": "command.loop_arguments", "trace": "trace.trace_arguments"}
 # What several processes of a launcher do with a command: the ranks of `run` share its work, and
 # these are independent of one another (of other profiles, on other nodes). Rank 0 alone runs the
 # rest.
@@ -74,7 +68,13 @@ def main(argv: list[str] | None = None) -> int:
     if rank > 0 and name != _PARALLEL and name not in _INDEPENDENT:
         return 0
     with standard_streams():
-        code, sentence, error = _run(name, words)
+        error: BaseException | None = None
+        try:
+            with _interrupts(name):
+                code, sentence = _execute(name, words), ""
+                sys.stdout.flush()
+        except (Exception, KeyboardInterrupt) as raised:
+            (code, sentence), error = exit_codes.ended_by(raised), raised
         if rank > 0 and isinstance(error, errors.InputError):
             if name == _PARALLEL and not isinstance(error, errors.RankError):
                 return 0  # rank 0 has the same error
@@ -85,28 +85,12 @@ def main(argv: list[str] | None = None) -> int:
     return code
 
 
-def module_of(name: str) -> str:
-    """Return the name of a command's module."""
-    return f"adhesis.ensemble.command.{name}"
-
-
 def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
-    module = importlib.import_module(_OPTIONS.get(name, module_of(name)))
+    module = importlib.import_module(f"adhesis.ensemble.{_OPTIONS.get(name, f'command.{name}')}")
     parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
     module.add_arguments(parser)
     return parser
-
-
-def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | None]:
-    """Return exit code, the sentence to report, and the error."""
-    try:
-        with _interrupts(name):
-            code = _execute(name, words)
-            sys.stdout.flush()
-        return code, "", None
-    except (Exception, KeyboardInterrupt) as error:
-        return *exit_codes.ended_by(error), error
 
 
 def _execute(name: str, words: Sequence[str]) -> int:
@@ -131,8 +115,8 @@ def _execute(name: str, words: Sequence[str]) -> int:
     if name not in _WITHOUT_NUMERICS:
         errors.check_memory()
     with errors.naming_options():
-        code: int = importlib.import_module(module_of(name)).execute(args)
-    return code
+        code: int | None = importlib.import_module(f"adhesis.ensemble.command.{name}").execute(args)
+    return code or 0
 
 
 @contextmanager
@@ -198,12 +182,9 @@ def _interrupts(name: str) -> Iterator[None]:
 
 def _overview() -> Parser:
     listing = "\n".join(f"  {name:<12}{text}" for name, text in COMMANDS.items())
-    parser = Parser(
-        "adhesis",
-        "Hysteresis loops of rough contacts with zero-range (JKR) adhesion.\n\n"
-        f"commands:\n{listing}\n\nadhesis COMMAND --help lists its options.",
-        EXAMPLES,
-    )
+    about = "Hysteresis loops of rough contacts with zero-range (JKR) adhesion."
+    commands = f"commands:\n{listing}\n\nadhesis COMMAND --help lists its options."
+    parser = Parser("adhesis", f"{about}\n\n{commands}", EXAMPLES)
     parser.add_argument("--version", action="store_true", help="version and commit")
     parser.add_argument("command", metavar="COMMAND")
     return parser

@@ -9,27 +9,24 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.reporter import log
 
-EXAMPLES = (
-    "adhesis merge part1.h5 part2.h5 --out all.h5",
-    "adhesis merge part3.h5 --out all.h5",
-)
+EXAMPLES = ("adhesis merge part1.h5 part2.h5 --out all.h5", "adhesis merge part3.h5 --out all.h5")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "parts", type=Path, metavar="PART.h5", nargs="+", help="results files of one campaign"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.h5", required=True, help="made, or merged into"
+    declare(
+        parser,
+        ("parts PART.h5", Path, "results files of one campaign", {"nargs": "+"}),
+        ("--out FILE.h5", Path, "made, or merged into", {"required": True}),
     )
 
 
-def execute(args: argparse.Namespace) -> int:
-    """Merge; returns 0."""
+def execute(args: argparse.Namespace) -> None:
+    """Merge."""
     from adhesis.ensemble.results.layout import check_results_file
     from adhesis.ensemble.results.merge import merge
     from adhesis.ensemble.run.lock import RunLock
@@ -52,4 +49,3 @@ def execute(args: argparse.Namespace) -> int:
         f"{out}: {counted(merged.taken, 'row')} taken over from "
         f"{counted(len(args.parts), 'file')}; {merged.done} of {total} done{failed}"
     )
-    return 0

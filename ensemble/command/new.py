@@ -11,10 +11,7 @@ from pathlib import Path
 from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.outputs import check_ending, write_new
 
-EXAMPLES = (
-    "adhesis new my.toml",
-    "adhesis new study/first.toml",
-)
+EXAMPLES = ("adhesis new my.toml", "adhesis new study/first.toml")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,8 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.toml", help="the file to write")
 
 
-def execute(args: argparse.Namespace) -> int:
-    """Write the file; returns 0."""
+def execute(args: argparse.Namespace) -> None:
+    """Write the file."""
     check_ending("FILE.toml", args.file, ".toml")
 
     def content() -> bytes:
@@ -34,4 +31,3 @@ def execute(args: argparse.Namespace) -> int:
     write_new("FILE.toml", args.file, content)
     file = shell_word(args.file)
     print(f"next        adhesis run {file} --dry-run   (its cost; without --dry-run: the run)")
-    return 0

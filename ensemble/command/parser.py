@@ -65,6 +65,18 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message} ({self.prog} --help lists the options)")
 
 
+def declare(group: argparse._ActionsContainer, *options: tuple[Any, ...]) -> None:
+    """Declare options: name with its metavar ("--out FILE"), type, help, and further settings.
+
+    The type of a flag is bool, that of a text None.
+    """
+    for words, kind, text, *more in options:
+        name, _, metavar = words.partition(" ")
+        of_kind = {"type": kind, "metavar": metavar or None}
+        settings = {"action": "store_true"} if kind is bool else of_kind
+        group.add_argument(name, help=text, **{**settings, **dict(*more)})
+
+
 class _StoreOnce(argparse._StoreAction):
     """Store the value of an option, which may be given once."""
 
@@ -88,13 +100,15 @@ def _text(value: str) -> str:
     return value
 
 
+def _refused(value: str, rule: str) -> argparse.ArgumentTypeError:
+    return argparse.ArgumentTypeError(f"is {quoted(value)}: it must be {rule}")
+
+
 def _number(value: str) -> float:
     try:
         return float(value)  # NaN too: the rule of the quantity refuses it
     except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"is {quoted(value)}: it must be a number, as in 0.5"
-        ) from None
+        raise _refused(value, "a number, as in 0.5") from None
 
 
 def within(
@@ -108,7 +122,7 @@ def within(
         except ValueError:
             number = math.nan
         if not low <= number <= high:
-            raise argparse.ArgumentTypeError(f"is {quoted(value)}: it must be {rule}")
+            raise _refused(value, rule)
         return number
 
     return read
@@ -116,9 +130,7 @@ def within(
 
 def _path(value: str) -> Path:
     if not value or "\0" in value:
-        raise argparse.ArgumentTypeError(
-            f"is {quoted(value)}: it must be the name of a file or directory"
-        )
+        raise _refused(value, "the name of a file or directory")
     return _Named(value)
 
 

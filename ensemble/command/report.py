@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.reporter import bar
 
@@ -18,27 +19,21 @@ _FILES = (*(f"{name}.csv" for name in _TABLES), "curves.nc", "report.md", "repor
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("file", metavar="FILE.h5", type=Path, help="results file of a campaign")
-    parser.add_argument(
-        "--to",
-        metavar="DIR",
-        type=Path,
-        required=True,
-        help="directory for losses.csv, curves.nc, the figures, report.md and report.html",
+    to = "directory for losses.csv, curves.nc, the figures, report.md and report.html"
+    beside = (
+        "other campaigns to compare with, loop by loop: another resolution or method, other load "
+        "steps, another largest penetration, another spectrum"
     )
-    parser.add_argument(
-        "--beside",
-        metavar="OTHER.h5",
-        type=Path,
-        nargs="+",
-        default=[],
-        help="other campaigns to compare with, loop by loop: another resolution or method, other "
-        "load steps, another largest penetration, another spectrum",
+    declare(
+        parser,
+        ("file FILE.h5", Path, "results file of a campaign"),
+        ("--to DIR", Path, to, {"required": True}),
+        ("--beside OTHER.h5", Path, beside, {"nargs": "+", "default": []}),
     )
 
 
-def execute(args: argparse.Namespace) -> int:
-    """Write the report; returns 0."""
+def execute(args: argparse.Namespace) -> None:
+    """Write the report."""
     inputs = {"the command": args.file}
     inputs |= {f"--beside (number {k})": path for k, path in enumerate(args.beside, 1)}
     check_output_folder("--to", args.to, _FILES, inputs)
@@ -51,4 +46,3 @@ def execute(args: argparse.Namespace) -> int:
             beside=args.beside,
             progress=lambda part: show(None, None, f"adhesis report: {part}"),
         )
-    return 0

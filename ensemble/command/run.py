@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble import exit_codes
-from adhesis.ensemble.command.parser import within
+from adhesis.ensemble.command.parser import declare, within
 from adhesis.ensemble.errors import InputError, WriteError, parameter
 from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.quantities import WORK_OF_ADHESION
@@ -32,70 +32,37 @@ _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one
 _MOST = 2**31 - 1
 _NUMBER = within(0, _MOST, "a number that is not negative")
 _WHOLE = within(0, _MOST, "a whole number that is not negative", int)
-EXAMPLES = (
-    "adhesis run jobs/example.toml --ranks 3",
-    "adhesis run jobs/paper.toml --dry-run",
-)
+EXAMPLES = ("adhesis run jobs/example.toml --ranks 3", "adhesis run jobs/paper.toml --dry-run")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="the campaign file")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE.h5",
-        help="results file (default: the campaign's name, here)",
+    ranks = "start N ranks on this machine (one more than cores is right: rank 0 only hands out)"
+    dry_run = "estimate the cost from about a minute of pilot loops, and write nothing"
+    part = "compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)"
+    walltime = (
+        "stop in time for this walltime, as 3600, 1h30m or 12:00:00 "
+        "(default: what Slurm or Torque say)"
     )
-    parser.add_argument(
-        "--ranks",
-        type=within(1, _MOST, "a whole number of at least 1", int),
-        metavar="N",
-        help="start N ranks on this machine (one more than cores is right: rank 0 only hands out)",
-    )
-    parser.add_argument(
-        "--dry-run",
-        action="store_true",
-        help="estimate the cost from about a minute of pilot loops, and write nothing",
-    )
-    parser.add_argument(
-        "--part",
-        metavar="K/N",
-        help="compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)",
-    )
-    parser.add_argument(
-        "--walltime",
-        metavar="TIME",
-        help="stop in time for this walltime, as 3600, 1h30m or 12:00:00 "
-        "(default: what Slurm or Torque say)",
-    )
-    parser.add_argument(
-        "--max-failures",
-        type=_WHOLE,
-        metavar="N",
-        default=20,
-        help="stop after so many failed tasks; 0: never (default: 20)",
-    )
-    parser.add_argument(
-        "--redo",
-        metavar="WHICH",
-        help="compute tasks again: those that failed (failed), or done ones too (all)",
-    )
-    gamma = WORK_OF_ADHESION.option
-    for name, kind, text in (
-        ("--hurst", _NUMBER, "with --redo: only tasks of this H; may be repeated"),
-        ("--work-of-adhesion", gamma, "with --redo: only tasks of this γ in J/m²; may be repeated"),
-        ("--realisation", _WHOLE, "with --redo: only this realisation; may be repeated"),
-    ):
-        parser.add_argument(
-            name, type=kind, metavar="VALUE", action="append", default=[], help=text
-        )
-    parser.add_argument(
-        "--patience",
-        type=_NUMBER,
-        metavar="SECONDS",
-        default=10.0,
-        help="how long to wait for another run to let go of FILE.h5 (default: 10)",
+    failures = "stop after so many failed tasks; 0: never (default: 20)"
+    redo = "compute tasks again: those that failed (failed), or done ones too (all)"
+    only, more = "with --redo: only", {"action": "append", "default": []}
+    gamma = f"{only} tasks of this γ in J/m²; may be repeated"
+    patience = "how long to wait for another run to let go of FILE.h5 (default: 10)"
+    declare(
+        parser,
+        ("campaign CAMPAIGN.toml", Path, "the campaign file"),
+        ("--out FILE.h5", Path, "results file (default: the campaign's name, here)"),
+        ("--ranks N", within(1, _MOST, "a whole number of at least 1", int), ranks),
+        ("--dry-run", bool, dry_run),
+        ("--part K/N", None, part),
+        ("--walltime TIME", None, walltime),
+        ("--max-failures N", _WHOLE, failures, {"default": 20}),
+        ("--redo WHICH", None, redo),
+        ("--hurst VALUE", _NUMBER, f"{only} tasks of this H; may be repeated", more),
+        ("--work-of-adhesion VALUE", WORK_OF_ADHESION.option, gamma, more),
+        ("--realisation VALUE", _WHOLE, f"{only} this realisation; may be repeated", more),
+        ("--patience SECONDS", _NUMBER, patience, {"default": 10.0}),
     )
 
 
@@ -113,10 +80,9 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
     try:
         if args.ranks is not None and not args.dry_run:
             check_ranks(args.ranks)
+            rule = "leave it out under mpirun or srun"
             if launched()[0] > 1:
-                raise InputError(
-                    "--ranks starts ranks of its own: leave it out under mpirun or srun"
-                )
+                raise InputError(f"--ranks starts ranks of its own: {rule}")
         comm = world()
         code = _run(args, comm, started, engine)
         return code if comm.rank == 0 else exit_codes.DONE
@@ -177,9 +143,8 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     )
     if args.dry_run:
         if options.redo is not None:
-            raise InputError(
-                "--redo and --dry-run cannot be given together: the price is that of pending tasks"
-            )
+            why = "the price is that of pending tasks"
+            raise InputError(f"--redo and --dry-run cannot be given together: {why}")
         return _price(campaign, path, options.part, engine) if comm.rank == 0 else exit_codes.DONE
     summary = run_campaign(campaign, path, comm, options, log, engine)
     if comm.rank == 0:
@@ -201,9 +166,8 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
 
 def _again(args: argparse.Namespace) -> str:
     """Return how a run is resumed; with --redo what it did would be computed once more."""
-    if args.redo is None:
-        return "run the same command again to resume"
-    return "run the command again without --redo to resume"
+    how = "the same command again" if args.redo is None else "the command again without --redo"
+    return f"run {how} to resume"
 
 
 def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) -> None:
@@ -219,23 +183,17 @@ def _report_end(campaign: Campaign, path: Path, summary: Summary, again: str) ->
         log(line)
     if summary.doubtful:
         they = "its own account it" if summary.doubtful == 1 else "their own account they"
-        log(
-            doubtful_losses(
-                summary.doubtful,
-                f": by {they} may be off by more than {100 * campaign.solver.accuracy:g} %, the "
-                f"accuracy asked for ({status})",
-            )
-        )
+        most = f"{100 * campaign.solver.accuracy:g} %, the accuracy asked for ({status})"
+        log(doubtful_losses(summary.doubtful, f": by {they} may be off by more than {most}"))
     if summary.beyond_limit:
         why = why_beyond(campaign.material.opens)
         log(doubtful_losses(summary.beyond_limit, f": {why} ({status})"))
     if summary.short_of_preload:
         log(f"{counted(summary.short_of_preload, 'loop')} did not reach the preload ({status})")
     if summary.stopped:
+        least = "at least " if summary.precisions else ""  # further batches may follow
         are = "is" if summary.pending == 1 else "are"
-        left = f"{counted(summary.pending, 'task')} {are} left"
-        if summary.precisions:  # further batches may follow
-            left = f"at least {left}"
+        left = f"{least}{counted(summary.pending, 'task')} {are} left"
         log(f"stopped early: {summary.stopped}; {left}, {again}")
 
 
@@ -260,10 +218,8 @@ def _selection(args: argparse.Namespace) -> Any:
 
     values = {name: getattr(args, name) for name in ("hurst", "work_of_adhesion", "realisation")}
     if args.redo is None:
-        for name in filter(values.get, values):
-            raise InputError(
-                f"{parameter(name)} needs --redo: it chooses the tasks to compute again"
-            )
+        for name in map(parameter, filter(values.get, values)):
+            raise InputError(f"{name} needs --redo: it chooses the tasks to compute again")
         return None
     if args.redo not in ("failed", "all"):
         raise InputError(f"--redo is {args.redo!r}: it must be failed or all")

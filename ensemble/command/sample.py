@@ -11,10 +11,7 @@ from pathlib import Path
 from adhesis.ensemble.escape import shell_word
 from adhesis.ensemble.outputs import write_new
 
-EXAMPLES = (
-    "adhesis sample trace.csv",
-    "adhesis sample data/stylus.csv",
-)
+EXAMPLES = ("adhesis sample trace.csv", "adhesis sample data/stylus.csv")
 _POINTS, _STEP = 1001, 1e-6  # m
 
 
@@ -23,15 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="the file to write, as .csv")
 
 
-def execute(args: argparse.Namespace) -> int:
-    """Write the file; returns 0."""
+def execute(args: argparse.Namespace) -> None:
+    """Write the file."""
     write_new("FILE", args.file, lambda: _sample().encode())
-    file = shell_word(args.file)
-    print(
-        f"next        adhesis trace {file} --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 "
-        "--to out"
-    )
-    return 0
+    options = "--work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out"
+    print(f"next        adhesis trace {shell_word(args.file)} {options}")
 
 
 def _sample() -> str:

@@ -6,29 +6,26 @@ import argparse
 import json
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from adhesis.ensemble.command.parser import within
+from adhesis.ensemble.command.parser import declare, within
 from adhesis.ensemble.errors import InputError
 
-EXAMPLES = (
-    "adhesis status paper.h5",
-    "adhesis status paper.h5 --watch --interval 10",
-)
+EXAMPLES = ("adhesis status paper.h5", "adhesis status paper.h5 --watch --interval 10")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("file", type=Path, metavar="FILE.h5", help="the results file")
-    parser.add_argument("--json", action="store_true", help="everything, as JSON")
-    parser.add_argument("--watch", action="store_true", help="repeat the status until all is done")
-    parser.add_argument(
-        "--interval",
-        type=within(0.1, 86_400, "a number of seconds between 0.1 and 86400"),
-        metavar="SECONDS",
-        default=2.0,
-        help="with --watch: how often (default: 2)",
+    seconds = within(0.1, 86_400, "a number of seconds between 0.1 and 86400")
+    interval = "with --watch: how often (default: 2)"
+    declare(
+        parser,
+        ("file FILE.h5", Path, "the results file"),
+        ("--json", bool, "everything, as JSON"),
+        ("--watch", bool, "repeat the status until all is done"),
+        ("--interval SECONDS", seconds, interval, {"default": 2.0}),
     )
 
 
@@ -48,11 +45,9 @@ def _watch(path: Path, interval: float) -> int:
     from rich.console import Console
     from rich.live import Live
 
-    live = Live(console=Console(highlight=False, markup=False), auto_refresh=False)
-    if sys.stdout.isatty():
-        live.start()
+    shown = Live(console=Console(highlight=False, markup=False), auto_refresh=False)
     first: tuple[float, int] | None = None
-    try:
+    with shown if sys.stdout.isatty() else nullcontext() as live:
         while True:
             now = time.monotonic()
             status = _status(path)
@@ -61,16 +56,14 @@ def _watch(path: Path, interval: float) -> int:
             if first is None or finished < first[1]:
                 first = (now, finished)
             text = _text(status, now - first[0], finished - first[1])
-            if live.is_started:
-                live.update(text, refresh=True)
-            else:
+            if live is None:
                 print(text, flush=True)
+            else:
+                live.update(text, refresh=True)
             if not status["pending"]:
                 return 0
             # Every look reads all rows with a result: it takes at most a fifth of the time.
             time.sleep(max(interval, 4 * (time.monotonic() - now)))
-    finally:
-        live.stop()
 
 
 def _status(path: Path) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.exit_codes import SOME_FAILED
 from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
-from adhesis.ensemble.quantities import WORK_OF_ADHESION, read_words, words_of
+from adhesis.ensemble.quantities import WORK_OF_ADHESION, read_list
 from adhesis.ensemble.trace.answer import (
     FIGURE_FILES,
     FILES,
@@ -31,8 +31,7 @@ def execute(args: argparse.Namespace) -> int:
         raise InputError("--to is missing: give the directory for the page, or --plan for none")
     if args.processes is not None and args.processes < 1:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
-    option, text = "--work-of-adhesion", args.work_of_adhesion
-    gammas = read_words(option, words_of(option, text), WORK_OF_ADHESION.read)
+    gammas = read_list("--work-of-adhesion", args.work_of_adhesion, WORK_OF_ADHESION.read)
     with refused_as_input(vars(args), thickness="layer"):
         half_space = HalfSpace(args.young, args.poisson)
         control = control_of(args, half_space)
@@ -67,13 +66,11 @@ def execute(args: argparse.Namespace) -> int:
         numbers = document(answer)
         numbers["provenance"] = provenance(args.words, source, None, numbers)
         write_json(args.to / "trace.json", numbers)
-    with (
-        writing.output("--to", args.to / "trace.html"),
-        staged_folder(args.to, FIGURE_FILES) as folder,
-    ):
+    page = args.to / "trace.html"
+    with writing.output("--to", page), staged_folder(args.to, FIGURE_FILES) as folder:
         write_page(answer, folder)
     print(summary(answer))
     if not writing.failures:
-        print(f"wrote       {args.to / 'trace.html'}, trace.md, trace.json and the figures")
+        print(f"wrote       {page}, trace.md, trace.json and the figures")
     writing.finish()
     return 0

@@ -11,27 +11,24 @@ import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 
 if TYPE_CHECKING:
     from adhesis.solver.validate.claims import Row
 
-EXAMPLES = (
-    "adhesis validate",
-    "adhesis validate --method sharp --json",
-)
+EXAMPLES = ("adhesis validate", "adhesis validate --method sharp --json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``adhesis validate``."""
-    parser.add_argument(
-        "--method",
-        action="append",
-        metavar="NAME",
-        help="method to validate, may be repeated (default: all)",
+    method = "method to validate, may be repeated (default: all)"
+    declare(
+        parser,
+        ("--method NAME", None, method, {"action": "append"}),
+        ("--json", bool, "print the rows as JSON"),
     )
-    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
 
 
 def execute(args: argparse.Namespace) -> int:
@@ -59,7 +56,5 @@ def execute(args: argparse.Namespace) -> int:
 def _line(row: Row) -> str:
     verdict = "ok  " if row.passed else "FAIL"
     note = f"  ({row.note})" if row.note else ""
-    return (
-        f"{verdict}  {row.error:8.1e} <= {row.bound:7.1e}  {row.method:<5}  {row.claim}"
-        f"  [{row.resolution}]{note}"
-    )
+    error = f"{row.error:8.1e} <= {row.bound:7.1e}"
+    return f"{verdict}  {error}  {row.method:<5}  {row.claim}  [{row.resolution}]{note}"

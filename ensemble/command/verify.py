@@ -10,20 +10,16 @@ import argparse
 import json
 from pathlib import Path
 
+from adhesis.ensemble.command.parser import declare
 from adhesis.ensemble.exit_codes import DONE, SOME_FAILED
 
-EXAMPLES = (
-    "adhesis verify paper.h5",
-    "adhesis verify paper.h5 --json",
-)
+EXAMPLES = ("adhesis verify paper.h5", "adhesis verify paper.h5 --json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("file", type=Path, metavar="FILE.h5", help="the results file")
-    parser.add_argument(
-        "--json", action="store_true", help="counts, and every damaged row with its task, as JSON"
-    )
+    rows = "counts, and every damaged row with its task, as JSON"
+    declare(parser, ("file FILE.h5", Path, "the results file"), ("--json", bool, rows))
 
 
 def execute(args: argparse.Namespace) -> int:

@@ -20,17 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from adhesis.ensemble.errors import WriteError
-from adhesis.ensemble.run.launch import (
-    check_file_size_limit,
-    cores,
-    end_with_parent,
-    launch_environment,
-    launcher,
-    python,
-    python_environment,
-    settings,
-)
-from adhesis.ensemble.versions import first_lines, installed, last_lines, processor
+from adhesis.ensemble.run import launch
+from adhesis.ensemble.versions import LAST, gist, installed, processor
 
 _RANKS = 2
 _TIME_LIMIT = 60.0  # s; the first load of the libraries from a cold network disk is slow
@@ -70,10 +61,9 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     found = alone.reports[0] if alone.reports else {}
     texts = found.get("versions") or installed()
     checks = [_libraries(alone, texts), _kernels()]
-    mpi_loads = bool(found.get("mpi_loads"))
-    mpirun = launcher()
+    mpirun = launch.launcher()
     together: _Probe | None = None
-    if not mpi_loads:
+    if not found.get("mpi_loads"):
         checks.append(Check("MPI library", False, texts["mpi"], needed=False))
     elif mpirun is None:
         text = "no mpirun and no mpiexec in PATH; adhesis run --ranks starts processes instead"
@@ -82,29 +72,19 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
         together = _run_probe([mpirun, "-n", str(_RANKS)], directory)
         checks.append(_ranks(together, mpirun))
 
-    parallel = bool(found.get("parallel_hdf5"))
-    if not parallel:
-        writer, why = "rank 0", f"this h5py has HDF5 {texts['hdf5']}"
+    writer = "rank 0"
+    if not found.get("parallel_hdf5"):
+        why = f"this h5py has HDF5 {texts['hdf5']}"
     elif together is None:
-        writer, why = "rank 0", "no ranks could be started"
+        why = "no ranks could be started"
     else:
         written = _writing(together)
         checks.append(written)
-        writer, why = "rank 0", written.text
+        why = written.text
         if written.ok:
             writer, why = "mpio", "h5py has parallel HDF5, and ranks wrote a file together"
-    return Diagnosis(
-        versions=texts,
-        cores=cores(),
-        mpirun=mpirun or "",
-        mpirun_version=_mpirun_version(mpirun) if mpirun else "",
-        writer=writer,
-        why=why,
-        checks=checks,
-    )
-
-
-# ------------------------------------------------------------------------------------- the checks
+    version = _mpirun_version(mpirun) if mpirun else ""
+    return Diagnosis(writer, why, launch.cores(), mpirun or "", version, texts, checks)
 
 
 @dataclass(frozen=True)
@@ -115,18 +95,17 @@ class _Probe:
     failure: str  # empty if the command ended well
 
 
-def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
+def _run_probe(start: list[str], directory: Path | str | None) -> _Probe:
     try:
-        if launch:
-            check_file_size_limit()
+        if start:
+            launch.check_file_size_limit()
         with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
-            probe = python("-m", "adhesis.ensemble.doctor.examine", scratch)
-            code, output = _run([*launch, *probe, *(["together"] if launch else [])])
+            probe = launch.python("-m", "adhesis.ensemble.doctor.examine", scratch)
+            code, output = _run([*start, *probe, *(["together"] if start else [])])
             failure = "" if code == 0 else f"did not end within {_TIME_LIMIT:.0f} s"
             if code:
                 # of several processes, the first page has the reason, of one the last lines
-                lines = first_lines(output) if launch else last_lines(output)
-                failure = f"ended with {code}: {lines}"
+                failure = f"ended with {code}: {gist(output, slice(4) if start else LAST)}"
             reports = []
             for path in sorted(Path(scratch).glob("report-*.json")):
                 with suppress(OSError, ValueError):  # the process ended while it wrote
@@ -140,13 +119,13 @@ def _run(command: list[str]) -> tuple[int | None, str]:
     """Return the exit code of a command and what it wrote; None if it passed the time limit."""
     process = subprocess.Popen(
         command,
-        env=python_environment(launch_environment(_RANKS)),
+        env=launch.python_environment(launch.launch_environment(_RANKS)),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         errors="replace",
-        preexec_fn=end_with_parent,
+        preexec_fn=launch.end_with_parent,
     )
     try:
         output, _ = process.communicate(timeout=_TIME_LIMIT)
@@ -166,9 +145,8 @@ def _run(command: list[str]) -> tuple[int | None, str]:
 def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
     if not probe.reports:
         return Check("libraries", False, f"a process that loads them {probe.failure}")
-    broken = [
-        f"{name}: {texts[name]}" for name in ("hdf5", "fftw") if not texts[name][:1].isdigit()
-    ]
+    named = ((name, texts[name]) for name in ("hdf5", "fftw"))
+    broken = [f"{name}: {text}" for name, text in named if not text[:1].isdigit()]
     return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
 
 
@@ -176,7 +154,7 @@ def _kernels() -> Check:
     try:
         from adhesis.solver import _kernels
     except ImportError as error:
-        return Check("kernels", False, f"do not load: {last_lines(str(error))}")
+        return Check("kernels", False, f"do not load: {gist(error)}")
     return Check("kernels", True, f"{_kernels.COMPILER}, on {processor()}")
 
 
@@ -192,7 +170,7 @@ def _ranks(probe: _Probe, mpirun: str) -> Check:
         )
     else:
         text = f"{mpirun} -n {_RANKS} {probe.failure or f'gave {len(sizes)} ranks'}"
-        if given := ", ".join(settings()):
+        if given := ", ".join(launch.settings()):
             text += f"; settings of MPI: {given}"
     return Check("ranks", False, text)
 
@@ -211,12 +189,9 @@ def _mpirun_version(mpirun: str) -> str:
         _, output = _run([mpirun, "--version"])
     except OSError as error:
         return str(error)
-    lines = [" ".join(line.split()) for line in output.splitlines()]
     # The version is in the first line of Open MPI, in the second of MPICH's Hydra.
-    return next((line for line in lines if any(c.isdigit() for c in line)), "")
-
-
-# --------------------------------------------------------------------- in a process of its own
+    numbered = (line for line in output.splitlines() if any(c.isdigit() for c in line))
+    return " ".join(next(numbered, "").split())
 
 
 def _report(scratch: Path, together: bool) -> None:
@@ -230,7 +205,7 @@ def _report(scratch: Path, together: bool) -> None:
         mpi4py.rc.initialize = together
         importlib.import_module("mpi4py.MPI")
     except (ImportError, RuntimeError) as error:
-        found["mpi_loads"], reason = False, f"does not load: {last_lines(str(error))}"
+        found["mpi_loads"], reason = False, f"does not load: {gist(error)}"
     found["versions"] = installed() | ({"mpi": reason} if reason else {})
     # "3.0 parallel"; without HDF5 the reason
     parallel = found["parallel_hdf5"] = found["versions"]["hdf5"].endswith("parallel")
@@ -265,10 +240,10 @@ def _write_together(path: Path, comm: Any) -> str:
             if not np.array_equal(file["rows"][()], expected):
                 return "the file does not hold what was written"
     except (OSError, RuntimeError, ValueError, KeyError) as error:
-        return last_lines(str(error))
+        return gist(error)
     return "ok"
 
 
 if __name__ == "__main__":
-    end_with_parent()
+    launch.end_with_parent()
     _report(Path(sys.argv[1]), together=len(sys.argv) > 2)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from adhesis.ensemble.errors import InputError, quoted
-from adhesis.ensemble.quantities import STRESS, read_words, words_of
+from adhesis.ensemble.quantities import STRESS, read_list
 from adhesis.ensemble.trace.options import MAX_PENETRATION, refuse_several
 from adhesis.solver.loading.cycle import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
@@ -17,7 +17,6 @@ from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 
-_OUT = "out"
 _TURNS = ("max_penetration", "max_stress", "preload")
 
 
@@ -56,13 +55,12 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     control = control_of(args, half_space)
     if args.path is not None:
         refuse_several(args, "path", *_TURNS)
-        words = words_of("--path", args.path)
-        out = words[-1] == _OUT
-        words = words[:-1] if out else words
-        if not words:
+        turns, comma, last = args.path.rpartition(",")
+        out = last.strip() == "out"
+        if out and not comma:
             raise InputError(f"--path is {quoted(args.path)}: it holds no turning point")
         rule = "numbers with commas between them, and perhaps 'out' behind the last"
-        points = read_words("--path", words, rule=rule, text=args.path)
+        points = read_list("--path", turns if out else args.path, rule=rule, given=args.path)
         return Cycle(points, control, args.load_steps, is_path=True, out=out)
     cycle = turns_of(args, control)
     return replace(cycle, points=tuple(sorted(cycle.points)))
@@ -92,26 +90,25 @@ def turns_of(args: argparse.Namespace, control: Control) -> Cycle:
     rule = "one or more numbers, as 1.5 or 0.5,1.5"
     if control.is_fixed:
         rule = "one or more numbers between 0 and 1, as 0.9 or 0.3,0.6"
-    penetrations: tuple[float, ...] | None = None
+    penetrations: tuple[float, ...] = ()
     if args.max_penetration is not None:
         penetrations = _distinct("--max-penetration", args.max_penetration, float, rule)
     if args.preload is None:
         return Cycle(penetrations or (MAX_PENETRATION,), control, args.load_steps)
-    if penetrations is not None and len(penetrations) > 1:
+    if len(penetrations) > 1:
         raise InputError(
             f"--max-penetration is {args.max_penetration} beside --preload: it must be one number, "
             "at which a loop turns that has not reached its preload"
         )
     preloads = _distinct("--preload", args.preload, STRESS.read)
-    latest = None if penetrations is None else penetrations[0]
-    return Cycle(preloads, control, args.load_steps, True, latest)
+    return Cycle(preloads, control, args.load_steps, True, next(iter(penetrations), None))
 
 
 def _distinct(
     option: str, text: str, read: Callable[[str], float], rule: str = ""
 ) -> tuple[float, ...]:
     """Read turning points with commas between them, all different."""
-    points = read_words(option, words_of(option, text), read, rule)
+    points = read_list(option, text, read, rule)
     if len(set(points)) < len(points):
         raise InputError(f"{option} is {text}: turning points must differ")
     return points
@@ -131,13 +128,10 @@ def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
 def in_options(text: str, args: argparse.Namespace) -> str:
     """Return a message on a path with the options that prescribe a stiffness or the separation."""
     option = "--stiffness" if args.layer is None else "--layer"
-    weight = "--stiffness 0 --max-stress"
+    weight, change = "--stiffness 0 --max-stress", "larger" if args.layer is None else "thinner"
     for words, replacement in (
         ("give a preload in place of max_stress", f"give --preload in place of {weight}"),
-        (
-            "give a larger stiffness",
-            "give a thinner --layer" if args.layer is not None else "give a larger --stiffness",
-        ),
+        ("give a larger stiffness", f"give a {change} {option}"),
         ("prescribe the separation", f"prescribe the separation by leaving {option} out"),
     ):
         text = text.replace(words, replacement)

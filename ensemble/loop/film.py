@@ -27,11 +27,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.film_scenes import Scene, Scenes
+from adhesis.ensemble.loop.record import Result
 from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.solver import checks
 from adhesis.solver.checks import counted, function
-from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.model.profile import Array
 
@@ -39,17 +39,12 @@ FORMATS = (".html", ".gif", ".mp4")
 _WIDTH, _HEIGHT = 9.0, 6.2  # inches
 _DPI = 80  # of .gif and .mp4: 720 × 496 pixels, even numbers, as mp4 wants them
 _RATE = 10  # frames a second
-_BODY, _CONTACT, _POINT = "film-body", "film-contact", "film-point"
 _TENTH = 10.0  # coordinates of the page are whole tenths of a point
 # A surface far above the profile, on long necks, is cut off: the profile keeps a third.
 _MOST_RANGE = 3.0
 _LOOK: Any = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "legend.fontsize": 8,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize"), 9),
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), 8),
     "axes.formatter.use_mathtext": False,  # text of the page stays text
     "savefig.bbox": None,
     "svg.fonttype": "none",
@@ -66,9 +61,8 @@ def check_film(name: str, path: str | os.PathLike[str]) -> Path:
     ending = path.suffix.lower()
     check_ending(name, path, *FORMATS)
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
-        raise InputError(
-            f"{name} is {path}: ffmpeg, which writes .mp4, is not installed, so take .html or .gif"
-        )
+        why = "ffmpeg, which writes .mp4, is not installed"
+        raise InputError(f"{name} is {path}: {why}, so take .html or .gif")
     return path
 
 
@@ -81,7 +75,7 @@ class Film:
     scenes : Scenes
     """
 
-    def __init__(self, result: LoopResult | PathResult, scenes: Scenes) -> None:
+    def __init__(self, result: Result, scenes: Scenes) -> None:
         self._result, self._scenes = result, scenes
 
     def __repr__(self) -> str:
@@ -99,10 +93,7 @@ class Film:
         )
 
     def save(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        progress: Callable[[int, int], None] | None = None,
+        self, path: str | os.PathLike[str], *, progress: Callable[[int, int], None] | None = None
     ) -> None:
         """Write the film.
 
@@ -179,7 +170,7 @@ class Film:
 class _Drawing:
     """The figure of a film, and what moves in it."""
 
-    def __init__(self, result: LoopResult | PathResult, scenes: Scenes) -> None:
+    def __init__(self, result: Result, scenes: Scenes) -> None:
         self._result, self._scenes = result, scenes
         with style(), mpl.rc_context(_LOOK):
             self.figure = new_figure(2, 1, _WIDTH, _HEIGHT, height_ratios=[3, 4])
@@ -200,34 +191,27 @@ class _Drawing:
         top = 1e6 * max(float(scene.surface.max()) for scene in self._scenes.scenes)
         self._ceiling = min(top, floor + _MOST_RANGE * span) + 0.1 * span
         axes.fill_between(self._mm, height, floor, color="0.55", lw=0)
-        (self._body,) = axes.fill(self._mm, height, fc="#56B4E9", ec="#0072B2", lw=1.0, alpha=0.55)
-        (self._contact,) = axes.plot(
-            self._mm[:2], height[:2], color="#D55E00", lw=3.0, solid_capstyle="round"
-        )
-        self._body.set_gid(_BODY)
-        self._contact.set_gid(_CONTACT)
-        axes.set(
-            xlim=(self._mm[0], self._mm[-1]),
-            ylim=(floor, self._ceiling),
-            xlabel="position (mm)",
-            ylabel="height (µm)",
-        )
-        axes.set_title(
-            "elastic body (blue) over the rigid profile (grey), contact in red", loc="left"
-        )
+        blue: Any = {"fc": "#56B4E9", "ec": "#0072B2", "lw": 1.0, "alpha": 0.55}
+        (self._body,) = axes.fill(self._mm, height, gid="film-body", **blue)
+        red: Any = {"color": "#D55E00", "lw": 3.0, "solid_capstyle": "round"}
+        (self._contact,) = axes.plot(self._mm[:2], height[:2], gid="film-contact", **red)
+        axes.set(xlim=(self._mm[0], self._mm[-1]), ylim=(floor, self._ceiling))
+        axes.set(xlabel="position (mm)", ylabel="height (µm)")
+        title = "elastic body (blue) over the rigid profile (grey), contact in red"
+        axes.set_title(title, loc="left")
 
     def _draw_curve(self, axes: Axes) -> None:
         result = self._result
-        scale = result.problem.stress_scale
-        x, y = result.penetration, result.mean_stress / scale
+        x, y = result.penetration, result.mean_stress / result.problem.stress_scale
+        self._path = np.column_stack([x, y])
         for branch in ("loading", "unloading"):
             rows = np.where(result.branch == branch, y, np.nan)
             axes.plot(x, rows, color="k", ls=LINE_OF_BRANCH[branch], lw=1.0, label=branch)
         places = np.array(result.states_before_jumps(), dtype=int)
         axes.plot(x[places], y[places], "o", ms=3, mfc="#D55E00", mew=0, label="jumps")
         axes.axhline(0, color="0.7", lw=0.5, zorder=0)
-        (self._point,) = axes.plot(x[:1], y[:1], "o", ms=8, mfc="#0072B2", mec="w")
-        self._point.set_gid(_POINT)
+        look: Any = {"ms": 8, "mfc": "#0072B2", "mec": "w", "gid": "film-point"}
+        (self._point,) = axes.plot(x[:1], y[:1], "o", **look)
         axes.set(xlabel="penetration Δ/h_max", ylabel="σ~ = 2p̄/(E* q0 h_max)")
         axes.legend(loc="best")
         axes.set_title(" ")  # keeps the place of the texts
@@ -252,8 +236,6 @@ class _Drawing:
             artist.set_visible(True)
         self.figure.figimage(picture, zorder=-1)
 
-    # ------------------------------------------------------------------ a frame of the figure
-
     def show(self, scene: Scene, *, texts: bool = False) -> None:
         """Move the figure to a frame; with its texts, which a page has beside the figure."""
         surface = 1e6 * scene.surface
@@ -266,16 +248,12 @@ class _Drawing:
             piece = np.array([left, *inside, right])
             pieces += [np.column_stack([piece, np.interp(piece, self._mm, surface)]), pieces[0]]
         self._contact.set_data(*np.concatenate(pieces).T)
-        result, index = self._result, scene.state
-        stress = result.mean_stress[index] / result.problem.stress_scale
-        self._point.set_data([result.penetration[index]], [stress])
+        self._point.set_data(*self._path[[scene.state]].T)
         if texts:
             caption, _, lost = scene.caption.partition("; ")
             self._texts[0].set_text(caption)
             self._texts[1].set_text(scene.announcement or lost)
             self._texts[1].set_color("#D55E00" if scene.announcement else "k")
-
-    # ------------------------------------------------------------------ a frame of the page
 
     def moved(self, scene: Scene) -> dict[str, Any]:
         """Return what a page moves for a frame, in tenths of a point.
@@ -283,10 +261,8 @@ class _Drawing:
         ``y``: the surface at the positions ``x``, the first value and then differences; ``c``: ends
         of the contact patches in units of the spacing of ``x``, in thousandths; ``p``: the point.
         """
-        index, result = scene.state, self._result
         _, y = self._tenths(self._shape, self._mm, 1e6 * scene.surface)
-        stress = result.mean_stress[index : index + 1] / result.problem.stress_scale
-        point = self._tenths(self._curve, result.penetration[index : index + 1], stress)
+        point = self._tenths(self._curve, *self._path[[scene.state]].T)
         spacing = self._scenes.x[1]
         return {
             "y": [int(v) for v in np.diff(y, prepend=0)],

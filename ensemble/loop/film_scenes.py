@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from adhesis.ensemble.loop.record import Result
 from adhesis.solver.checks import Bounds, counted, function, whole
-from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import ContactState, Method
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Array
@@ -28,11 +27,8 @@ class Scene:
     """One frame."""
 
     state: int  # number of the state in the result
-    # Shape (nodes,); height of the deformed surface above the profile's mean line, in m
-    surface: Array
-    # Shape (patches, 2); ends of the contact patches in m, within the period; one across its end is
-    # two
-    patches: Array
+    surface: Array  # height above the profile's mean line in m, shape (nodes,)
+    patches: Array  # ends in m, shape (patches, 2), within the period; one across its end is two
     caption: str  # the state in numbers
     announcement: str  # the jumps since the frame before; empty without any
     is_notable: bool  # whether those jumps lose a hundredth of all drops or more
@@ -42,18 +38,14 @@ class Scene:
 class Scenes:
     """All frames of a film."""
 
-    # x, height: shape (nodes,); positions in m from 0 to the period, both included, and the rigid
-    # profile there in m
-    x: Array
-    height: Array
+    x: Array  # positions in m from 0 to the period, both included, shape (nodes,)
+    height: Array  # of the rigid profile there, in m
     scenes: list[Scene]  # in the order of the path
     jumps_shown: int  # jumps that have a frame before and one after them
 
 
 def scenes_of(
-    result: LoopResult | PathResult,
-    frames: int,
-    progress: Callable[[int, int], None] | None = None,
+    result: Result, frames: int, progress: Callable[[int, int], None] | None = None
 ) -> Scenes:
     """Compute the frames of a result: evenly spaced ones, and on top those of jumps.
 
@@ -79,25 +71,17 @@ def scenes_of(
         state = result.contact_states[index]
         since = [j for j, p in zip(result.jumps, places, strict=True) if last <= p < index]
         before = sum(p < index for p in places)
-        scenes.append(
-            Scene(
-                state=index,
-                surface=_surface(method, state, x, height),
-                patches=_patches(state, profile.period),
-                caption=_caption(result, index, before),
-                announcement=_announcement(since),
-                is_notable=_drop(since) > 0.01 * _drop(result.jumps),
-            )
-        )
+        shapes = _surface(method, state, x, height), _patches(state, profile.period)
+        texts = _caption(result, index, before), _announcement(since)
+        is_notable = _drop(since) > 0.01 * _drop(result.jumps)
+        scenes.append(Scene(index, *shapes, *texts, is_notable))
         last = index
         if progress is not None:
             progress(done, len(chosen))
     return Scenes(x, height, scenes, shown)
 
 
-def _chosen(
-    result: LoopResult | PathResult, places: Sequence[int], frames: int
-) -> tuple[list[int], int]:
+def _chosen(result: Result, places: Sequence[int], frames: int) -> tuple[list[int], int]:
     """Numbers of the states that are shown, and of how many jumps."""
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(result.penetration)))])
     even = np.searchsorted(way, np.linspace(0.0, way[-1], frames))
@@ -140,7 +124,7 @@ def _drop(jumps: Sequence[Jump]) -> float:
     return float(sum(jump.energy_drop for jump in jumps))
 
 
-def _caption(result: LoopResult | PathResult, index: int, jumps: int) -> str:
+def _caption(result: Result, index: int, jumps: int) -> str:
     lost = _drop(result.jumps[:jumps])
     patches = counted(int(result.patches[index]), "patch")
     return (

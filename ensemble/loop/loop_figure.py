@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from adhesis.ensemble.loop.record import Result
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.figures.curves import Curve, draw_curves, look_of_branch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import LoopState
-from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import Fields, Opening
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile
 
 
-def draw_loops(results: Sequence[LoopResult | PathResult], ax: object = None) -> Figure:
+def draw_loops(results: Sequence[Result], ax: object = None) -> Figure:
     """Draw loops of ascending turning points that share their loading branch, or one path.
 
     ``ax`` is that of :func:`draw_curves`.
@@ -28,7 +28,7 @@ def draw_loops(results: Sequence[LoopResult | PathResult], ax: object = None) ->
     return draw_curves(_curves_of(results), ax)
 
 
-def _curves_of(results: Sequence[LoopResult | PathResult]) -> Iterator[Curve]:
+def _curves_of(results: Sequence[Result]) -> Iterator[Curve]:
     for k, result in enumerate(results):
         columns = result.columns()
         if isinstance(result, LoopResult):

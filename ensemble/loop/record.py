@@ -14,16 +14,18 @@ from adhesis.solver.loading.loop_state import LoopState
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
 
+Result = LoopResult | PathResult
 
-def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
+
+def loop_document(result: Result) -> dict[str, Any]:
     """Return the JSON document of a loop or path, whose ``provenance`` names the units.
 
     The states of a loop are there twice: ``states`` is a list of objects, one per state, and each
     of its keys is also a list of its own at the top level, for readers that want columns.
     """
     columns = {name: values.tolist() for name, values in result.columns().items()}
-    interior, details = result.interior, asdict(result.method)
-    del details["name"]
+    interior, details = result.interior, asdict(result.method).items()
+    plain = {k: v.tolist() if hasattr(v, "tolist") else v for k, v in details if k != "name"}
     control, h_max = result.problem.control, result.problem.profile.h_max
     displacement = {}
     if not control.is_fixed:  # path of the far side in h_max
@@ -35,29 +37,19 @@ def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
         "interior_tension": None if interior is None else asdict(interior),
         "loss_note": result.loss_note,
         "warnings": list(result.warnings),
-        "method_details": {
-            key: value.tolist() if hasattr(value, "tolist") else value
-            for key, value in details.items()
-        },
+        "method_details": plain,
         "jumps": result.jump_rows(),
         **columns,
     }
     if isinstance(result, PathResult):
-        return document | {
-            "turning_points": list(result.turning_points),
-            "out": result.ends_out,
-            "minor_loops": [
-                asdict(part) | {"audit_residual": part.audit_residual}
-                for part in result.minor_loops
-            ],
-        }
+        loops = [asdict(p) | {"audit_residual": p.audit_residual} for p in result.minor_loops]
+        turns, out = list(result.turning_points), result.ends_out
+        return document | {"turning_points": turns, "out": out, "minor_loops": loops}
     rows = zip(*columns.values(), strict=True)
     return document | {"states": [dict(zip(columns, row, strict=True)) for row in rows]}
 
 
-def document(
-    results: Sequence[LoopResult | PathResult], warnings: Sequence[str] = ()
-) -> dict[str, Any]:
+def document(results: Sequence[Result], warnings: Sequence[str] = ()) -> dict[str, Any]:
     """Return the JSON document of one path, or of loops with ascending turning points.
 
     That of the last loop, and where there are several all of them, in order, as ``turns``. The keys
@@ -68,9 +60,6 @@ def document(
     for one in documents:
         one["warnings"] = [*warnings, *one["warnings"]]
     return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})
-
-
-# ---------------------------------------------------------------------- fields
 
 
 def fields_at_penetrations(
@@ -131,13 +120,10 @@ def _arrays(found: Sequence[LoopState], n: int) -> dict[str, Any]:
         row[: one.state.patches] = one.edges
     fields = [one.fields(n) for one in found]
     of_states = ("branch", "penetration", "separation", "mean_stress")
+    of_fields = ("stress", "displacement", "gap")
     return {
         **{name: np.array([getattr(one, name) for one in found]) for name in of_states},
-        "x": fields[0].x,
-        "height": fields[0].height,
-        **{
-            name: np.array([getattr(one, name) for one in fields])
-            for name in ("stress", "displacement", "gap")
-        },
+        **{name: getattr(fields[0], name) for name in ("x", "height")},
+        **{name: np.array([getattr(one, name) for one in fields]) for name in of_fields},
         "edges": edges,
     }

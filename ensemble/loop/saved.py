@@ -24,6 +24,7 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.record import Result
 from adhesis.ensemble.outputs import check_ending, check_outputs, whole_file
 from adhesis.ensemble.quantities import units_under, with_units
 from adhesis.ensemble.regular_file import open_regular
@@ -39,7 +40,6 @@ from adhesis.solver.model.pattern import AdhesionPattern
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Profile
 
-Result = LoopResult | PathResult
 _KINDS: dict[str, type[Result]] = {"loop": LoopResult, "path": PathResult}
 _KIND = "adhesis_result"
 _NOT_KEPT = {"problem", "method", "contact_states", "new_method"}
@@ -64,9 +64,6 @@ class SavedReport(MethodReport):
             raise AttributeError(name) from None
 
 
-# ---------------------------------------------------------------------- tables
-
-
 def to_dataframe(result: Result, of: str) -> Any:
     """Return states or jumps as a table; see :meth:`adhesis.LoopResult.to_dataframe`."""
     checks.choice("of", of, ("states", "jumps"))
@@ -80,7 +77,7 @@ def to_dataframe(result: Result, of: str) -> Any:
 def to_xarray(result: Result) -> xr.Dataset:
     """Return a labelled dataset; see :meth:`adhesis.LoopResult.to_xarray`."""
     variables: dict[str, Any] = {}
-    kind = next(name for name, kind in _KINDS.items() if isinstance(result, kind))
+    kind = "path" if isinstance(result, PathResult) else "loop"
     about: dict[str, Any] = {_KIND: kind, "adhesis_version": __version__}
     problem = result.problem
     is_load = problem.control.is_load
@@ -123,9 +120,6 @@ def to_xarray(result: Result) -> xr.Dataset:
         "method": json.dumps(report, default=lambda v: v.tolist()),
     }
     return xr.Dataset(variables, attrs=about)
-
-
-# ---------------------------------------------------------------------- files
 
 
 def write_csv(path: Path, results: Sequence[Result]) -> None:
@@ -208,9 +202,8 @@ def load(path: str | os.PathLike[str]) -> Result:
     except PermissionError:
         raise InputError(f"path is {path}: it cannot be read (permission denied)") from None
     except Exception as error:  # h5py and xarray raise nearly every kind over a crafted file
-        raise InputError(
-            f"path is {path}: it is no loop or path that adhesis has saved ({type(error).__name__})"
-        ) from error
+        what = f"no loop or path that adhesis has saved ({type(error).__name__})"
+        raise InputError(f"path is {path}: it is {what}") from error
 
 
 def _waves(found: xr.Dataset, name: str) -> Any:
@@ -225,10 +218,8 @@ def _result(found: xr.Dataset) -> Result:
         name = entry.name
         if name in _PARTS:
             dim, part = _PARTS[name]
-            names = [entry.name for entry in fields(part)]
-            columns = [found[f"{dim}_{entry}"].values.tolist() for entry in names]
-            rows = zip(*columns, strict=True)
-            values[name] = tuple(part(**dict(zip(names, row, strict=True))) for row in rows)
+            columns = [found[f"{dim}_{entry.name}"].values.tolist() for entry in fields(part)]
+            values[name] = tuple(part(*row) for row in zip(*columns, strict=True))
         elif name in found:
             array = found[name].values
             values[name] = array.astype(str) if array.dtype.kind == "O" else array
@@ -255,11 +246,7 @@ def _result(found: xr.Dataset) -> Result:
 
 def sealed(content: bytes) -> bytes:
     """Return the bytes of a file with their checksum behind them."""
-    return content + _seal(content)
-
-
-def _seal(content: bytes) -> bytes:
-    return _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+    return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def _read_sealed(path: Path) -> xr.Dataset:
@@ -278,9 +265,9 @@ def _read_sealed(path: Path) -> xr.Dataset:
         if size > _MOST_BYTES:
             raise InputError(f"path is {path}: it has {size / 1e6:.0f} MB, more than any loop")
         stream.seek(0)
-        content = stream.read(size)
-    content, seal = content[:-_LENGTH], content[-_LENGTH:]
-    if seal != _seal(content):
+        whole = stream.read(size)
+    content = whole[:-_LENGTH]
+    if sealed(content) != whole:
         raise InputError(
             f"path is {path}: it is damaged, as its bytes do not have their checksum; take a copy "
             "of it, or compute the loop again"
@@ -296,13 +283,8 @@ def _check_members(path: Path, file: h5py.File, size: int) -> None:
     """Refuse what would be read from elsewhere, or is larger than the file, before it is read."""
     for name in file:
         own = isinstance(file.get(name, getlink=True), h5py.HardLink)
-        found = file[name] if own else None
-        if (
-            not isinstance(found, h5py.Dataset)
-            or found.is_virtual
-            or found.external
-            or (found.size or 0) * found.dtype.itemsize > size
-        ):
-            raise InputError(
-                f"path is {path}: it holds {name!r} otherwise than adhesis saves a loop or path"
-            )
+        found: Any = file[name] if own else None
+        is_own = isinstance(found, h5py.Dataset) and not (found.is_virtual or found.external)
+        if not is_own or (found.size or 0) * found.dtype.itemsize > size:
+            otherwise = f"it holds {name!r} otherwise than adhesis saves a loop or path"
+            raise InputError(f"path is {path}: {otherwise}")

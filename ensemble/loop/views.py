@@ -11,16 +11,13 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+from adhesis.ensemble.loop.record import Result
 from adhesis.ensemble.quantities import UNITS, drive_text, stress_text
 from adhesis.ensemble.reporter import bar
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.loading.path import PathResult
 from adhesis.solver.loading.path_record import Progress
 from adhesis.solver.method import Branch, ContactState, Method
 from adhesis.solver.values import brief
-
-Result = LoopResult | PathResult
 
 
 def plot(result: Result, ax: Any = None) -> Any:
@@ -58,15 +55,12 @@ def __getattr__(name: str) -> Any:
     return getattr(saved, name)
 
 
-# ---------------------------------------------------------------------- in notebooks
-
-
 def page(shown: Any) -> str:
     """Return the numbers of an object with their units, and its figure if it has one, as HTML."""
     from adhesis.ensemble.loop.loop_figure import draw_shape
     from adhesis.ensemble.report.html import picture_of, table_of
 
-    if isinstance(shown, LoopResult | PathResult):
+    if isinstance(shown, Result):
         rows = shown.summary_rows() + [("warning", text) for text in shown.warnings]
         return table_of(rows) + picture_of(plot(shown))
     figure = draw_shape(shown)

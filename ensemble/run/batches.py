@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.precision import enough, looks
 from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.interval import Array
 
 
 @dataclass
 class _Cell:
     # By realisation: its row, the value of the quantity, and whether there is one
     rows: NDArray[np.int64]
-    values: NDArray[np.float64]
+    values: Array
     known: NDArray[np.bool_]
-    # Of every value: 0 without adhesion, where nothing is lost and the value is rounding, or NaN
-    factor: float
+    factor: float  # 0 without adhesion, where nothing is lost and a value is rounding, or NaN
     asked: int = 0
     full: bool = False
 
@@ -39,9 +39,7 @@ class Batches:
     ``known`` which of them have been computed.
     """
 
-    def __init__(
-        self, campaign: Campaign, values: NDArray[np.float64], known: NDArray[np.bool_]
-    ) -> None:
+    def __init__(self, campaign: Campaign, values: Array, known: NDArray[np.bool_]) -> None:
         assert campaign.stop.relative_error is not None
         self._wanted = campaign.stop.relative_error
         self._looks = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
@@ -83,7 +81,4 @@ class Batches:
         known = int(np.append(cell.known, False).argmin())  # without a gap
         stop = enough(cell.values[:known], self._looks, self._wanted)
         cell.full = stop is not None
-        if stop is None:
-            cell.asked = next(look for look in self._looks if look > known)
-        else:
-            cell.asked = stop
+        cell.asked = stop or next(look for look in self._looks if look > known)

@@ -42,7 +42,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Protocol
@@ -188,11 +188,10 @@ class Master:
             self._heard[message[0]] = self._awake
         elif self._awake > self._next_count:
             self._next_count = self._awake + self.limits.silence / 12
+            longest = self.limits.silence
             for rank, heard in self._heard.items():
-                if self._awake - heard > self.limits.silence:
-                    raise Unresponsive(
-                        f"rank {rank} has not answered for {self.limits.silence:g} s"
-                    )
+                if self._awake - heard > longest:
+                    raise Unresponsive(f"rank {rank} has not answered for {longest:g} s")
         return message
 
     def _consider_stopping(self) -> None:
@@ -278,36 +277,6 @@ class Master:
                 self._reason = self._reason or message[1][1]
 
 
-def attempt(
-    compute: Compute, task: int, rank: int, stop: Callable[[Any], bool], limit: float | None
-) -> Outcome:
-    """Compute one task; failures become part of the outcome.
-
-    ``stop`` takes the note of the task's last check, or None, and returns whether to give it up:
-    GivenUp is then raised. ``limit`` is in s. What the handler of a signal raises meanwhile passes.
-    """
-    started = time.perf_counter()
-    end = started + (math.inf if limit is None else limit)
-
-    def check(note: Any = None) -> None:
-        if stop(note):
-            raise GivenUp
-        if time.perf_counter() > end:
-            raise TimeLimit(f"longer than the time limit of {limit:g} s")
-
-    result, error = None, None
-    try:
-        with _watched(check):
-            result = compute(task, check)
-    except TimeLimit as failure:
-        error = str(failure)
-    except Exception as failure:
-        if raised_by_handler(failure):
-            raise
-        error = f"{type(failure).__name__}: {failure}"
-    return Outcome(task, rank, time.perf_counter() - started, error, result)
-
-
 @contextmanager
 def _watched(check: StopCheck) -> Iterator[None]:
     """Call ``check`` from a timer too: a task may hang before it calls it itself.
@@ -365,20 +334,37 @@ class Worker:
         if message[0] == "dismissed":
             self.channel.send(MASTER, ("goodbye",))
             return False
-        self._task, self._note = message[1], None
-        answer: Message = ("given up", self._task)
+        task = self._task = message[1]
+        self._note = None
+        answer: Message = ("given up", task)
         if not self._stopped():
-            try:
-                outcome = attempt(
-                    *(self.compute, self._task, self.channel.rank),
-                    *(self._stopped, self.limits.task_seconds),
-                )
-                answer = ("outcome", self.deliver(outcome))
-            except GivenUp:
-                pass
+            with suppress(GivenUp):
+                answer = ("outcome", self.deliver(self._attempt(task)))
         self._task = None
         self.channel.send(MASTER, answer)
         return True
+
+    def _attempt(self, task: int) -> Outcome:
+        """Compute one task; failures become part of the outcome, what a handler raises passes."""
+        started, limit = time.perf_counter(), self.limits.task_seconds
+
+        def check(note: Any = None) -> None:
+            if self._stopped(note):
+                raise GivenUp
+            if limit is not None and time.perf_counter() > started + limit:
+                raise TimeLimit(f"longer than the time limit of {limit:g} s")
+
+        result, error = None, None
+        try:
+            with _watched(check):
+                result = self.compute(task, check)
+        except TimeLimit as failure:
+            error = str(failure)
+        except Exception as failure:
+            if raised_by_handler(failure):
+                raise
+            error = f"{type(failure).__name__}: {failure}"
+        return Outcome(task, self.channel.rank, time.perf_counter() - started, error, result)
 
     def _received(self) -> Message:
         pause = SHORTEST_PAUSE

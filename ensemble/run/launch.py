@@ -68,9 +68,8 @@ def end_with_parent() -> None:
 
 def cores() -> int:
     """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    linux = hasattr(os, "sched_getaffinity")
+    return len(os.sched_getaffinity(0)) if linux else os.cpu_count() or 1
 
 
 def peak_bytes() -> int:
@@ -101,11 +100,8 @@ def launch_environment(ranks: int) -> dict[str, str]:
     """
     # A copy of os.environ already lacks what an MPI in this process has put into C's environment.
     nested = any(mark in os.environ for mark in _RANK_MARKS)
-    env = {
-        name: value
-        for name, value in os.environ.items()
-        if not (nested and name.startswith(_LAUNCHER_PREFIXES))
-    }
+    dropped = _LAUNCHER_PREFIXES if nested else ()
+    env = {k: v for k, v in os.environ.items() if not k.startswith(dropped)}
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         for prefix in ("OMPI", "PRTE"):
             env[f"{prefix}_ALLOW_RUN_AS_ROOT"] = "1"

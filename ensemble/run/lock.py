@@ -34,7 +34,7 @@ from adhesis.solver.checks import counted
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}
 # Without O_NONBLOCK, opening a pipe in place of the lock file would block.
 _SAFELY = os.O_NOFOLLOW | os.O_NONBLOCK
-_MAX_RECORD = 4096  # bytes
+_RECORD, _MAX_RECORD = ("host", "pid", "ranks", "since"), 4096  # bytes
 _RETRY_INTERVAL = 0.1  # s
 
 
@@ -62,10 +62,8 @@ class RunLock:
                     "that have outlived it: wait until they have ended"
                 )
             if not announced and patience > 1:
-                log(
-                    f"{self._results} is held by another run{self._holder()}; "
-                    f"waiting up to {patience:g} s for it to end"
-                )
+                held = f"{self._results} is held by another run{self._holder()}"
+                log(f"{held}; waiting up to {patience:g} s for it to end")
                 announced = True
             time.sleep(_RETRY_INTERVAL)
         self._owner = True
@@ -106,10 +104,8 @@ class RunLock:
                     return True
         except OSError as error:
             if error.errno in _UNSUPPORTED:
-                log(
-                    f"warning: the file system of {self.path} has no locks; "
-                    "make sure that no other run writes there"
-                )
+                none = f"the file system of {self.path} has no locks"
+                log(f"warning: {none}; make sure that no other run writes there")
                 return True
         os.close(descriptor)
         self._descriptor = None
@@ -133,21 +129,16 @@ class RunLock:
         return self._descriptor
 
     def _no_lock(self) -> InputError:
-        return InputError(
-            f"{self.path} is a link or no ordinary file, and not the lock of a run: remove it"
-        )
+        kind = "a link or no ordinary file, and not the lock of a run"
+        return InputError(f"{self.path} is {kind}: remove it")
 
     def _write_record(self, ranks: int) -> None:
         assert self._descriptor is not None
-        record = {
-            "host": socket.gethostname(),
-            "pid": os.getpid(),
-            "ranks": ranks,
-            "since": datetime.now().astimezone().isoformat(timespec="seconds"),
-        }
+        since = datetime.now().astimezone().isoformat(timespec="seconds")
+        record = zip(_RECORD, (socket.gethostname(), os.getpid(), ranks, since), strict=True)
         try:
             os.ftruncate(self._descriptor, 0)
-            os.pwrite(self._descriptor, json.dumps(record).encode(), 0)
+            os.pwrite(self._descriptor, json.dumps(dict(record)).encode(), 0)
         except OSError as error:
             self.release()
             raise WriteError(f"{self.path} cannot be written: {error.strerror}") from error
@@ -196,6 +187,6 @@ def _read_record(descriptor: int) -> dict[str, Any] | None:
     """Read the record that the holder of a lock has written into it."""
     try:
         record = json.loads(os.pread(descriptor, _MAX_RECORD, 0))
-        return {name: record[name] for name in ("host", "pid", "ranks", "since")}
+        return {name: record[name] for name in _RECORD}
     except (OSError, ValueError, KeyError, TypeError):
         return None

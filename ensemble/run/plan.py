@@ -62,9 +62,8 @@ class Selection:
 
     def rows(self, tasks: Tasks, status: NDArray[np.uint8]) -> list[int]:
         """Return the rows that are selected, by the status of each task."""
-        selected = np.isin(
-            status, (schema.FAILED, schema.DONE) if self.status == "all" else schema.FAILED
-        )
+        finished = (schema.FAILED, schema.DONE)[: 2 if self.status == "all" else 1]
+        selected = np.isin(status, finished)
         for name, chosen in self.values.items():
             if chosen:
                 selected &= np.isin(tasks.column(name), list(chosen))
@@ -90,8 +89,7 @@ class Plan:
 
     tasks: Tasks  # row by row
     rows: list[int]  # rows to compute
-    # done, failed: rows that are
-    done: int
+    done: int  # rows that are
     failed: int
     known: NDArray[np.int64]  # checksum of each row that is done or failed; -1 of others
     # Of each group of tasks that take about the same time: seconds measured, and tasks
@@ -103,14 +101,11 @@ def tasks_of(campaign: Campaign, part: Part) -> Tasks:
     """Return the tasks of a part (InputError, if there can be no such part)."""
     tasks = campaign.tasks(part)
     if part != WHOLE and campaign.stop.relative_error is not None:
-        raise InputError(
-            f"part is {part}, but the campaign has [stop]: its batches are decided on whole cells"
-        )
+        rule = "its batches are decided on whole cells"
+        raise InputError(f"part is {part}, but the campaign has [stop]: {rule}")
     if not tasks:
-        raise InputError(
-            f"part is {part}: the campaign has {counted(campaign.task_count, 'task')} and so at "
-            "most as many parts"
-        )
+        count = counted(campaign.task_count, "task")
+        raise InputError(f"part is {part}: the campaign has {count} and so at most as many parts")
     return tasks
 
 
@@ -161,9 +156,7 @@ def prepare(
         lay_out()
     else:
         with Results(path) as old:
-            grown_keys = _growth(path, old, campaign, part)
-            if grown_keys:
-                # Which rows are not needed is decided anew.
+            if _growth(path, old, campaign, part):  # which rows are not needed is decided anew
                 taken = np.isin(old.status(), (schema.DONE, schema.FAILED))
                 source = Source(old, campaign, taken)
                 lay_out([source], created=old.attributes.get("created"))
@@ -193,17 +186,15 @@ def prepare(
                 is_marked = status == schema.NOT_NEEDED
                 writer.mark(np.flatnonzero(spare & ~is_marked), schema.NOT_NEEDED)
                 writer.mark(np.flatnonzero(is_marked & ~spare), schema.PENDING)
+    left = len(plan.rows)
     if is_new:
-        at_first = " at first" if plan.batches else ""
-        say(f"{path}: {counted(len(plan.rows), 'task')} to do{at_first}")
+        say(f"{path}: {counted(left, 'task')} to do{' at first' if plan.batches else ''}")
         return plan
-    again_by = parameter("redo", "adhesis run")
     grown = "" if new is None else f", {np.isin(plan.rows, new).sum()} of them new"
-    planned = plan.done + plan.failed + len(plan.rows)  # with [stop] more may follow
-    say(
-        f"{path}: {plan.done} of {counted(planned, 'task')} done, {len(plan.rows)} to do{grown}"
-        + (f", {plan.failed} failed before (see {again_by} failed)" if plan.failed else "")
-    )
+    see = f"(see {parameter('redo', 'adhesis run')} failed)"
+    before = f", {plan.failed} failed before {see}" if plan.failed else ""
+    planned = counted(plan.done + plan.failed + left, "task")  # with [stop] more may follow
+    say(f"{path}: {plan.done} of {planned} done, {left} to do{grown}{before}")
     return plan
 
 
@@ -229,26 +220,20 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
     times: dict[Group, tuple[float, int]] = {}
     seconds = results.column("wall_time")
     for task, of_cell in tasks.by_cell():
-        done = of_cell[status[of_cell] == schema.DONE]
-        if done.size:
-            sum_before, count = times.get(group_of(campaign, task), (0.0, 0))
-            known = (sum_before + float(seconds[done].sum()), count + done.size)
-            times[group_of(campaign, task)] = known
+        measured = seconds[of_cell[status[of_cell] == schema.DONE]]
+        if measured.size:
+            group = group_of(campaign, task)
+            before, count = times.get(group, (0.0, 0))
+            times[group] = (before + float(measured.sum()), count + measured.size)
     rows, batches = np.flatnonzero(status == schema.PENDING).tolist(), None
     is_known = np.isin(status, (schema.DONE, schema.FAILED))
     if campaign.stop.relative_error is not None:
         steered = results.column(campaign.stop.quantity)
         batches = Batches(campaign, np.where(status == schema.FAILED, np.nan, steered), is_known)
         rows = batches.to_do
-    return Plan(
-        tasks=tasks,
-        rows=rows,
-        batches=batches,
-        done=int(np.sum(status == schema.DONE)),
-        failed=int(np.sum(status == schema.FAILED)),
-        known=np.where(is_known, results.column(schema.CHECKSUM.name).astype(np.int64), -1),
-        times=times,
-    )
+    done, failed = (int(np.sum(status == code)) for code in (schema.DONE, schema.FAILED))
+    known = np.where(is_known, results.column(schema.CHECKSUM.name).astype(np.int64), -1)
+    return Plan(tasks, rows, done, failed, known, times, batches)
 
 
 def group_of(campaign: Campaign, task: Task) -> Group:

@@ -61,37 +61,28 @@ class CellPrice:
 class Price:
     """Cost of a campaign."""
 
-    # tasks, done: tasks of the campaign or part, and those of them that have a result
-    tasks: int
-    done: int
+    tasks: int  # of the campaign or part
+    done: int  # those of them that have a result
     cells: tuple[CellPrice, ...]
-    # Estimated CPU time of the longest task, or of the longest set of tasks that share a loading
-    # branch, in s
-    longest: float
-    # file_bytes, rank_bytes: of the results file; of one rank's memory, as this process has had it
-    file_bytes: int
-    rank_bytes: int
+    longest: float  # CPU time in s of the longest task, or set of tasks that share a loading branch
+    file_bytes: int  # of the results file
+    rank_bytes: int  # of one rank's memory, as this process has had it
     pilots: int  # loops that were computed to find out
     pilot_seconds: float  # their CPU time
-    # Pilot loops that turned before their preload, and the highest mean stress that one of these
-    # reached at a load step, in Pa
-    pilots_short: int = 0
-    highest_stress: float = -math.inf
-    stop: str = ""  # with ``[stop]``: for how many realisations a cell the price is, and why
+    # With ``[stop]`` for how many realisations a cell the price is; pilots short of their preload
+    notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """Return the lines of ``adhesis run --dry-run``."""
-        tried = (
-            f"{counted(self.pilots, 'pilot loop')} of {duration(self.pilot_seconds)} in all"
-            if self.pilots
-            else "the loops that are done"
-        )
+        tried = "the loops that are done"
+        if self.pilots:
+            spent = duration(self.pilot_seconds)
+            tried = f"{counted(self.pilots, 'pilot loop')} of {spent} in all"
         memory = f", about {bytes_text(self.rank_bytes)} of memory a rank" if self.left else ""
         lines = [
             f"{counted(self.left, 'task')} to do in {counted(len(self.cells), 'cell')}, "
             f"{self.done} done; nothing was written",
-            *([self.stop] if self.stop else []),
-            *([self._short()] if self.pilots_short else []),
+            *self.notes,
             f"{self.seconds / 3600:.3g} core hours, by {tried}; "
             f"the longest task takes about {duration(self.longest)}",
             f"results file {bytes_text(self.file_bytes)}{memory}",
@@ -105,10 +96,9 @@ class Price:
         if len(self.cells) <= _MOST_CELLS_SHOWN:
             lines += ["", "s a loop  tasks  core hours  cell"]
             for cell in self.cells:
-                mark = " " if cell.measured else "~"
-                hours = cell.tasks * cell.seconds / 3600
-                name = cell.task.cell_name
-                lines.append(f"{mark}{cell.seconds:7.3g} {cell.tasks:6d} {hours:11.3g}  {name}")
+                mark, hours = " " if cell.measured else "~", cell.tasks * cell.seconds / 3600
+                numbers = f"{cell.seconds:7.3g} {cell.tasks:6d} {hours:11.3g}"
+                lines.append(f"{mark}{numbers}  {cell.task.cell_name}")
             if not all(cell.measured for cell in self.cells):
                 lines.append("~ extrapolated from other cells")
         return "\n".join(lines)
@@ -119,14 +109,6 @@ class Price:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
-
-    def _short(self) -> str:
-        of = f"{self.pilots_short} of {counted(self.pilots, 'pilot loop')}"
-        does, turns = ("does", "turns") if self.pilots_short == 1 else ("do", "turn")
-        return (
-            f"WARNING: {of} {does} not reach the preload, and {turns} at the latest turning point: "
-            f"{most_reached(self.highest_stress)}. {INSTEAD}."
-        )
 
     @property
     def left(self) -> int:
@@ -145,9 +127,8 @@ class Price:
     @property
     def most_workers(self) -> int:
         """Workers that are still busy for most of the time."""
-        if not self.longest:
-            return max(1, self.left)
-        return max(1, min(self.left, math.floor(self.seconds / (_BUSY * self.longest))))
+        busy = math.floor(self.seconds / (_BUSY * self.longest)) if self.longest else self.left
+        return max(1, min(self.left, busy))
 
 
 def price(
@@ -201,18 +182,22 @@ def price(
             on_pilot(task, took)
         spent, longest = spent + together, max(longest, together)
     cells, stop = _cells(campaign, tasks, left, known)
+    warning = ""
+    if short:
+        does, turns = ("does", "turns") if len(short) == 1 else ("do", "turn")
+        warning = (
+            f"WARNING: {len(short)} of {counted(pilots, 'pilot loop')} {does} not reach the "
+            f"preload, and {turns} at the latest turning point: {most_reached(max(short))}. "
+            f"{INSTEAD}."
+        )
     return Price(
-        tasks=len(tasks),
-        done=done,
-        cells=cells,
+        *(len(tasks), done, cells),
         longest=max(longest, _longest(campaign, cells)) if left else 0.0,
         file_bytes=file_size(campaign, part),
         rank_bytes=peak_bytes(),
         pilots=pilots,
         pilot_seconds=spent,
-        pilots_short=len(short),
-        highest_stress=max(short, default=-math.inf),
-        stop=stop,
+        notes=tuple(filter(None, (stop, warning))),
     )
 
 
@@ -234,10 +219,7 @@ def _left(campaign: Campaign, path: Path, tasks: Tasks, known: Known) -> tuple[T
 
 
 def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:
-    """Tasks that share a loading branch together; of each realisation the cheapest first.
-
-    The cheapest first, so that as many cells as possible are met.
-    """
+    """Tasks that share a loading branch together; the cheapest first, to meet many cells."""
     for _, of_realisation in groupby(tasks, key=attrgetter("realisation")):
         found: dict[Hashable, list[Task]] = {}
         for task in of_realisation:
@@ -257,18 +239,12 @@ def _cells(
     stop = ""
     if campaign.stop.relative_error is not None:
         wanted, stop = _realisations(campaign, known)
-        for cell in count:
-            have = campaign.realisations - count[cell]
-            count[cell] = min(count[cell], max(0, wanted - have))
-    return tuple(
-        CellPrice(
-            task,
-            count[cell],
-            mean[cell] if cell in mean else of_prior(prior(task)),
-            len(known[cell]),
-        )
-        for cell, task in first.items()
-    ), stop
+        for cell, left_here in count.items():
+            have = campaign.realisations - left_here
+            count[cell] = min(left_here, max(0, wanted - have))
+    time_of = {cell: mean.get(cell, of_prior(prior(task))) for cell, task in first.items()}
+    cells = (CellPrice(t, count[c], time_of[c], len(known[c])) for c, t in first.items())
+    return tuple(cells), stop
 
 
 def _law(priors: list[float], seconds: list[float]) -> Callable[[float], float]:

@@ -139,7 +139,6 @@ class _Socket:
 
 
 def _work(rank: int, connection: Connection) -> None:
-    """Work until dismissed."""
     try:
         compute, task_seconds, report_interval = connection.recv()
     except EOFError:

@@ -25,12 +25,10 @@ class Summary:
     # computed, failed_now: of these, by this run
     computed: int = 0
     failed_now: int = 0
-    # At the end, of all tasks in the file: losses whose own checks say that they are wrong, losses
-    # of the zero-range limit alone (:mod:`adhesis.ensemble.task.doubt`), and loops that turned
-    # before their preload was reached
+    # At the end, of all tasks in the file, as in :mod:`adhesis.ensemble.task.doubt`
     doubtful: int = 0
     beyond_limit: int = 0
-    short_of_preload: int = 0
+    short_of_preload: int = 0  # loops that turned before their preload was reached
     seconds: float = 0.0
     stopped: str | None = None  # why it stopped before the last task
     # With ``[stop]``: name of every cell, and how well the mean of its quantity is known
@@ -54,10 +52,7 @@ class ProgressLine(Display):
     """
 
     def __init__(
-        self,
-        counts: Summary,
-        time_left: Callable[[], float | None],
-        stream: TextIO | None = None,
+        self, counts: Summary, time_left: Callable[[], float | None], stream: TextIO | None = None
     ) -> None:
         super().__init__(self._line, stream, at_once=True)
         self._counts = counts
@@ -78,13 +73,12 @@ class ProgressLine(Display):
             self.say(f"doubtful loss: {what}")
 
     def _line(self, seconds: float) -> str:
-        c = self._counts
+        c, left = self._counts, self._time_left()
         parts = [f"{c.done} of {counted(c.total, 'task')} done"]
         if c.failed_now:
             parts.append(f"{c.failed_now} failed")
         if c.computed:
             parts.append(f"{duration(seconds)} so far")
-        left = self._time_left()
         if left is not None and c.pending:
             parts.append(f"about {duration(left)} left")
         return ", ".join(parts)

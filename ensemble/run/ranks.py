@@ -75,9 +75,8 @@ def world() -> Any:
         from mpi4py import MPI
     except (ImportError, RuntimeError, OSError) as error:
         if size > 1:
-            raise RankError(
-                f"{launcher} started {size} processes, but mpi4py cannot be used here: {error}"
-            ) from error
+            why = f"mpi4py cannot be used here: {error}"
+            raise RankError(f"{launcher} started {size} processes, but {why}") from error
         return OneRank()
     comm = MPI.COMM_WORLD
     if size > 1 and comm.size == 1:

@@ -22,9 +22,8 @@ Unit = tuple[int, ...]
 class _Group:
     prior: float
     waiting: int = 0  # tasks
-    # seconds, count: measured
-    seconds: float = 0.0
-    count: int = 0
+    seconds: float = 0.0  # measured
+    count: int = 0  # of measured ones
 
 
 class Schedule:
@@ -80,12 +79,12 @@ class Schedule:
         entry = self._groups[group]
         return entry.seconds / entry.count if entry.count else None
 
-    def estimate(self, group: Hashable) -> float | None:
-        """Return the estimated time of one task of a group in s; None if nothing is known yet."""
-        mean = self.mean(group)
+    def estimate(self, group: Hashable) -> float:
+        """Return the estimated time of one task of a group in s; its prior before any is known."""
+        mean, prior = self.mean(group), self._groups[group].prior
         if mean is not None or not self._known_prior:
-            return mean
-        return self._groups[group].prior * self._known_seconds / self._known_prior
+            return prior if mean is None else mean
+        return prior * self._known_seconds / self._known_prior
 
     def seconds_left(self, in_flight: Iterable[int], workers: int) -> float | None:
         """Return the estimated time in s until so many workers are done; None if nothing is known.
@@ -97,7 +96,7 @@ class Schedule:
         left: dict[Hashable, float] = {n: group.waiting for n, group in self._groups.items()}
         for task in in_flight:
             left[self.group_of[task]] += 0.5
-        return sum(count * (self.estimate(name) or 0.0) for name, count in left.items()) / workers
+        return sum(count * self.estimate(name) for name, count in left.items()) / workers
 
     def take(self, time_left: float | None = None) -> Unit:
         """Return the next unit; an empty one if none waits or fits into ``time_left`` (s)."""
@@ -125,10 +124,7 @@ class Schedule:
             self.waiting += by
 
     def _length(self, unit: Unit) -> float:
-        """Estimated time of a unit in s, or relative to others before any is known."""
-        group = self.group_of[unit[0]]
-        estimate = self.estimate(group)
-        return len(unit) * (self._groups[group].prior if estimate is None else estimate)
+        return len(unit) * self.estimate(self.group_of[unit[0]])
 
     def _fits(self, unit: Unit, time_left: float | None) -> bool:
         return time_left is None or not self._known_prior or self._length(unit) <= time_left

@@ -23,7 +23,6 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import CHECKSUM, DONE, FAILED, NOT_NEEDED, origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run import dispatch
-from adhesis.ensemble.run.dispatch import Outcome, StopCheck
 from adhesis.ensemble.run.interrupt import GRACE, StopSignals
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Options, Plan, group_of, prepare, prior
@@ -45,17 +44,14 @@ ComputeLoop = Callable[[Campaign, Task, Progress | None], Row]
 class Engine:
     """Functions that a run works with; tests and benchmarks pass in their own."""
 
-    # Computes a task of a campaign; it calls its third argument now and then
-    compute: ComputeLoop = field(default_factory=Runner)
-    # Raises InputError if a task cannot be set up
-    check: Callable[[Campaign, Task], None] = check_task
+    compute: ComputeLoop = field(default_factory=Runner)  # calls its third argument now and then
+    check: Callable[[Campaign, Task], None] = check_task  # InputError for a task not to be set up
     # Opens the results file for writing: path, the communicator if all ranks write, and what
     # returns the versions and the processor of a rank
     writer: Callable[[Path, Any, Callable[[int], str]], Writer] = Writer
     # Whether each rank writes the rows that it computed, as parallel HDF5 allows
     all_write: bool = bool(h5py.get_config().mpi)
-    # How long a rank may not be heard from until the run ends, in s
-    silence: float = dispatch.SILENCE
+    silence: float = dispatch.SILENCE  # of :class:`Limits`, in s
 
 
 def run_campaign(
@@ -82,12 +78,10 @@ def run_campaign(
     options, engine = options or Options(), engine or Engine()
     path = target_of(path)
     comm = comm or OneRank()
-    size = max(comm.size, 1 + options.processes)
+    size, check = max(comm.size, 1 + options.processes), engine.check
     with RunLock(path) as lock, StopSignals() as signals:
         try:
-            plan = together(
-                comm, lambda: prepare(campaign, path, lock, size, options, say, engine.check)
-            )
+            plan = together(comm, lambda: prepare(campaign, path, lock, size, options, say, check))
         except WriteError:
             lock.release()  # no other rank writes yet
             raise
@@ -104,8 +98,8 @@ def run_campaign(
         with ExitStack() as stack:
             writer = None
             if own_rows or comm.rank == 0:
-                all_of_them = comm if own_rows else None
-                writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
+                opened = engine.writer(path, comm if own_rows else None, origins.__getitem__)
+                writer = stack.enter_context(opened)
             session = _Session(campaign, plan, writer, options, signals, engine, stream)
             stopped = session.run(comm, own_rows)
         # The file is closed: a rank that ends by an error with it open would wait for the others.
@@ -113,7 +107,7 @@ def run_campaign(
 
 
 def _compute(
-    loop: ComputeLoop, campaign: Campaign, tasks: Tasks, row: int, check: StopCheck
+    loop: ComputeLoop, campaign: Campaign, tasks: Tasks, row: int, check: dispatch.StopCheck
 ) -> Row:
     """Compute a task of a campaign as the hand-out asks for it."""
     return loop(campaign, tasks[row], lambda *_: check())
@@ -144,7 +138,7 @@ class _Session:
             stop=self._stop,
             time_left=self._time_left,
             task_seconds=campaign.solver.time_limit,
-            grace=GRACE if options.deadline is None else options.deadline.grace,
+            grace=GRACE if deadline is None else deadline.grace,
             silence=engine.silence,
             report_interval=min(dispatch.REPORT_INTERVAL, engine.silence / 12),
         )
@@ -156,21 +150,17 @@ class _Session:
             dispatch.Worker(MpiChannel(comm), self._compute, self._limits, deliver).run()
             return None
         limits = self._limits
-        with ExitStack() as stack:
-            channel: dispatch.Channel
-            if comm.size > 1:
-                channel = MpiChannel(comm)
-            elif self.options.processes and self.plan.rows:
-                processes = Processes(self.options.processes, self._compute, limits)
-                channel = stack.enter_context(processes)
-            else:
-                channel = dispatch.OwnWorker(self._compute, limits)
-            return self._hand_out(channel, own_rows)
+        if comm.size > 1:
+            return self._hand_out(MpiChannel(comm), own_rows)
+        if self.options.processes and self.plan.rows:
+            with Processes(self.options.processes, self._compute, limits) as channel:
+                return self._hand_out(channel, own_rows)
+        return self._hand_out(dispatch.OwnWorker(self._compute, limits), own_rows)
 
     def _hand_out(self, channel: dispatch.Channel, own_rows: bool) -> str | None:
         schedule = self._schedule()
 
-        def collect(outcome: Outcome) -> None:
+        def collect(outcome: dispatch.Outcome) -> None:
             self._count(outcome if own_rows else self._write(outcome), progress, schedule)
 
         progress = ProgressLine(
@@ -214,7 +204,7 @@ class _Session:
         summary.stopped = stopped if summary.pending else None
         return summary
 
-    def _write(self, outcome: Outcome) -> Outcome:
+    def _write(self, outcome: dispatch.Outcome) -> dispatch.Outcome:
         """Write a row; of its numbers the master gets those by which it is judged."""
         assert self.writer is not None
         task, rank = outcome.task, outcome.rank
@@ -227,7 +217,7 @@ class _Session:
         judged = (*OF_DOUBT, self.campaign.stop.quantity, CHECKSUM.name)
         return replace(outcome, result={name: row[name] for name in judged})
 
-    def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
+    def _count(self, outcome: dispatch.Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         counts, what, row = self._counts, str(self.plan.tasks[outcome.task]), outcome.result
         self.plan.known[outcome.task] = row[CHECKSUM.name]
         if outcome.error is not None:

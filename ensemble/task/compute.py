@@ -10,7 +10,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.dataset import sizes_of
-from adhesis.ensemble.task.fields import FieldPlan, field_plan, field_row
+from adhesis.ensemble.task.fields import FieldPlan, field_row
 from adhesis.ensemble.task.row import Row, row_of, row_scales
 from adhesis.solver.loading.loop import LoadingBranch
 from adhesis.solver.loading.path_record import Progress
@@ -35,11 +35,8 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
     control = Control() if stiffness is None else Control(stiffness)
     material = campaign.material
     return Problem(
-        profile,
-        half_space,
-        task.work_of_adhesion,
-        control,
-        math.inf if material.strength is None else material.strength,
+        *(profile, half_space, task.work_of_adhesion, control),
+        strength=math.inf if material.strength is None else material.strength,
         adhesion_range=material.adhesion_range,
         work_of_adhesion_open=material.work_of_adhesion_open,
         measure=material.measure,
@@ -56,12 +53,9 @@ def check_task(campaign: Campaign, task: Task) -> None:
 
 
 def _make_method(campaign: Campaign, task: Task) -> Method:
-    return make_method(
-        campaign.solver.method,
-        make_problem(campaign, task),
-        accuracy=campaign.solver.accuracy,
-        nodes_per_wave=campaign.solver.nodes_per_wave,
-    )
+    problem, solver = make_problem(campaign, task), campaign.solver
+    nodes = solver.nodes_per_wave
+    return make_method(solver.method, problem, accuracy=solver.accuracy, nodes_per_wave=nodes)
 
 
 class Runner:
@@ -84,7 +78,7 @@ class Runner:
         once, in the first loop that needs it.
         """
         wall, cpu = time.perf_counter(), time.process_time()
-        here, plan = campaign.at(task), field_plan(campaign, task)
+        here, plan = campaign.at(task), FieldPlan(campaign, task)
         turn, key = here.cycle.turning_point, campaign.branch_of(task)
         last, self._last = self._last, None  # an interrupted branch is not continued
         if last is not None and last[0] is campaign and last[1] == key and last[2] < turn:
@@ -116,7 +110,7 @@ def _branch(campaign: Campaign, task: Task) -> LoadingBranch:
         [campaign.at(other).cycle.turning_point for other in others],
         load_steps=campaign.cycle.load_steps,
         latest=None if campaign.cycle.preload is None else campaign.cycle.deepest,
-        marks=[mark for o in others for mark in _marks(field_plan(campaign, o))],
+        marks=[mark for o in others for mark in _marks(FieldPlan(campaign, o))],
     )
 
 

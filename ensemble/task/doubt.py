@@ -18,15 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from adhesis.ensemble.quantities import percent, stress_text
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.zero_range import (
-    ANY_RANGE,
-    DOUBTFUL_EXCESS,
-    DOUBTFUL_LOSS,
-    DOUBTFUL_RANGE,
-    EDGE_SHARE,
-    beyond_limit,
-    stored_at_pull_off,
-)
+from adhesis.solver.loading import zero_range as limits
 
 # Numbers of a row from which beyond_zero_range decides, in the order of beyond_limit.
 _OF_LIMIT = (
@@ -45,15 +37,15 @@ def why_beyond(opens: bool) -> str:
     """Return why losses are beyond zero range; ``opens``: whether patches open from inside."""
     if opens:
         return (
-            f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, "
-            f"or the range of adhesion is longer than touch_range, turn_range or {EDGE_SHARE:.2g} "
-            "of edge_range, or patches open from inside, so that what the model leaves out matters "
-            "for it (docs/zero-range.md)"
+            f"the tension inside patches exceeds the strength more than {limits.DOUBTFUL_EXCESS:g} "
+            "times, or the range of adhesion is longer than touch_range, turn_range or "
+            f"{limits.EDGE_SHARE:.2g} of edge_range, or patches open from inside, so that what the "
+            "model leaves out matters for it (docs/zero-range.md)"
         )
     return (
-        f"{ANY_RANGE} is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "
-        "work of adhesion of the largest contact, so that an interface of finite range would lose "
-        "less (docs/zero-range.md)"
+        f"{limits.ANY_RANGE} is below {limits.DOUBTFUL_RANGE:g} m, or the loss above "
+        f"{limits.DOUBTFUL_LOSS:g} times the work of adhesion of the largest contact, so that "
+        "an interface of finite range would lose less (docs/zero-range.md)"
     )
 
 
@@ -94,9 +86,9 @@ def beyond_zero_range(
     What a ``stiffness`` (Pa/m) that holds the solid stores at pull-off is no loss of the solid.
     """
     if stiffness is not None:
-        stored = stored_at_pull_off(values["pull_off_stress"], stiffness)
+        stored = limits.stored_at_pull_off(values["pull_off_stress"], stiffness)
         values = {**values, "loss": values["loss"] - stored}
-    return beyond_limit(*(values[name] for name in _OF_LIMIT))
+    return limits.beyond_limit(*(values[name] for name in _OF_LIMIT))
 
 
 def highest_stress(loading: ArrayLike) -> float:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,64 +39,51 @@ GAP_BINS: Array = np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:])
 HEIGHT_BINS: Array = 0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:])
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class FieldPlan:
-    """States of which a campaign keeps fields, and bins of their statistics."""
+    """States of which a campaign keeps fields, and bins of their statistics.
+
+    It is the plan of a task, or of the file, with lengths in units of what tasks differ in. All
+    tasks have the spectral bins of the finest profile of the campaign.
+    """
 
     campaign: Campaign  # its tables hold the values of the task, if the plan is that of one
-    period: float  # λ in m
-    finest_harmonic: int  # highest harmonic of all profiles of the campaign
-    # Δ/h_max; under a load and at a preload 1, and then all penetrations here are mean stresses
-    # over max_stress or preload
-    max_penetration: float
+    task: Task | None = None
 
-    @cached_property
-    def penetration(self) -> Array:
-        """Δ/h_max of the states, ascending: the wanted ones moved to the nearest load step."""
-        top, wanted = self.max_penetration, self.campaign.output.field_penetrations
-        step = top / self.campaign.cycle.load_steps
+    def __post_init__(self) -> None:
+        campaign, task = self.campaign, self.task
+        self.campaign = campaign if task is None else campaign.at(task)
+        cycle, output = self.campaign.cycle, self.campaign.output
+        shared = task is None and campaign.has_axis("period")
+        self.period = 2 * np.pi if shared else self.campaign.profile.period  # λ in m
+        # Δ/h_max; under a load and at a preload 1, and then all penetrations here are mean stresses
+        # over max_stress or preload
+        shared = task is None and campaign.has_axis("max_penetration")
+        top = 1.0 if cycle.turns_at_stress or shared else cycle.turning_point
+        self.max_penetration = top
+        # Of the states, ascending: the wanted ones moved to the nearest load step
+        step, wanted = top / cycle.load_steps, output.field_penetrations
         wanted = (top / 3, 2 * top / 3, top) if wanted is None else wanted
-        return np.array([step * k for k in sorted({round(value / step) for value in wanted})])
-
-    @cached_property
-    def nodes(self) -> int:
-        """Nodes on which fields are computed, a power of two."""
-        return int(1 << (NODES_PER_WAVE * self.finest_harmonic - 1).bit_length())
-
-    @cached_property
-    def stride(self) -> int:
-        """Distance of the nodes of a stored field, in nodes of the computed one; a power of two."""
-        stride = 1
-        while self.nodes // stride > self.campaign.output.field_nodes:
-            stride *= 2
-        return stride
-
-    @cached_property
-    def position(self) -> Array:
-        """Positions x of the stored nodes, in m."""
-        count = self.nodes // self.stride
-        return np.linspace(0, self.period, count, endpoint=False)
-
-    @cached_property
-    def harmonic_edges(self) -> NDArray[np.int64]:
-        """First harmonic of each bin of the spectra, and one past the last; no bin is empty."""
-        top = self.nodes // 2
-        count = max(2, int(np.ceil(np.log10(top) * _BINS_PER_DECADE)) + 1)
-        return np.unique(np.rint(np.logspace(0, np.log10(top), count)).astype(np.int64))
-
-    @cached_property
-    def filled(self) -> NDArray[np.bool_]:
-        """Bins of the spectra in which the profile has every harmonic, shape (bins,)."""
-        first, last = self.harmonic_edges[:-1], self.harmonic_edges[1:] - 1
-        n0, ratio = self.campaign.profile.n0, self.campaign.profile.ratio
-        return np.asarray((first >= n0) & (last <= n0 * ratio))
-
-    @cached_property
-    def wave_number(self) -> Array:
-        """Wave number of each bin in rad/m: geometric mean of its first and last harmonic."""
-        edges = self.harmonic_edges
+        steps = sorted({round(value / step) for value in wanted})
+        self.penetration: Array = np.array([step * k for k in steps])
+        # Nodes on which fields are computed, a power of two
+        self.nodes = int(1 << (NODES_PER_WAVE * campaign.finest_harmonic - 1).bit_length())
+        # Nodes of a stored field, a power of two; their distance in computed ones, and x in m
+        stored = min(self.nodes, 1 << (output.field_nodes.bit_length() - 1))
+        self.stride = self.nodes // stored
+        self.position: Array = np.linspace(0, self.period, stored, endpoint=False)
+        # First harmonic of each bin of the spectra, and one past the last; no bin is empty
+        decades = np.log10(self.nodes // 2)
+        count = max(2, int(np.ceil(decades * _BINS_PER_DECADE)) + 1)
+        edges = np.unique(np.rint(np.logspace(0, decades, count)).astype(np.int64))
+        self.harmonic_edges: NDArray[np.int64] = edges
+        # Wave number of each bin in rad/m: geometric mean of its first and last harmonic
         middle = np.sqrt(edges[:-1] * (edges[1:] - 1.0)).astype(np.float64)
-        return np.asarray(middle * (2 * np.pi / self.period))
+        self.wave_number: Array = np.asarray(middle * (2 * np.pi / self.period))
+        # Bins in which the profile has every harmonic, shape (bins,)
+        n0, ratio = self.campaign.profile.n0, self.campaign.profile.ratio
+        filled = (edges[:-1] >= n0) & (edges[1:] - 1 <= n0 * ratio)
+        self.filled: NDArray[np.bool_] = np.asarray(filled)
 
     def spectral_density(self, values: Array) -> Array:
         """Return the spectral density in the bins, in u² m, of values on the nodes with unit u."""
@@ -118,10 +104,8 @@ def field_scales(plan: FieldPlan) -> tuple[Scale, ...]:
         meaning = "position of a node of a kept field"
         positions = Scale("field_position", plan.position, "m", meaning)
     depth = f"penetration/{'max_penetration' if campaign.has_axis('max_penetration') else 'h_max'}"
-    if campaign.cycle.under_load:
-        depth = "mean stress/max_stress"
-    if campaign.cycle.preload is not None:
-        depth = "mean stress/preload"
+    if campaign.cycle.turns_at_stress:
+        depth = f"mean stress/{'max_stress' if campaign.cycle.under_load else 'preload'}"
     return (
         waves,
         Scale("gap_bin", GAP_BINS, "1", "gap/h_max, geometric middle of its bin"),
@@ -151,21 +135,6 @@ FIELD_DATASETS = (
     _field("field_stress", "Pa", "stress, compression positive", *_SHAPE),
     _field("field_gap", "m", "gap", *_SHAPE),
 )
-
-
-def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
-    """Return the plan of a task, or of the file, with lengths in units of what tasks differ in.
-
-    All tasks have the spectral bins of the finest profile of the campaign.
-    """
-    here = campaign if task is None else campaign.at(task)
-    cycle, period = here.cycle, here.profile.period
-    top = 1.0 if cycle.turns_at_stress else cycle.turning_point
-    if task is None and campaign.has_axis("max_penetration"):
-        top = 1.0
-    if task is None and campaign.has_axis("period"):
-        period = 2 * np.pi
-    return FieldPlan(here, period, campaign.finest_harmonic, top)
 
 
 def field_row(

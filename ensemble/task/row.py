@@ -7,6 +7,7 @@ One table, from which the results file is laid out, written, read and documented
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import chain
 from operator import attrgetter, methodcaller
 from typing import Any
 
@@ -15,17 +16,16 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
-from adhesis.ensemble.task.fields import FIELD_DATASETS, field_plan, field_scales
+from adhesis.ensemble.task.fields import FIELD_DATASETS, FieldPlan, field_scales
 from adhesis.solver.loading.loop_result import LoopResult
-from adhesis.solver.method import Branch
-from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
+from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS, Branch
 from adhesis.solver.model.profile import Array
 
 Row = dict[str, Any]
 """Values of one task by dataset; those of kept fields only where the task keeps them."""
 
 
-def _number(
+def _value(
     name: str, unit: str, meaning: str, value: str | Callable[..., Any] = "", **options: Any
 ) -> Dataset:
     """Return a dataset; its value is taken by a function, or by the path of an attribute.
@@ -36,10 +36,14 @@ def _number(
     return Dataset(name, unit, meaning, value=take, **options)
 
 
+def _count(name: str, meaning: str, value: str | Callable[..., Any] = "") -> Dataset:
+    return _value(name, "1", meaning, value, dtype=COUNT)
+
+
 def _curves(branch: Branch) -> tuple[Dataset, ...]:
     dims = ("task", f"{branch}_penetration")
     return tuple(
-        _number(f"{branch}_{name}", unit, meaning, name, dtype=dtype, dims=dims)
+        _value(f"{branch}_{name}", unit, meaning, name, dtype=dtype, dims=dims)
         for name, dtype, unit, meaning in (
             ("mean_stress", FLOAT, "Pa", "mean stress, compression positive"),
             ("contact_fraction", FLOAT, "1", "contact fraction A/A0"),
@@ -52,7 +56,7 @@ def _curves(branch: Branch) -> tuple[Dataset, ...]:
 def _jump(name: str, unit: str, meaning: str, value: Any = None, **options: Any) -> Dataset:
     """Return a dataset of the catalogue of jumps, whose value is taken from loop and jump."""
     take = value or (lambda loop, jump: getattr(jump, name))
-    return _number(f"jump_{name}", unit, meaning, take, dims=("task", "jump"), **options)
+    return _value(f"jump_{name}", unit, meaning, take, dims=("task", "jump"), **options)
 
 
 def _flag(name: str, meaning: str, names: tuple[str, ...]) -> Dataset:
@@ -66,81 +70,65 @@ def _of_interior(name: str) -> Callable[[LoopResult], float]:
 
 
 _SMALL, _LARGE = (methodcaller("drops", small_scale=small) for small in (True, False))
-TIMES = (_number("wall_time", "s", "wall time"), _number("cpu_time", "s", "CPU time"))
-# Of each loop, one number.
+TIMES = (_value("wall_time", "s", "wall time"), _value("cpu_time", "s", "CPU time"))
 NUMBERS = (
-    _number("h_max", "m", "height of the highest point", "problem.profile.h_max"),
-    _number("h_rms", "m", "root mean square height", "problem.profile.h_rms"),
-    _number("m0", "m2", "mean square height", "problem.profile.m0"),
-    _number("m2", "1", "mean square slope", "problem.profile.m2"),
-    _number("m4", "m-2", "mean square curvature", "problem.profile.m4"),
-    _number("loss", "J m-2", "loop integral of the mean stress per nominal area"),
-    _number("loss_dimensionless", "1", "loop integral of dimensionless stress"),
-    _number("loss_from_drops", "J m-2", "energy drops at jumps, and friction between them"),
-    _number("loss_small_scale", "J m-2", "energy drops of edges running inside a patch", _SMALL),
-    _number("loss_large_scale", "J m-2", "energy drops of patches that come and go", _LARGE),
-    _number("friction", "J m-2", "part of the loss that edges dissipate as they recede"),
-    _number("gamma_open", "J m-2", "work of adhesion at which edges recede", "problem.gamma_open"),
-    _number("audit_residual", "1", "(loss - loss_from_drops) / loss"),
-    _number("loss_error", "J m-2", "estimated numerical error of the loss"),
-    _number("zone_error", "J m-2", "estimated change of the loss by zones at edges"),
-    _number(
-        *("races", "1", "jumps that other speeds, order or a finer field might end elsewhere"),
-        dtype=COUNT,
-    ),
-    _number("energy_at_stake", "J m-2", "energy between the ends of those jumps"),
+    _value("h_max", "m", "height of the highest point", "problem.profile.h_max"),
+    _value("h_rms", "m", "root mean square height", "problem.profile.h_rms"),
+    _value("m0", "m2", "mean square height", "problem.profile.m0"),
+    _value("m2", "1", "mean square slope", "problem.profile.m2"),
+    _value("m4", "m-2", "mean square curvature", "problem.profile.m4"),
+    _value("loss", "J m-2", "loop integral of the mean stress per nominal area"),
+    _value("loss_dimensionless", "1", "loop integral of dimensionless stress"),
+    _value("loss_from_drops", "J m-2", "energy drops at jumps, and friction between them"),
+    _value("loss_small_scale", "J m-2", "energy drops of edges running inside a patch", _SMALL),
+    _value("loss_large_scale", "J m-2", "energy drops of patches that come and go", _LARGE),
+    _value("friction", "J m-2", "part of the loss that edges dissipate as they recede"),
+    _value("gamma_open", "J m-2", "work of adhesion at which edges recede", "problem.gamma_open"),
+    _value("audit_residual", "1", "(loss - loss_from_drops) / loss"),
+    _value("loss_error", "J m-2", "estimated numerical error of the loss"),
+    _value("zone_error", "J m-2", "estimated change of the loss by zones at edges"),
+    _count("races", "jumps that other speeds, order or a finer field might end elsewhere"),
+    _value("energy_at_stake", "J m-2", "energy between the ends of those jumps"),
     # below the least of four ranges of adhesion the zero-range limit holds
-    _number("valid_range", "m", "range of adhesion below which no patch opens from inside"),
-    _number("edge_range", "m", "range whose cohesive zone is as long as what pins edges"),
-    _number("touch_range", "m", "range that changes the loss by 0.01 by earlier touches"),
-    _number("turn_range", "m", "way beyond the turn in which jumps take 0.01 of the loss"),
-    _number("largest_interior_tension", "Pa", "largest tension inside patches"),
-    _number("interior_tension_position", "m", "position of that tension", _of_interior("position")),
-    _number(
+    _value("valid_range", "m", "range of adhesion below which no patch opens from inside"),
+    _value("edge_range", "m", "range whose cohesive zone is as long as what pins edges"),
+    _value("touch_range", "m", "range that changes the loss by 0.01 by earlier touches"),
+    _value("turn_range", "m", "way beyond the turn in which jumps take 0.01 of the loss"),
+    _value("largest_interior_tension", "Pa", "largest tension inside patches"),
+    _value("interior_tension_position", "m", "position of that tension", _of_interior("position")),
+    _value(
         "interior_tension_penetration",
         "1",
         "penetration/h_max at that tension",
         _of_interior("penetration"),
     ),
-    _number(
+    _value(
         "opening_strength", "Pa", "strength at which patches open from inside", "problem.strength"
     ),
-    _number("openings", "1", "jumps that begin with a gap that opens inside a patch"),
-    _number("barrier", "J m-2", "energy up to the cracks that open patches"),
+    _value("openings", "1", "jumps that begin with a gap that opens inside a patch"),
+    _value("barrier", "J m-2", "energy up to the cracks that open patches"),
     # where the loop turned
-    _number(
-        "turning_penetration", "1", "penetration/h_max at the turning point", "max_penetration"
-    ),
-    _number("turning_stress", "Pa", "mean stress at the turning point"),
-    _number(
+    _value("turning_penetration", "1", "penetration/h_max at the turning point", "max_penetration"),
+    _value("turning_stress", "Pa", "mean stress at the turning point"),
+    _value(
         *("preload_reached", "1", "1 if the mean stress reached the preload, 0 if not"),
         lambda loop: np.nan if loop.preload_reached is None else float(loop.preload_reached),
     ),
-    _number("work_gained", "J m-2", "work gained on loading per nominal area"),
-    _number("work_spent", "J m-2", "work spent on unloading per nominal area"),
-    _number("largest_contact_fraction", "1", "largest contact fraction A/A0 of the loop"),
-    _number(
+    _value("work_gained", "J m-2", "work gained on loading per nominal area"),
+    _value("work_spent", "J m-2", "work spent on unloading per nominal area"),
+    _value("largest_contact_fraction", "1", "largest contact fraction A/A0 of the loop"),
+    _value(
         "full_contact_energy",
         "J m-2",
         "elastic energy of full contact",
         "problem.full_contact_energy",
     ),
-    _number("pull_off_penetration", "1", "penetration/h_max of the first load step out of contact"),
-    _number("pull_off_stress", "Pa", "largest mean tension on unloading"),
-    _number(
-        "states",
-        "1",
-        "states that the loop passed through",
-        lambda loop: len(loop.branch),
-        dtype=COUNT,
-    ),
+    _value("pull_off_penetration", "1", "penetration/h_max of the first load step out of contact"),
+    _value("pull_off_stress", "Pa", "largest mean tension on unloading"),
+    _count("states", "states that the loop passed through", lambda loop: len(loop.branch)),
 )
-# Of each branch, values on its axis.
 CURVES = {branch: _curves(branch) for branch in BRANCHES}
-JUMP_COUNT = _number(
-    "jump_count", "1", "number of jumps, kept or not", lambda loop: len(loop.jumps), dtype=COUNT
-)
-# Of each jump that the catalogue holds, one number.
+JUMP_COUNT = _count("jump_count", "number of jumps, kept or not", lambda loop: len(loop.jumps))
 JUMPS = (
     _flag("branch", "branch", BRANCHES),
     _flag("kind", "kind of the jump", JUMP_KINDS),
@@ -157,27 +145,19 @@ JUMPS = (
     _jump("patches_before", "1", "patches before the jump", dtype=COUNT),
     _jump("patches_after", "1", "patches after the jump", dtype=COUNT),
 )
-RESULT_DATASETS: tuple[Dataset, ...] = (
-    *TIMES,
-    *NUMBERS,
-    *(dataset for branch in BRANCHES for dataset in CURVES[branch]),
-    JUMP_COUNT,
-    *JUMPS,
-    *FIELD_DATASETS,
-)
+_CURVES = tuple(chain(*CURVES.values()))
+RESULT_DATASETS = (*TIMES, *NUMBERS, *_CURVES, JUMP_COUNT, *JUMPS, *FIELD_DATASETS)
 
 
 def row_scales(campaign: Campaign) -> tuple[Scale, ...]:
     """Return the dimensions of the rows of a campaign."""
     several = campaign.has_axis("max_penetration")
     depth = f"penetration/{'max_penetration' if several else 'h_max'}"
+    curves = [(f"{branch}_penetration", branch) for branch in BRANCHES]
     return (
-        Scale("loading_penetration", campaign.loading_penetration, "1", f"{depth} on loading"),
-        Scale(
-            "unloading_penetration", campaign.unloading_penetration, "1", f"{depth} on unloading"
-        ),
+        *(Scale(name, getattr(campaign, name), "1", f"{depth} on {b}") for name, b in curves),
         Scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
-        *field_scales(field_plan(campaign)),
+        *field_scales(FieldPlan(campaign)),
     )
 
 

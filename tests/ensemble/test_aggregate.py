@@ -13,7 +13,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import estimates, interval, interval_method, untransformed
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.task.fields import field_plan
+from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.solver.model.jump import JUMP_KINDS
 from tests.support.campaign_support import run_python
 from tests.support.synthetic_results import campaign, rows, sign, text_of, write
@@ -152,7 +152,7 @@ def test_spectra_leave_out_realisations_without_contact(tmp_path):
     assert cell.fields.in_contact.tolist() == [[5, 5, 5], [4, 5, 5]]
     expected = psd[[0, 1, 3, 4], 1, 0].astype(np.float32).mean(axis=0)
     np.testing.assert_allclose(cell.fields.psd_displacement[1, 0], expected, rtol=1e-6)
-    slope, _ = fitted_slope(field_plan(plan), cell.fields.psd_displacement[0, 2])
+    slope, _ = fitted_slope(FieldPlan(plan), cell.fields.psd_displacement[0, 2])
     assert slope == pytest.approx(-2.8, abs=1e-3)
     with Results(tmp_path / "r.h5") as results:
         first = results.column("field_height", slice(0, 1))[0]
@@ -163,12 +163,12 @@ def test_a_fitted_slope_knows_its_error():
     plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=1)
     # The paper's spectrum: two decades, so that one of them is fitted.
     plan = parse_campaign(plan.text.replace("ratio = 10", "ratio = 100"))
-    q = field_plan(plan).wave_number
+    q = FieldPlan(plan).wave_number
     rng = np.random.default_rng(3)
     pulls = []
     for _ in range(300):
         density = q**-2.8 * np.exp(0.3 * rng.standard_normal(q.size))
-        slope, error = fitted_slope(field_plan(plan), density)
+        slope, error = fitted_slope(FieldPlan(plan), density)
         pulls.append((slope + 2.8) / error)
     assert abs(np.mean(pulls)) < 0.2
     assert 0.8 < np.std(pulls) < 1.5

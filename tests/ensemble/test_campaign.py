@@ -17,7 +17,7 @@ from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.tasks import Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.compute import make_problem
-from adhesis.ensemble.task.fields import field_plan
+from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.solver.model.pattern import stripes
 from tests.support.campaign_support import ROOT, campaign_text, differing
 from tests.support.wrong_values import outside
@@ -384,7 +384,7 @@ def test_a_path_turns_where_its_control_lets_it_turn():
 
 def test_fields_under_a_load_are_kept_at_parts_of_it():
     text = under('control = "load"\nmax_stress = 300')
-    plan = field_plan(parse_campaign(text))
+    plan = FieldPlan(parse_campaign(text))
     np.testing.assert_allclose(plan.penetration, [0.25, 0.75, 1.0])  # of 4 load steps
     assert plan.campaign.cycle.turning_point == 300
 

@@ -14,7 +14,7 @@ import pytest
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command import main as command_line
-from adhesis.ensemble.command.main import COMMANDS, main, module_of, parser_of
+from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.errors import RankError
 from adhesis.ensemble.quantities import Quantity
 from adhesis.ensemble.results.layout import create
@@ -150,7 +150,7 @@ def test_the_package_can_be_run():
     ],
 )
 def test_signals_end_a_command_in_one_line(name, number, code, word, capsys, monkeypatch):
-    module = importlib.import_module(module_of(name))
+    module = importlib.import_module(f"adhesis.ensemble.command.{name}")
     monkeypatch.setattr(module, "execute", lambda args: signal.raise_signal(number))
     assert main([name, *required(name)]) == code
     assert capsys.readouterr().err == f"adhesis {name}: {word}\n"
@@ -160,7 +160,7 @@ def test_signals_end_a_command_in_one_line(name, number, code, word, capsys, mon
 
 def test_a_second_signal_does_not_cut_the_removal_of_unfinished_files_short(folder, monkeypatch):
     """A terminal that closes sends SIGHUP twice: the shell's, and the system's."""
-    module = importlib.import_module(module_of("status"))
+    module = importlib.import_module("adhesis.ensemble.command.status")
     removed = []
 
     def execute(args):
@@ -177,7 +177,7 @@ def test_a_second_signal_does_not_cut_the_removal_of_unfinished_files_short(fold
 
 def test_what_nohup_ignores_does_not_end_a_command(folder, monkeypatch):
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    module = importlib.import_module(module_of("status"))
+    module = importlib.import_module("adhesis.ensemble.command.status")
     monkeypatch.setattr(module, "execute", lambda args: signal.raise_signal(signal.SIGHUP) or 0)
     try:
         assert main(["status", "r.h5"]) == 0

@@ -17,7 +17,7 @@ from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.fields import (
     GAP_EDGES,
     HEIGHT_EDGES,
-    field_plan,
+    FieldPlan,
     field_row,
     field_scales,
 )
@@ -306,7 +306,7 @@ def campaign_with(output: str = "", **changes: str):
 
 
 def test_every_harmonic_below_the_last_node_lies_in_one_bin():
-    plan = field_plan(campaign_with(ratio="100"))
+    plan = FieldPlan(campaign_with(ratio="100"))
     edges = plan.harmonic_edges
     assert edges[0] == 1
     assert edges[-1] == plan.nodes // 2
@@ -319,7 +319,7 @@ def test_every_harmonic_below_the_last_node_lies_in_one_bin():
 
 def test_the_spectral_density_holds_the_mean_square_and_the_slope_of_the_profile():
     campaign = campaign_with(ratio="200")
-    plan = field_plan(campaign)
+    plan = FieldPlan(campaign)
     task = campaign.tasks()[-1]
     profile = make_problem(campaign, task).profile
     density = plan.spectral_density(profile.heights(plan.nodes))
@@ -332,23 +332,23 @@ def test_the_spectral_density_holds_the_mean_square_and_the_slope_of_the_profile
 
 def test_positions_have_units_of_a_period_that_has_several_values_and_bins_are_of_the_task():
     for period, units in (("1e-3", {"rad m-1", "m"}), ("[1e-3, 2e-3]", {"1"})):
-        scales = field_scales(field_plan(campaign_with(period=period)))
+        scales = field_scales(FieldPlan(campaign_with(period=period)))
         assert {s.unit for s in scales if s.name in ("wave_number", "field_position")} == units
     campaign = campaign_with(ratio="[4, 40]")
-    low, high = (field_plan(campaign, task) for task in list(campaign.tasks().of_cells())[:2])
+    low, high = (FieldPlan(campaign, task) for task in list(campaign.tasks().of_cells())[:2])
     assert np.sum(low.filled) < np.sum(high.filled)
     np.testing.assert_array_equal(low.harmonic_edges, high.harmonic_edges)
 
 
 def test_penetrations_move_to_load_steps():
-    plan = field_plan(campaign_with("field_penetrations = [0.29, -1.0, 0.31]\n"))
+    plan = FieldPlan(campaign_with("field_penetrations = [0.29, -1.0, 0.31]\n"))
     np.testing.assert_allclose(plan.penetration, [-1.05, 0.3], atol=1e-12)
-    assert field_plan(campaign_with()).penetration.size == 3
+    assert FieldPlan(campaign_with()).penetration.size == 3
 
 
 def test_reductions_agree_with_the_states_of_the_loop():
     campaign = campaign_with("field_nodes = 16\n", nodes_per_wave="64")
-    plan, task = field_plan(campaign), campaign.tasks()[0]
+    plan, task = FieldPlan(campaign), campaign.tasks()[0]
     method = make_method("grid", make_problem(campaign, task), nodes_per_wave=64)
     cycle = campaign.cycle
     loop = run_loop(method, max_penetration=cycle.max_penetration, load_steps=cycle.load_steps)

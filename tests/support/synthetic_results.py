@@ -12,7 +12,7 @@ from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import axis_datasets, kept_rows
 from adhesis.ensemble.task.dataset import KEPT
-from adhesis.ensemble.task.fields import GAP_EDGES, field_plan
+from adhesis.ensemble.task.fields import GAP_EDGES, FieldPlan
 from adhesis.solver.model.jump import JUMP_KINDS
 from tests.support.campaign_support import campaign_text
 
@@ -118,7 +118,7 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
 
 def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
     """Power-law spectra -(2H+1) and -(2+H), Gaussian heights, exponential gaps, waves as shapes."""
-    plan = field_plan(campaign)
+    plan = FieldPlan(campaign)
     n, states = hurst.size, (2, plan.penetration.size)
     q = plan.wave_number / (10 * 2 * np.pi / plan.period)
     scatter = 1 + 0.1 * rng.standard_normal((n, *states, 1))

@@ -25,7 +25,7 @@ from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import style
 from adhesis.ensemble.report.further_axes import cell_label, state_sign
 from adhesis.ensemble.report.paper import PaperFigure
-from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, FieldPlan, field_plan
+from adhesis.ensemble.task.fields import GAP_BINS, HEIGHT_BINS, FieldPlan
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
@@ -235,7 +235,7 @@ def _penetration_handles(
     unit = _SIGNS[state_sign(data)]
     if len(tops) > 1 and not data.campaign.cycle.turns_at_stress:
         unit = r"\Delta/\Delta"
-    penetration = (data.cells[0].plan if len(tops) == 1 else field_plan(data.campaign)).penetration
+    penetration = (data.cells[0].plan if len(tops) == 1 else FieldPlan(data.campaign)).penetration
     return [
         style.key(rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}", **look)
         for k, look in zip(chosen, looks, strict=True)
