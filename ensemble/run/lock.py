@@ -34,7 +34,7 @@ from adhesis.solver.checks import counted
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF}
 # Without O_NONBLOCK, opening a pipe in place of the lock file would block.
 _SAFELY = os.O_NOFOLLOW | os.O_NONBLOCK
-_RECORD, _MAX_RECORD = ("host", "pid", "ranks", "since"), 4096  # bytes
+_MAX_RECORD = 4096  # bytes
 _RETRY_INTERVAL = 0.1  # s
 
 
@@ -134,11 +134,15 @@ class RunLock:
 
     def _write_record(self, ranks: int) -> None:
         assert self._descriptor is not None
-        since = datetime.now().astimezone().isoformat(timespec="seconds")
-        record = zip(_RECORD, (socket.gethostname(), os.getpid(), ranks, since), strict=True)
+        record = {
+            "host": socket.gethostname(),
+            "pid": os.getpid(),
+            "ranks": ranks,
+            "since": datetime.now().astimezone().isoformat(timespec="seconds"),
+        }
         try:
             os.ftruncate(self._descriptor, 0)
-            os.pwrite(self._descriptor, json.dumps(dict(record)).encode(), 0)
+            os.pwrite(self._descriptor, json.dumps(record).encode(), 0)
         except OSError as error:
             self.release()
             raise WriteError(f"{self.path} cannot be written: {error.strerror}") from error
@@ -187,6 +191,6 @@ def _read_record(descriptor: int) -> dict[str, Any] | None:
     """Read the record that the holder of a lock has written into it."""
     try:
         record = json.loads(os.pread(descriptor, _MAX_RECORD, 0))
-        return {name: record[name] for name in _RECORD}
+        return {name: record[name] for name in ("host", "pid", "ranks", "since")}
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -51,11 +51,6 @@ EQUAL = 1e-3
 each other may differ and count as equal: of equal edges the first one leads. So much of the largest
 stiffness a mode may have, too, that has softened at a fold: there the error of the field decides
 its sign, and with that losses of equal crests differed by up to 4 %."""
-MOVED_ON = 2.0
-"""λ_min per relative error of the field: so far an edge of one mirrored patch is moved off a fold,
-with two works of adhesion. It stays ahead by that: with 1e-3 λ_min losses were off by up to 13
-times their ``loss_error``. Of several patches one is moved by 1e-3 λ_min still, or that error would
-choose which of them goes first."""
 
 # ---------------------------------------------------------------- nucleation
 
@@ -95,10 +90,13 @@ come in either order. Of 400 loops with 20 to 80 patches two were wrong, by 0.09
 order was not that at a finer accuracy: they were 0.5 and 4.5 times that apart. Where all folds
 less than a resolution apart counted, half of the loops with 20 to 80 patches had races, instead of
 a tenth."""
-TURNED_BACK = 0.2
-"""Of the displacement of an equilibrium by the error of the field: an edge that is pinned where it
-turns back may have gone back by so much in a step. Later events have the error of its place: with
-five times as much a loss was off by 2.8 of its ``loss_error``."""
+PINNED_PLACE = 0.2
+"""Of the displacement of an equilibrium by the error of the field: so far from its place an edge
+with two works of adhesion may be left, as later events keep that. One that is pinned where it turns
+back may have gone back by so much in a step (with five times as much a loss was off by 2.8 of its
+``loss_error``), and one edge of a mirrored patch is moved on by so much where they part (with
+1e-3 λ_min by up to 13; of several patches one is moved by 1e-3 λ_min still, or the error of the
+field would choose which of them goes first)."""
 TRAPEZOID_FAR = 4.0
 """Of the allowed error of the trapezoidal rule: a step with more is halved."""
 QUIET_STRESS = 0.05

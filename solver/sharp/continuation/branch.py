@@ -23,10 +23,10 @@ from adhesis.solver.sharp.output.contact_states import States
 from adhesis.solver.sharp.tolerances import (
     LONGEST_STEP,
     ORDER_RESOLVED,
+    PINNED_PLACE,
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
-    TURNED_BACK,
     WORK_STALLED,
 )
 
@@ -268,7 +268,7 @@ class StableBranch:
         back = np.where(motion * end < 0, 0.5 * (1 - share) * np.abs(end), 0.0)
         worst = int(np.argmax(back))
         edges = self._edges
-        if back[worst] <= max(edges.newton_tolerance, TURNED_BACK * edges.field_error):
+        if back[worst] <= max(edges.newton_tolerance, PINNED_PLACE * edges.field_error):
             return 1.0
         return float(np.clip(share[worst], 0.1, 0.9))
 

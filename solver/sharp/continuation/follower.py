@@ -32,7 +32,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.nucleation.crack import Crack, Cracks
 from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation, Touch, locate
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
-from adhesis.solver.sharp.tolerances import EQUAL, MOVED_ON, SECOND_FOLD_DISPLACED
+from adhesis.solver.sharp.tolerances import EQUAL, PINNED_PLACE, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
 
 
@@ -316,7 +316,7 @@ class Follower:
         way = np.sign(point.rate[edge] * (fold.d - point.d))
         length = self.edges.law.rest_step
         if self.edges.adhesion.pins and len(point.gaps) == 1:  # it stays ahead by as much
-            length = MOVED_ON * self.edges.tolerance * self.edges.wave
+            length = PINNED_PLACE * self.edges.field_error
         moved = self._moved_on(point.gaps, edge, way * length)
         start, reach = point.extrapolate(fold.d), self.edges.longest_step
         saddle = self.edges.equilibrium(start, fold.d, reach, strict=False)
