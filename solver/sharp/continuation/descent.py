@@ -146,7 +146,7 @@ class Descents:
         law = EdgeLaw(edges.law_at(gaps))
         law.longest_step *= share
         rests, raced = 0, False
-        start = gaps
+        rested, start = np.empty((0, 2)), gaps
         while rests <= 2 * RESTS:
             near = edges.response_near(gaps, prescribed)
             if near is None:
@@ -170,6 +170,10 @@ class Descents:
                 # Next to a fold the field's error may hide whether there is a minimum: edges go to
                 # and fro. Whatever is taken for it, the next step in s decides.
                 rests += 1
+                same = gaps.shape == rested.shape
+                if same and np.abs(gaps - rested).max() < edges.newton_tolerance:
+                    rests = max(rests, RESTS + 1)  # no patience changes anything
+                rested = gaps
                 strict = rests <= RESTS
                 point = edges.equilibrium(
                     gaps, prescribed, edges.longest_step, strict=strict, memory=law.memory
