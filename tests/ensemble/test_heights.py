@@ -127,6 +127,8 @@ def test_a_file_that_may_not_be_read_is_refused(read, tmp_path, monkeypatch):
         read(path)
 
 
+OF_HEADER = """16 heights in m (header); they are named 'Depth (m)': change their sign if they \
+grow into the sample; the header has a step or pitch of 9 µm, against a step of 62.5 µm"""
 DOUBTFUL: dict[str, tuple[list[str], dict[str, Any], str]] = {
     "a unit that was damaged": (["z [æm]", *METRES], {}, r"is clear, with '\[æm\]' in .*give unit"),
     "line of the header against option": (
@@ -162,10 +164,6 @@ DOUBTFUL: dict[str, tuple[list[str], dict[str, Any], str]] = {
         "has 2 heights of -32768, 32767, which instruments write for missing ones",
     ),
 }
-
-
-OF_HEADER = """16 heights in m (header); they are named 'Depth (m)': change their sign if they \
-grow into the sample; the header has a step or pitch of 9 µm, against a step of 62.5 µm"""
 
 
 @pytest.mark.parametrize(

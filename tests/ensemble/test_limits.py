@@ -55,7 +55,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def limited(
-    limit: str, words: list[object], folder: Path, fake: str | None = None
+    limit: str, words: list[object], folder: Path, fake: str | None = None, **variables: str
 ) -> subprocess.CompletedProcess[str]:
     """Run a command under an option of ulimit, one of processes as another user."""
     other: list[str] = []
@@ -65,8 +65,15 @@ def limited(
         other = ["setpriv", f"--reuid={ANOTHER_USER}", f"--regid={ANOTHER_USER}", "--clear-groups"]
         other += [f"--inh-caps{capability}", f"--ambient-caps{capability}"]
     line = ("bash", "-c", f'ulimit {limit}; exec "$@"', "bash", *command(words, fake=fake))
-    # byte code that is cut off at the limit would be read by whoever comes next
-    return ran(*other, *line, cwd=folder, env=environment(PYTHONDONTWRITEBYTECODE="1"))
+    return ran(*other, *line, cwd=folder, env=environment(PYTHONDONTWRITEBYTECODE="1") | variables)
+
+
+def test_no_byte_code_is_cut_off_at_a_limit_of_file_sizes(tmp_path: Path) -> None:
+    """It would be read by whoever comes next, and each later command would fail."""
+    new = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(tmp_path)}
+    limited("-f 1", ["new", "n.toml"], tmp_path, **new)
+    assert list(tmp_path.rglob("parser.*.pyc"))  # loaded before the command begins
+    assert not list(tmp_path.rglob("template.*.pyc"))
 
 
 @pytest.mark.parametrize(("limit", "value", "name"), CASES)

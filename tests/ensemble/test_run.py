@@ -91,8 +91,7 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("number", "name"),
-    [(signal.SIGINT, "Ctrl-C (SIGINT)"), (signal.SIGKILL, "")],
+    ("number", "name"), [(signal.SIGINT, "Ctrl-C (SIGINT)"), (signal.SIGKILL, "")]
 )
 def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, whole, number, name):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"

@@ -14,13 +14,7 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.task.compute import Runner, make_problem
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.doubt import doubtful
-from adhesis.ensemble.task.fields import (
-    GAP_EDGES,
-    HEIGHT_EDGES,
-    FieldPlan,
-    field_row,
-    field_scales,
-)
+from adhesis.ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldPlan, field_row, field_scales
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult

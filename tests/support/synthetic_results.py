@@ -157,8 +157,7 @@ def sign(path: Path) -> Path:
     """Give a results file and its rows the checksums of what they hold, as if all were written."""
     with h5py.File(path, "r+") as file:
         file["checksum"][...] = row_checksums(
-            lambda name, rows: file[name][rows],
-            *(file[KEPT][:], np.arange(file["task"].size)),
+            lambda name, rows: file[name][rows], *(file[KEPT][:], np.arange(file["task"].size))
         )
     write_head(path)
     return path
