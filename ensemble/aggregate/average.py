@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.by_blocks import (
     Curve,
@@ -35,6 +36,7 @@ from adhesis.ensemble.aggregate.companions import (
 from adhesis.ensemble.campaign.tables import Axis, Campaign
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
+from adhesis.ensemble.task.dataset import KEPT
 from adhesis.solver.method import BRANCHES
 
 _MAX_FAILURES = 20
@@ -158,7 +160,8 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     InputError if a file cannot be read, is no results file, or holds no finished task.
     """
     with Results(path) as results:
-        cells = tuple(_averaged(results, cell) for cell in finished_cells(results))
+        kept = results.column(KEPT)
+        cells = tuple(_averaged(results, cell, kept) for cell in finished_cells(results))
         failed = np.flatnonzero(results.status() == FAILED)[:_MAX_FAILURES]
         errors = (text or "no reason given" for text in results.errors(failed))
         companions = tuple(read_companion(other, results.campaign) for other in beside)
@@ -174,7 +177,7 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
         )
 
 
-def _averaged(results: Results, cell: Cell) -> AveragedCell:
+def _averaged(results: Results, cell: Cell, kept: NDArray[np.intp]) -> AveragedCell:
     ones = np.ones(cell.done)
     stress = 1 / stress_scale(cell.campaign, cell.values["h_max"])
     # by dataset, the curves to make of it, with the factor of each row
@@ -193,5 +196,5 @@ def _averaged(results: Results, cell: Cell) -> AveragedCell:
         **{entry.name: getattr(cell, entry.name) for entry in fields(Cell)},
         curves=curves,
         jumps=count_jumps(results, cell.rows),
-        fields=average_fields(results, cell.rows),
+        fields=average_fields(results, cell.rows, kept),
     )

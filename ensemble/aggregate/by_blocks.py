@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import FieldPlan
 from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
 from adhesis.solver.model.profile import Array
@@ -98,10 +97,12 @@ class FieldStatistics:
     shape: DeformedShape | None
 
 
-def average_fields(results: Results, rows: NDArray[np.intp]) -> FieldStatistics:
-    """Average the rows of a cell."""
+def average_fields(
+    results: Results, rows: NDArray[np.intp], kept: NDArray[np.intp]
+) -> FieldStatistics:
+    """Average the rows of a cell; ``kept`` are the rows of the file that keep their fields."""
     averages = {name: _average(results, name, rows) for name in _AVERAGED}
-    slots = np.flatnonzero(np.isin(results.column(KEPT), rows))[:1]
+    slots = np.flatnonzero(np.isin(kept, rows))[:1]
     shape = [results.column(name, slots).astype(float) for name in _OF_SHAPE]
     return FieldStatistics(
         in_contact=averages["psd_displacement"][1],

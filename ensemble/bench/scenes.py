@@ -40,13 +40,18 @@ class Scene:
     max_penetration: float = 0.9
     load_steps: int = 40  # steps from first touch to ``max_penetration`` (Δ~max)
     grids: tuple[int, ...] = (8, 16, 32, 64)  # lower bounds of the nodes per shortest wave
-    # Of the loss
+    # Requested accuracies of the loss, low to high
     accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
     # Accuracies of the reference run of ``sharp``, best first; the first that succeeds is used.
     # Empty if the loss is known exactly.
     tightest: tuple[float, ...] = ()
     reference_load_steps: int = 80  # load steps of the reference run
     exact_loss: float | None = None  # in J/m² of nominal area, if it is known in closed form
+
+
+def _one_wave() -> Problem:
+    """A cos(q0 x)."""
+    return Problem(single_wave(_SHALLOW, _PERIOD), HALF_SPACE, _EXACT.work_of_adhesion)
 
 
 def _two_waves(work_of_adhesion: float) -> Problem:
@@ -68,7 +73,7 @@ def _rough(work_of_adhesion: float, n0: int, ratio: int) -> Problem:
 ONE_WAVE = Scene(
     name="one-wave",
     title="one wave, α = 0.2",
-    problem=partial(Problem, single_wave(_SHALLOW, _PERIOD), HALF_SPACE, _EXACT.work_of_adhesion),
+    problem=_one_wave,
     max_penetration=0.5,
     load_steps=10,
     # The wave is the whole profile: its contact of 0.18 λ needs many nodes.

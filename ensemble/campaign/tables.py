@@ -351,7 +351,7 @@ class Campaign:
         flat = (list(chain.from_iterable(parts)) for parts in product(*rows))
         return [tuple(values[i] for i in place) for values in flat]
 
-    @property
+    @cached_property
     def finest_harmonic(self) -> int:
         """Highest harmonic of all profiles."""
         return int(max(n0 * ratio for n0, ratio in self.in_cells("profile.n0", "profile.ratio")))

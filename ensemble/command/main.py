@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from traceback import walk_stack
 from types import FrameType
 
@@ -65,10 +65,7 @@ def main(argv: list[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     name = words[0] if words else ""
-    if resource.getrlimit(resource.RLIMIT_FSIZE)[0] != resource.RLIM_INFINITY:
-        # Python would leave byte code that is cut off at the limit, and read that ever after.
-        sys.dont_write_bytecode = True
-        os.environ["PYTHONDONTWRITEBYTECODE"] = "1"  # nor do ranks
+    _write_no_byte_code_under_a_limit()
     rank = launched()[1]
     if rank > 0 and name != _PARALLEL and name not in _INDEPENDENT:
         return 0
@@ -88,6 +85,20 @@ def main(argv: list[str] | None = None) -> int:
             program = f"adhesis {name}" if name in COMMANDS else "adhesis"
             log(f"{program}: {sentence}")
     return code
+
+
+def _write_no_byte_code_under_a_limit() -> None:
+    """Python leaves byte code that a limit of file sizes cuts off, and would read it ever after."""
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    if limit == resource.RLIM_INFINITY:
+        return
+    sys.dont_write_bytecode = True
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"  # nor do ranks
+    for module in list(sys.modules.values()):
+        path = getattr(module, "__cached__", None)
+        with suppress(OSError):
+            if path and os.path.getsize(path) == limit:
+                os.unlink(path)
 
 
 def parser_of(name: str) -> Parser:

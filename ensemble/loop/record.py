@@ -18,7 +18,7 @@ Result = LoopResult | PathResult
 
 
 def loop_document(result: Result) -> dict[str, Any]:
-    """Return the JSON document of a loop or path, whose ``provenance`` names the units.
+    """Return the JSON document of a loop or path; commands add a ``provenance`` with units.
 
     The states of a loop are there twice: ``states`` is a list of objects, one per state, and each
     of its keys is also a list of its own at the top level, for readers that want columns.

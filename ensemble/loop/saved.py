@@ -246,7 +246,11 @@ def _result(found: xr.Dataset) -> Result:
 
 def sealed(content: bytes) -> bytes:
     """Return the bytes of a file with their checksum behind them."""
-    return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+    return content + _seal(content)
+
+
+def _seal(content: bytes) -> bytes:
+    return _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def _read_sealed(path: Path) -> xr.Dataset:
@@ -265,9 +269,9 @@ def _read_sealed(path: Path) -> xr.Dataset:
         if size > _MOST_BYTES:
             raise InputError(f"path is {path}: it has {size / 1e6:.0f} MB, more than any loop")
         stream.seek(0)
-        whole = stream.read(size)
-    content = whole[:-_LENGTH]
-    if sealed(content) != whole:
+        content = stream.read(size)
+    content, seal = content[:-_LENGTH], content[-_LENGTH:]
+    if seal != _seal(content):
         raise InputError(
             f"path is {path}: it is damaged, as its bytes do not have their checksum; take a copy "
             "of it, or compute the loop again"

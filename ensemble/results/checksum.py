@@ -53,7 +53,7 @@ def row_checksums(read: Read, kept: NDArray[np.intp], rows: NDArray[np.intp]) ->
     """
     out = np.zeros(rows.size, np.uint32)
     places = dict(zip(kept.tolist(), range(kept.size), strict=True))
-    done, step = 0, 64  # rows of the first block, which shows how long one is
+    done, step = 0, 1  # the first row shows how long one is
     while done < rows.size:
         first = int(rows[done])
         last = done + int(np.searchsorted(rows[done:], first + step))

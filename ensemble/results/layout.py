@@ -171,11 +171,13 @@ def copy_rows(sources: Sequence[Source], file: h5py.File) -> None:
         step = max(1, _BLOCK_BYTES // width)
         for start in range(0, there.shape[0], step):
             with signals_held():
-                block = there[start : start + step]
+                block: NDArray[Any] | None = None
                 for source in sources:
                     target, taken = source.places(dataset)
                     part = slice(*np.searchsorted(target, (start, start + step)).tolist())
                     if np.any(chosen := taken[part]):
+                        block = there[start : start + step] if block is None else block
                         values = source.results.column(dataset.name, part)
                         block[target[part][chosen] - start] = values[chosen]
-                there[start : start + step] = block
+                if block is not None:
+                    there[start : start + step] = block

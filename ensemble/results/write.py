@@ -5,6 +5,7 @@ So a row whose status is not "pending" is a whole one, and its checksum is that 
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
@@ -29,7 +30,7 @@ _KEPT_NAMES = frozenset(d.name for d in OF_KEPT)
 
 # Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
 _LONGEST_NAME = 200
-_EMPTIED_AT_ONCE = 1000  # rows
+_BLOCK_BYTES = 16 * 2**20  # of rows that are emptied at once
 _DESCRIPTORS = Path("/proc/self/fd")  # of Linux
 
 
@@ -101,19 +102,22 @@ class Writer(AbstractContextManager["Writer"]):
 
     def reset(self, rows: Iterable[int]) -> None:
         """Empty rows (ascending), which are to be computed; what they held is lost."""
+        width = sum(rows_of.nbytes for rows_of in self._datasets.values())
+        most = max(1, _BLOCK_BYTES // width)
         for stretch in stretches(np.fromiter(rows, np.intp)):
-            for first in range(stretch.start, stretch.stop, _EMPTIED_AT_ONCE):
-                last = min(first + _EMPTIED_AT_ONCE, stretch.stop)
-                kept = np.searchsorted(self._kept_rows, (first, last)).tolist()
+            for first in range(stretch.start, stretch.stop, most):
+                last = min(first + most, stretch.stop)
                 with self._writing(first):
                     # First the status: a row that is being emptied is not to be taken for whole.
                     self._put(schema.STATUS, first, [schema.PENDING] * (last - first))
+                    kept = np.searchsorted(self._kept_rows, (first, last)).tolist()
                     for dataset in (*OF_TASKS, *OF_KEPT):
-                        start, stop = kept if dataset.dims[0] == KEPT else (first, last)
-                        rows_of = self._datasets[dataset.name]
-                        empty = np.full((stop - start, *rows_of.shape), dataset.fill, rows_of.dtype)
-                        rows_of.write(start, empty)
-                    self.flush()
+                        if dataset is not schema.STATUS:
+                            start, stop = kept if dataset.dims[0] == KEPT else (first, last)
+                            rows_of = self._datasets[dataset.name]
+                            shape = (stop - start, *rows_of.shape)
+                            rows_of.write(start, np.full(shape, dataset.fill, rows_of.dtype))
+                    self._put(schema.CHECKSUM, first, [schema.CHECKSUM.fill] * (last - first))
 
     def mark(self, rows: Iterable[int], status: int) -> None:
         """Mark rows (ascending) without a result as pending, or as not needed.
@@ -216,6 +220,11 @@ class DatasetRows:
         self.dtype = dataset.dtype
         self._space = self._id.get_space()
         self._rest = (0,) * len(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of a row."""
+        return int(math.prod(self.shape) * self.dtype.itemsize)
 
     def block(self, value: Any) -> NDArray[Any]:
         """Return the bytes that a value of a row has in the file, shape (1, …)."""

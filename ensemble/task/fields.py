@@ -68,10 +68,9 @@ class FieldPlan:
         self.penetration: Array = np.array([step * k for k in steps])
         # Nodes on which fields are computed, a power of two
         self.nodes = int(1 << (NODES_PER_WAVE * campaign.finest_harmonic - 1).bit_length())
-        # Nodes of a stored field, a power of two; their distance in computed ones, and x in m
+        # Nodes of a stored field, a power of two; their distance in computed ones
         stored = min(self.nodes, 1 << (output.field_nodes.bit_length() - 1))
         self.stride = self.nodes // stored
-        self.position: Array = np.linspace(0, self.period, stored, endpoint=False)
         # First harmonic of each bin of the spectra, and one past the last; no bin is empty
         decades = np.log10(self.nodes // 2)
         count = max(2, int(np.ceil(decades * _BINS_PER_DECADE)) + 1)
@@ -84,6 +83,11 @@ class FieldPlan:
         n0, ratio = self.campaign.profile.n0, self.campaign.profile.ratio
         filled = (edges[:-1] >= n0) & (edges[1:] - 1 <= n0 * ratio)
         self.filled: NDArray[np.bool_] = np.asarray(filled)
+
+    @property
+    def position(self) -> Array:
+        """Positions x of the stored nodes, in m."""
+        return np.linspace(0, self.period, self.nodes // self.stride, endpoint=False)
 
     def spectral_density(self, values: Array) -> Array:
         """Return the spectral density in the bins, in u² m, of values on the nodes with unit u."""

@@ -80,8 +80,7 @@ _SHORTER_WAVES = {
 }
 # One patch that carries all contact is that of a single crest up to this share of the period.
 _ONE_PATCH = 0.25
-# Numbers of the document by name: of the plan, the trace, the answer's loop, all loops alike.
-_PLANNED = ("waves", "patches", "wall", "processes")
+# Numbers of the document by their names: of the trace, of the answer's loop, of all loops alike.
 _READ = ("points", "step", "length", "height_range", "drop_outs", "tip_radius")
 _CONTACT = (
     *("young", "poisson", "work_of_adhesion", "work_of_adhesion_open", "measure"),
@@ -629,8 +628,8 @@ def run_rows(answer: Answer) -> list[dict[str, Any]]:
     for run in answer.plan.runs:
         found = answer.results.get(run.name)
         entry: dict[str, Any] = {
-            **{name: getattr(run, name) for name in ("name", "group", "reference")},
-            **{"said": run.description, "expected_seconds": answer.plan.seconds[run.name]},
+            **{"name": run.name, "group": run.group, "said": run.description},
+            **{"reference": run.reference, "expected_seconds": answer.plan.seconds[run.name]},
         }
         if isinstance(found, dict):
             entry |= {key: value for key, value in found.items() if key != "states"}
@@ -676,8 +675,9 @@ def document(answer: Answer) -> dict[str, Any]:
         "loop": dict(answer.main),
         "runs": run_rows(answer),
         "plan": {
-            **{name: getattr(plan, name) for name in _PLANNED},
-            **{"seconds": sum(plan.seconds.values()), "hints": list(plan.hints)},
+            **{"waves": plan.waves, "patches": plan.patches},
+            **{"seconds": sum(plan.seconds.values()), "wall": plan.wall},
+            **{"processes": plan.processes, "hints": list(plan.hints)},
         },
         "largest_changes": [
             {"name": change.run.name, "factor": change.factor} for change in answer.largest_changes

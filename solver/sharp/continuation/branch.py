@@ -175,6 +175,7 @@ class StableBranch:
         self._at_output: ContactState | None = None  # the state there, where work is compared
         self.trail = [point]
         self.smallest_step, self._longest = resolution.jump, math.inf  # step
+        self._unrefined = 0.0  # smallest step before the fold ahead was located finely
         # straight where no point before is known: short steps there keep the integral exact
         self._predictor = beyond(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
@@ -213,14 +214,15 @@ class StableBranch:
 
     def refine(self) -> None:
         """Locate the fold ahead as finely as the field resolves it."""
+        self._unrefined = self.smallest_step
         self.smallest_step = self._longest = self._resolution.field_limit
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.append(point)
         self.point, self._predictor = point, beyond(point)
-        if self._edges.adhesion.pins:
-            self.smallest_step = self._resolution.jump
+        if self._edges.adhesion.pins:  # else the branch would creep on from where edges part
+            self.smallest_step = max(self.smallest_step, self._unrefined)
 
     def _next_step(self) -> float:
         """Return the next step in d: the leading edge is not to move far, nor the target be passed.
