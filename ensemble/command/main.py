@@ -88,7 +88,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _write_no_byte_code_under_a_limit() -> None:
-    """Python 3.11 leaves byte code that the limit of file sizes cuts off, and reads it ever after."""
+    """Python 3.11 leaves byte code that a limit of file sizes cuts off, and reads it ever after."""
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     if limit == resource.RLIM_INFINITY:
         return
