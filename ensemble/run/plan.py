@@ -62,8 +62,8 @@ class Selection:
 
     def rows(self, tasks: Tasks, status: NDArray[np.uint8]) -> list[int]:
         """Return the rows that are selected, by the status of each task."""
-        finished = (schema.FAILED, schema.DONE)[: 2 if self.status == "all" else 1]
-        selected = np.isin(status, finished)
+        codes = (schema.FAILED, schema.DONE) if self.status == "all" else (schema.FAILED,)
+        selected = np.isin(status, codes)
         for name, chosen in self.values.items():
             if chosen:
                 selected &= np.isin(tasks.column(name), list(chosen))
