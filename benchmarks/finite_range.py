@@ -48,7 +48,7 @@ from scipy.optimize import brentq
 
 from adhesis import HalfSpace, Problem, Profile, make_method, run_loop
 from adhesis.solver.method import PathError
-from adhesis.solver.model.problem import LONGEST_GRIFFITH_CRACK
+from adhesis.solver.sharp.tolerances import LONGEST_GRIFFITH_CRACK
 
 STATES = 800
 NODES, WEIGHTS = leggauss(40)

@@ -80,7 +80,7 @@ def table(scenes: list[str], most_nodes: int, shares: list[float]) -> None:
                 ranged = problem_of(scene, delta)
                 loop = run_loop(make_method("sharp", ranged), max_penetration=DEPTH)
                 cells = [f"{loop.loss / zero.loss:.5f}", f"{loop.openings}"]
-                cells += [f"{loop.barrier / loop.loss:.2g}", f"{len(loop.warnings)}"]
+                cells += ["-", f"{len(loop.warnings)}"]
             except (ValueError, PathError) as error:  # the range is refused, or the path is lost
                 print(f"# {str(error)[:100]}")
             nodes, grid = nodes_of(zero.problem, delta), "-"

@@ -97,10 +97,10 @@ class MaterialTable:
     poisson: float = _axis(checks.POISSON, "Poisson's ratio ν", MISSING)
     adhesion_range: float | None = _axis(
         checks.ADHESION_RANGE,
-        "range δ of adhesion in m: surfaces touch at a gap of δ, and patches open from inside at "
-        "the strength γ/δ (method sharp alone); by default zero, so that they never do",
+        "range δ of adhesion in m: surfaces touch at a gap of δ (method sharp alone); by default "
+        "zero",
     )
-    strength: float | None = _axis(checks.STRENGTH, "instead of adhesion_range, the strength in Pa")
+    strength: float | None = _axis(checks.STRENGTH, "instead of it, the strength γ/δ in Pa")
     work_of_adhesion_open: float | None = _axis(
         checks.WORK_OF_ADHESION,
         "work of adhesion in J/m² where an edge recedes, at least γ, at which it advances; between "
@@ -119,7 +119,7 @@ class MaterialTable:
 
     @property
     def opens(self) -> bool:
-        """Whether patches may open from inside."""
+        """Whether adhesion has a range."""
         return not (self.adhesion_range is None and self.strength in (None, math.inf))
 
 

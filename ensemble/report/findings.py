@@ -110,12 +110,12 @@ def law(data: Aggregate) -> Iterator[str]:
     if material.adhesion_range is not None:
         yield (
             f"Adhesion has a range of {shown('adhesion_range')}: surfaces touch at that gap, and "
-            "patches open from inside at the strength of γ over it."
+            "the strength is γ over it."
         )
     elif material.opens:
         yield (
-            f"Adhesion has a strength of {shown('strength')}: patches open from inside there, and "
-            "surfaces touch at a gap of γ over it."
+            f"Adhesion has a strength of {shown('strength')}: its range, a gap at which surfaces "
+            "touch, is γ over it."
         )
         if any(cell.campaign.material.strength == math.inf for cell in data.cells):
             yield "Where the strength is inf, the range of adhesion is zero."
@@ -323,7 +323,7 @@ def _limit(data: Aggregate) -> Iterator[str]:
         return
     low, least = min(found)
     opens = data.campaign.material.opens
-    if low > 0 and not opens:  # with a strength patches open from inside where the limit ends
+    if low > 0 and not opens:  # a range that is given is in the model
         yield (
             f"The zero-range limit holds for ranges of adhesion well below {1e9 * low:.3g} nm: the "
             f"least {ANY_RANGE} of all loops, at {least}."

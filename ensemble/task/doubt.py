@@ -23,7 +23,7 @@ from adhesis.solver.loading import zero_range as limits
 # Numbers of a row from which beyond_zero_range decides, in the order of beyond_limit.
 _OF_LIMIT = (
     *("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction"),
-    *("opening_strength", "barrier", "edge_range", "touch_range", "turn_range", "gamma_open"),
+    *("opening_strength", "edge_range", "touch_range", "turn_range", "gamma_open"),
 )
 OF_DOUBT = ("audit_residual", "loss_error", "loss", "work_of_adhesion")
 """Numbers of a row from which :func:`doubtful` decides."""
@@ -34,13 +34,13 @@ INSTEAD = (
 
 
 def why_beyond(opens: bool) -> str:
-    """Return why losses are beyond zero range; ``opens``: whether patches open from inside."""
+    """Return why losses are beyond zero range; ``opens``: whether adhesion has a range."""
     if opens:
         return (
             f"the tension inside patches exceeds the strength more than {limits.DOUBTFUL_EXCESS:g} "
-            "times, or the range of adhesion is longer than touch_range, turn_range or "
-            f"{limits.EDGE_SHARE:.2g} of edge_range, or patches open from inside, so that what the "
-            "model leaves out matters for it (docs/zero-range.md)"
+            "times, where patches would open from inside, or the range of adhesion is longer than "
+            f"touch_range, turn_range or {limits.EDGE_SHARE:.2g} of edge_range, so that what the "
+            "method sharp leaves out matters for it; take the method zones (docs/zero-range.md)"
         )
     return (
         f"{limits.ANY_RANGE} is below {limits.DOUBTFUL_RANGE:g} m, or the loss above "

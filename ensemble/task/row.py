@@ -102,11 +102,8 @@ NUMBERS = (
         "penetration/h_max at that tension",
         _of_interior("penetration"),
     ),
-    _value(
-        "opening_strength", "Pa", "strength at which patches open from inside", "problem.strength"
-    ),
+    _value("opening_strength", "Pa", "largest tension of the interface", "problem.strength"),
     _value("openings", "1", "jumps that begin with a gap that opens inside a patch"),
-    _value("barrier", "J m-2", "energy up to the cracks that open patches"),
     # where the loop turned
     _value("turning_penetration", "1", "penetration/h_max at the turning point", "max_penetration"),
     _value("turning_stress", "Pa", "mean stress at the turning point"),

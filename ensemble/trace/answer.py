@@ -30,7 +30,7 @@ from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.pattern import AdhesionPattern
 from adhesis.solver.model.problem import Measure
-from adhesis.solver.registry import METHOD_NAMES, MethodName, check_law
+from adhesis.solver.registry import METHOD_NAMES, MethodName, make_method
 from adhesis.solver.values import ByValue
 
 FIGURES = {
@@ -339,8 +339,7 @@ def loss_of_trace(
     accuracy : float
         Wanted relative error of the loss of each loop.
     adhesion_range, strength : float, optional
-        Range δ of adhesion in m, or instead the strength in Pa at which patches open from inside
-        (:class:`~adhesis.Problem`).
+        Range δ of adhesion in m, or instead the strength γ/δ in Pa (:class:`~adhesis.Problem`).
     work_of_adhesion_open : float, optional
         Work of adhesion in J/m² where an edge recedes, beside a single γ; in the table of works of
         adhesion both keep their ratio.
@@ -455,9 +454,7 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     checks.instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        problem = cycle.problem(profile, gamma)
-        has_range = math.isfinite(problem.strength)
-        check_law(cycle.method, None, pins=problem.pinning > 0, has_range=has_range)
+        make_method(cycle.method, cycle.problem(profile, gamma), accuracy=cycle.accuracy)
 
 
 def run_plan(

@@ -82,11 +82,11 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         "--adhesion-range",
         type=LENGTH.option,
         metavar="D",
-        help="range of adhesion, 0.3nm; surfaces touch at a gap of D, and patches open from inside "
-        "at the strength G/D (default: zero range; method sharp alone)",
+        help="range of adhesion, 0.3nm; surfaces touch at a gap of D (default: zero range; method "
+        "sharp alone)",
     )
     group.add_argument(
-        "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"
+        "--strength", type=STRESS.option, metavar="S", help="instead, the strength G/D, 10MPa"
     )
     group.add_argument(
         "--max-penetration",

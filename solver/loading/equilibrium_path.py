@@ -255,11 +255,6 @@ class EquilibriumPath(ByValue, ResultViews):
         return sum(jump.kind == "opening" for jump in self.jumps)
 
     @property
-    def barrier(self) -> float:
-        """Sum of the barriers of these openings, in J/m² (:class:`Jump`)."""
-        return float(sum(jump.barrier for jump in self.jumps))
-
-    @property
     def energy_at_stake(self) -> float:
         """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
@@ -302,13 +297,7 @@ class EquilibriumPath(ByValue, ResultViews):
         tension = 0.0 if self.patches[-1] else max(0.0, float(-self.mean_stress.min()))
         lost = self.lost - stored_at_pull_off(tension, self.problem.control.stiffness)
         given = self.problem, self.valid_range, lost, self.contact_fraction
-        found = range_warnings(*given, *self.outer_ranges)
-        if self.barrier > 0:  # at a tenth of edge_range losses were up to 23 % too small
-            found.append(
-                "patches open from inside: a real interface yields over a zone before, and loses "
-                "more (docs/zero-range.md)"
-            )
-        return found
+        return range_warnings(*given, *self.outer_ranges)
 
     def strain_warnings(self) -> list[str]:
         """Return sentences where strains are not small."""
@@ -474,9 +463,8 @@ class EquilibriumPath(ByValue, ResultViews):
             zones = 100 * self.zone_error / (abs(self.lost) or 1.0)
             return (
                 f"adhesion of a range of {length_text(self.problem.attraction_range)}: surfaces "
-                f"jump together from there on, and patches open from inside at "
-                f"{stress_text(strength)}, {counted(self.openings, 'opening')} with barriers of "
-                f"{self.barrier:.2g} J/m²; largest tension inside patches {stress_text(largest)}; "
+                f"jump together from there on; largest tension inside patches "
+                f"{stress_text(largest)}, strength {stress_text(strength)}; "
                 f"{outside_text(*self.outer_ranges)}; zones at edges, left out, change the loss by "
                 f"about {float(f'{zones:.1g}'):g} %"
             )
@@ -502,7 +490,7 @@ class EquilibriumPath(ByValue, ResultViews):
         """
         problem, half_space = self.problem, self.problem.half_space
         own = (*self._numbers, "loss_from_drops", "audit_residual", "loss_error", "races")
-        own = (*own, "friction", "energy_at_stake", "openings", "barrier", "zone_error")
+        own = (*own, "friction", "energy_at_stake", "openings", "zone_error")
         more = ("largest_contact_fraction", "largest_interior_tension")
         values = {name: getattr(self, name) for name in (*own, *more)}
         gamma, pattern = problem.work_of_adhesion, problem.pattern

@@ -152,11 +152,11 @@ def estimated_error(own: float, jumps: Sequence[Jump], residual: float, problem:
 
     It is the sum of the method's own estimate (if there is none, a hundredth of the drops), the
     residual of the audit, and the sizes of negative drops, which are errors: energy falls in every
-    jump, after the barrier of an opening. ``own`` is NaN for a method without an estimate.
+    jump. ``own`` is NaN for a method without an estimate.
     """
     # Under a load the last drop is U, and may be negative (adhesis.solver.model.control).
     counted = [j for j in jumps if not (problem.control.is_load and j.kind == "pull-off")]
     if not math.isfinite(own):
         own = 0.01 * abs(sum(jump.energy_drop for jump in jumps))
-    negative = sum(max(0.0, -jump.energy_drop - jump.barrier) for jump in counted)
+    negative = sum(max(0.0, -jump.energy_drop) for jump in counted)
     return float(own + abs(residual) + negative)

@@ -64,7 +64,6 @@ _JUMPS, _SAMPLES = 16, 6
 _MOST_OF_LOSS = 0.9
 _OF_GAP = 0.99  # of the mean gap at a turning point: nearer to full contact no jump is sought
 _SAME = 1e-9  # of the period: edges that differ by less have not moved
-_ROUNDED = 1e-12  # prescribed values that differ by less, of themselves, are equal
 
 
 @dataclass(frozen=True)
@@ -96,14 +95,13 @@ def interior_tension(method: Method, record: Record) -> InteriorTension | None:
     """Find the largest tension inside patches on a path; None if there is none.
 
     With zero range the states before the sixteen jumps of unloading with the largest drops are
-    searched, and six states evenly spaced on the path. At a finite strength all states are searched
-    but those at the end of a jump from which patches open at once. Without adhesion nothing is in
-    tension.
+    searched, and six states evenly spaced on the path; at a finite strength all states. Without
+    adhesion nothing is in tension.
     """
     if method.problem.work_of_adhesion == 0:
         return None
-    opens = math.isfinite(method.problem.strength)
-    indices = _persistent_states(method.problem, record) if opens else _sampled(record)
+    is_limit = math.isinf(method.problem.strength)
+    indices = _sampled(record) if is_limit else list(range(len(record.states)))
     indices = [index for index in indices if record.states[index].patches]
     found = method.largest_tension([record.states[index] for index in indices])
     if found is None:
@@ -119,28 +117,11 @@ def interior_tension(method: Method, record: Record) -> InteriorTension | None:
 
 
 def _sampled(record: Record) -> list[int]:
-    """Return the indices of the states that are searched where nothing opens."""
+    """Return the indices of the states that are searched with zero range."""
     before = zip(record.jumps, before_jumps(record.states, record.jumps), strict=True)
     starts = sorted((-jump.energy_drop, i) for jump, i in before if jump.branch == "unloading")
     spaced = np.linspace(0, len(record.states) - 1, _SAMPLES + 2)[1:-1].astype(int)
     return sorted({*(index for _, index in starts[:_JUMPS]), *spaced.tolist()})
-
-
-def _persistent_states(problem: Problem, record: Record) -> list[int]:
-    """Return the indices of the states that are not left at the same prescribed value.
-
-    The others are the end of a jump and the start of an opening at once.
-    """
-    opened = {(j.separation, j.contact_before) for j in record.jumps if j.kind == "opening"}
-    out = []
-    before = math.nan
-    for index, state in enumerate(record.states):
-        prescribed = problem.prescribed_in(state)
-        stays = (state.separation, state.contact_fraction) not in opened
-        if stays or not math.isclose(before, prescribed, rel_tol=_ROUNDED):
-            out.append(index)
-        before = prescribed
-    return out
 
 
 def narrowest_length(problem: Problem, record: Record) -> float:
@@ -313,7 +294,6 @@ def beyond_limit(
     work_of_adhesion: Any,
     largest_contact_fraction: Any,
     strength: Any = math.inf,
-    barrier: Any = 0.0,
     edge_range: Any = math.inf,
     touch_range: Any = math.inf,
     turn_range: Any = math.inf,
@@ -324,9 +304,8 @@ def beyond_limit(
     The least of their ranges is below :data:`DOUBTFUL_RANGE`, or they are more than
     :data:`DOUBTFUL_LOSS` times the work of adhesion of the largest contact, at which its edges
     recede. At a finite strength it is those whose own range of adhesion, γ over the strength, is
-    longer than edges, touches or turns allow, those in which patches open (``barrier`` is
-    positive), and those at which the tension inside patches
-    exceeds the strength :data:`DOUBTFUL_EXCESS` times. None is where the strength is unknown (NaN).
+    longer than edges, touches or turns allow, and those at which the tension inside patches exceeds
+    the strength :data:`DOUBTFUL_EXCESS` times. None is where the strength is unknown (NaN).
     """
     loss, gamma = np.asarray(loss), np.asarray(work_of_adhesion)
     valid_range, is_limit = np.asarray(valid_range), np.isposinf(strength)
@@ -338,8 +317,7 @@ def beyond_limit(
     exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
     edges = EDGE_SHARE * np.asarray(edge_range)
     long = gamma > strength * least_range(math.inf, edges, touch_range, turn_range)
-    opened = exceeded | long | (np.asarray(barrier) > 0)
-    return np.asarray(np.where(is_limit, closed, np.isfinite(strength) & opened))
+    return np.asarray(np.where(is_limit, closed, np.isfinite(strength) & (exceeded | long)))
 
 
 _WHAT_A_LONGER_RANGE_DOES = {
@@ -361,9 +339,9 @@ def range_warnings(
 ) -> list[str]:
     """Return warnings if a loss is that of the zero-range limit alone.
 
-    At a finite strength patches open from inside, and touches come earlier; doubtful is then a
-    tension that exceeds it where no crack grows, and a range of adhesion that edges or turns do not
-    allow. ``range_`` is ``valid_range``, ``loss`` that without what a stiffness stores at pull-off.
+    At a finite strength touches come earlier; doubtful is then a tension inside patches that
+    exceeds it, and a range of adhesion that edges or turns do not allow. ``range_`` is
+    ``valid_range``, ``loss`` that without what a stiffness stores at pull-off.
     """
     out: list[str] = []
     bounds = {"edge_range": edge_range, "touch_range": touch_range, "turn_range": turn_range}
@@ -374,9 +352,9 @@ def range_warnings(
         if excess > DOUBTFUL_EXCESS:
             out.append(
                 f"the tension inside patches reaches {largest_tension:.3g} Pa, {excess:.3g} times "
-                f"the strength ({problem.strength:.3g} Pa), where no crack that fits grows: how "
-                "such places yield, which zero range leaves open, may matter for the loss "
-                "(docs/zero-range.md)"
+                f"the strength ({problem.strength:.3g} Pa): patches would open from inside there, "
+                "which the method sharp leaves out; take the method zones (--method zones, method "
+                '= "zones"; docs/zero-range.md)'
             )
         own = gamma / problem.strength
         shares = {"edge_range": EDGE_SHARE, "touch_range": 1.0, "turn_range": 1.0}

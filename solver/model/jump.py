@@ -10,8 +10,8 @@ The first kind that applies is assigned (a jump may run through several events):
 ``spreading``   edges advance, the patches stay the same.
 ``receding``    edges recede, the patches stay the same.
 
-A jump that begins with a gap that opens inside a patch, at a finite strength of the interface, has
-the kind ``opening``, whatever comes of it.
+A jump that begins with a gap that opens inside a patch has the kind ``opening``, whatever comes of
+it; a method states that of its jumps.
 
 Spreading and receding are the small-scale mechanism (an edge moves over the roughness of one
 patch); the others are the large-scale mechanism (patches form, merge, split, open and vanish).
@@ -50,8 +50,8 @@ class Jump(NotebookDisplay):
     energy_drop : float
         U before minus U after (the potential W if the separation is not fixed), per unit nominal
         area, in J/m². Negative by at most the error of the energies, which then counts in the error
-        of the loss, or by the barrier of an opening. At the loss of contact under a load it is U
-        before, of either sign (:mod:`adhesis.solver.model.control`).
+        of the loss. At the loss of contact under a load it is U before, of either sign
+        (:mod:`adhesis.solver.model.control`).
     kind : JumpKind
     patches_before, patches_after : int
     contact_before, contact_after : float
@@ -66,9 +66,6 @@ class Jump(NotebookDisplay):
         |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
         at the other speeds, in the other order or on the way; 0 unless ``raced``, or where that end
         is a mirror image or not known.
-    barrier : float
-        Of an opening, the energy per unit nominal area, in J/m², up to the crack that grows by
-        itself, which adhesion of zero range has to be lifted over; else 0.
 
     References
     ----------
@@ -86,7 +83,6 @@ class Jump(NotebookDisplay):
     patch_length: float
     raced: bool = False
     at_stake: float = 0.0
-    barrier: float = 0.0
 
     @classmethod
     def between(
@@ -98,16 +94,17 @@ class Jump(NotebookDisplay):
         *,
         raced: bool = False,
         at_stake: float = 0.0,
-        barrier: float = 0.0,
+        opens: bool = False,
         falls_off: bool = False,
     ) -> Jump:
         """Make the jump from one contact state to another at the same prescribed value.
 
-        A jump with a barrier is an opening. Where the solid falls off under a load, the work of
-        that is not counted: the drop is U before (:mod:`adhesis.solver.model.control`).
+        ``opens``: whether it begins with a gap that opens inside a patch. Where the solid falls off
+        under a load, the work of that is not counted: the drop is U before
+        (:mod:`adhesis.solver.model.control`).
         """
         edges = np.concatenate([before.edges, after.edges])
-        kind: JumpKind = "opening" if barrier > 0 else classify(before.edges, after.edges, period)
+        kind: JumpKind = "opening" if opens else classify(before.edges, after.edges, period)
         return cls(
             branch=branch,
             separation=before.separation,
@@ -121,7 +118,6 @@ class Jump(NotebookDisplay):
             patch_length=float((edges[:, 1] - edges[:, 0]).max(initial=0.0)),
             raced=raced,
             at_stake=at_stake,
-            barrier=barrier,
         )
 
     @property

@@ -15,7 +15,6 @@ from adhesis.solver.checks import (
     STRENGTH,
     WORK_OF_ADHESION,
     at_least,
-    at_most,
     choice,
     instance,
     plain,
@@ -31,9 +30,6 @@ from adhesis.solver.values import ByValue
 
 Measure = Literal["arc", "flat"]
 """Length on which adhesion acts: that of the profile, or its projection."""
-
-LONGEST_GRIFFITH_CRACK = 0.25
-"""Length of the longest Griffith crack that may open a patch, in shortest waves."""
 
 # Of the shortest wave: places in equal parts of the period that differ by less are copies.
 _SAME_PLACE = 1e-3
@@ -60,11 +56,6 @@ def check_slope(rms_slope: float) -> None:
         raise ValueError(f"rms slope is {shown}: it must be {RMS_SLOPE.text}")
 
 
-def griffith_length(tension: float, modulus: float, work_of_adhesion: float) -> float:
-    """Compute the length in m of the crack that is in equilibrium under a uniform tension in Pa."""
-    return 4 * modulus * work_of_adhesion / (math.pi * tension**2)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Problem(ByValue):
     """A rigid periodic profile pressed into an elastic half-space with adhesion.
@@ -81,9 +72,8 @@ class Problem(ByValue):
     control : Control
         Prescribed quantity; the separation by default.
     strength : float
-        σ_th in Pa: where the tension inside a patch reaches it, the patch opens from inside, and
-        surfaces touch at a gap of δ = γ/σ_th. Infinite by default, that of adhesion of zero range
-        (docs/zero-range.md).
+        σ_th in Pa, the largest tension that the interface bears: its adhesion has the range
+        δ = γ/σ_th. Infinite by default, that of adhesion of zero range (docs/zero-range.md).
     adhesion_range : float, optional
         Instead of the strength, the range δ of adhesion in m.
     work_of_adhesion_open : float, optional
@@ -100,9 +90,8 @@ class Problem(ByValue):
     ValueError
         If γ, γ_open, the strength or the range is out of bounds, or the measure is unknown; γ_open
         is below γ, or positive where γ = 0; both strength and range are given; one of them stands
-        beside a larger γ_open or a pattern; a pattern is given where γ = 0; the strength is so low
-        that Griffith's crack at that tension is longer than a quarter of the shortest wave; or the
-        rms slope is far beyond small strain, as it is when heights and period have different units.
+        beside a larger γ_open or a pattern; a pattern is given where γ = 0; or the rms slope is far
+        beyond small strain, as it is when heights and period have different units.
     TypeError
         If a part is of another class, or a value not a number.
 
@@ -137,7 +126,6 @@ class Problem(ByValue):
         choice("measure", self.measure, get_args(Measure))
         check_slope(float(np.sqrt(self.profile.m2)))
         self._set_strength(adhesion_range)
-        self._check_strength(adhesion_range)
         self._check_open()
         self._check_pattern()
 
@@ -240,37 +228,12 @@ class Problem(ByValue):
         axes = self.profile.mirror_axes
         return axes[self.pattern.is_mirrored(self.profile.q0 * axes)] if self.pattern else axes
 
-    def _check_strength(self, adhesion_range: float | None) -> None:
-        """Refuse a strength at which a crack as long as the waves would have to be put."""
-        most = LONGEST_GRIFFITH_CRACK * self.profile.shortest_wavelength
-        if math.isinf(self.strength) or self.critical_crack <= most:
-            return
-        least = math.sqrt(4 * self.half_space.modulus * self.work_of_adhesion / (math.pi * most))
-        if adhesion_range is None:
-            given, rule = f"strength is {self.strength:g} Pa", f"at least {at_least(least, 3)} Pa"
-        else:
-            given = f"adhesion_range is {adhesion_range:g} m"
-            rule = f"at most {at_most(self.work_of_adhesion / least, 3)} m"
-        raise ValueError(
-            f"{given}: it must be {rule} for this profile, or the crack that opens a patch, "
-            f"{self.critical_crack:.3g} m long, exceeds a quarter of the shortest wave, and edges "
-            "of zero range do not describe it"
-        )
-
     def toughness(self, x: Array, slope: Array) -> Array:
         """Compute γ for each projected length, in J/m², at x in m where the slopes are h'."""
         stretch: Array = np.sqrt(1 + slope**2) if self.measure == "arc" else np.ones_like(slope)
         if self.pattern is not None:
             stretch = stretch * self.pattern.at(self.profile.q0 * x)
         return np.asarray(self.work_of_adhesion * stretch)
-
-    @property
-    def critical_crack(self) -> float:
-        """Length 4 E*γ/(πσ_th²) in m of Griffith's crack at the strength; 0 if that is infinite.
-
-        Under a uniform tension σ_th a longer gap inside a patch grows, a shorter one closes.
-        """
-        return griffith_length(self.strength, self.half_space.modulus, self.work_of_adhesion)
 
     @property
     def attraction_range(self) -> float:

@@ -4,7 +4,6 @@
 ``full_contact``    any profile in full contact
 ``periodic_punch``  Koiter's row of flat strips
 ``parabola``        JKR in plane strain
-``last_gap``        one gap in an otherwise closed contact
 
 Import from its modules.
 """

@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from adhesis.solver._kernels import Adhesion
+from adhesis.solver.checks import at_least, at_most
 from adhesis.solver.method import (
     ContactState,
     Fields,
@@ -35,6 +36,7 @@ from adhesis.solver.sharp.continuation.follower import Follower
 from adhesis.solver.sharp.continuation.jump import Event, History
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.gap_field import GapField
+from adhesis.solver.sharp.field.patch_tension import InnerTension
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.output.contact_states import States, loading_device
@@ -48,6 +50,7 @@ from adhesis.solver.sharp.tolerances import (
     LARGEST_WORK_OF_STEP,
     LATE_DROP,
     LEAST_DROP,
+    LONGEST_GRIFFITH_CRACK,
     OTHER_MINIMUM,
     OVERLAP,
     PLACED_BY_PROFILE,
@@ -57,6 +60,26 @@ from adhesis.solver.sharp.tolerances import (
     WEAKNESS_POWER,
     WORK_OF_STEP,
 )
+
+
+def check_range(problem: Problem) -> None:
+    """Refuse a range of adhesion at which cohesive zones at edges are as long as the waves.
+
+    The crack that is in equilibrium under a uniform tension of the strength measures them.
+    """
+    modulus, gamma = problem.half_space.modulus, problem.work_of_adhesion
+    most = LONGEST_GRIFFITH_CRACK * problem.profile.shortest_wavelength
+    crack = 4 * modulus * gamma / (math.pi * problem.strength**2)
+    if crack <= most:
+        return
+    least = math.sqrt(4 * modulus * gamma / (math.pi * most))
+    raise ValueError(
+        f"adhesion_range is {problem.attraction_range:g} m, strength {problem.strength:g} Pa: with "
+        f"the method sharp they must be at most {at_most(gamma / least, 3)} m and at least "
+        f"{at_least(least, 3)} Pa for this profile, or Griffith's crack at the strength, "
+        f"{crack:.3g} m long, exceeds a quarter of the shortest wave, and edges of zero range do "
+        'not describe it; the method zones takes any range (--method zones, method = "zones")'
+    )
 
 
 @dataclass(frozen=True)
@@ -94,7 +117,8 @@ class SharpMethod(Method):
     Raises
     ------
     ValueError
-        If such a law breaks its contract.
+        If such a law breaks its contract, or the range of adhesion is so long that Griffith's crack
+        at the strength is longer than a quarter of the shortest wave.
     """
 
     name = "sharp"
@@ -113,6 +137,7 @@ class SharpMethod(Method):
         adhesion: Adhesion | None = None,
     ) -> None:
         super().__init__(problem, chosen=chosen)
+        check_range(problem)
         keep_freed()
         profile, modulus = problem.profile, problem.half_space.modulus
         self.accuracy = accuracy
@@ -166,6 +191,7 @@ class SharpMethod(Method):
         )
         self.follower = Follower(problem, self.edges, self.states, self.resolution)
         self.nucleation, self.jumps = self.follower.nucleation, self.follower.jumps
+        self._inner = InnerTension(problem)
         self._loaded: list[ContactState] = []  # without adhesion unloading goes back through them
 
     def report(self) -> SharpReport:
@@ -191,10 +217,10 @@ class SharpMethod(Method):
         best: PatchTension | None = None
         largest, unit = 0.0, self.problem.half_space.modulus / 2
         for number, state in enumerate(states):
-            for maximum in self.follower.cracks.inner.maxima(self._field(state), largest):
-                if maximum.tension > largest:
-                    largest = maximum.tension
-                    position = maximum.theta / self.q0 % self.problem.profile.period
+            for theta, tension in self._inner.maxima(self._field(state), largest):
+                if tension > largest:
+                    largest = tension
+                    position = theta / self.q0 % self.problem.profile.period
                     best = PatchTension(number, position, largest * unit)
         return best
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 NEWTON_TOLERANCE = 1e-7
 """λ_min. An edge this near to the reference of its gap keeps it, which ends Newton's iteration."""
 BY_FIELD = 1e5
-"""Likewise, per relative error of the field: where patches may open from inside, work and energy of
-steel differed by 2.3e-4 of the loss, as edges were off by 1e-7 λ_min at an error of 1e-14."""
+"""Likewise, per relative error of the field: where adhesion is weak, work and energy of steel
+differed by 2.3e-4 of the loss, as edges were off by 1e-7 λ_min at an error of 1e-14."""
 FIELD_ERROR = 10.0
 """λ_min per relative error of the field: how far an equilibrium may move with that error."""
 SMALLEST_LENGTH = 0.005
@@ -60,20 +60,18 @@ TRIAL_WIDTHS = 1.25
 """Ratio of the widths of seeds that are tried one after the other, where surfaces attract."""
 HEALED_OPENING = 0.99
 """Of the opening at which a touch did not hold: from there on it is tried again."""
-
-# ---------------------------------------------------------------- opening from inside
-
-STRENGTH_EXCEEDED = 2e-5
-"""σ_th. Tension inside a patch may exceed the strength by this share when it opens; maxima that
-differ by less open together."""
 GROWTH = 1.1
-"""G/γ of the crack that is put into a patch, and its inverse for a patch in a gap."""
-LONGEST_TRIAL_HALF_LENGTH = 0.25
-"""λ_min. Half-length of the longest crack or patch: it is then as long as half a wave."""
-IN_PATCH = 0.8
-"""Half-length of the longest one, over the distance of its middle from the nearest edge."""
-NEAR_STRENGTH = 0.8
-"""σ_th. Smaller maxima of tension are not judged."""
+"""γ/G of the seed that is put where surfaces attract."""
+LONGEST_TRIAL_HALF_WIDTH = 0.25
+"""λ_min. Half-width of the widest of these seeds: it is then as wide as half a wave."""
+IN_GAP = 0.8
+"""Half-width of the widest one, over the distance of its middle from the nearest edge."""
+LONGEST_GRIFFITH_CRACK = 0.25
+"""λ_min of the profile. Longest Griffith crack at the strength, 4E*γ/(πσ_th²), for which edges are
+taken as those of zero range: it is 1.6 times as long as Dugdale's zone at an edge."""
+
+# ---------------------------------------------------------------- tension inside patches
+
 MOST_MAXIMA = 32
 """Maxima of tension of one field that are refined."""
 

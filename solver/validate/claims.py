@@ -26,10 +26,9 @@ import numpy as np
 
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.model.control import Control
-from adhesis.solver.model.problem import Problem, griffith_length
+from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile, self_affine_profile
 from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
-from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.parabola import parabola_load, parabola_pull_off
 from adhesis.solver.references.periodic_punch import pull_off_stress
 from adhesis.solver.registry import MethodName, make_method
@@ -51,11 +50,6 @@ from adhesis.solver.validate.judge import (
 )
 
 __all__ = ["METHODS", "Row", "validate"]
-
-# The crack at which G = γ is the first of a row that do not differ by more than this; its energy is
-# largest there, so that it counts by its square.
-_CRACK_STEPS = 0.1**2
-_TENSION = 2e-5  # share of the strength to which the tension is located at which a patch opens
 
 
 def validate(
@@ -322,47 +316,6 @@ def controls(judge: Judge) -> Iterator[Row]:
         yield judge.row(f"{held}: p̄_out / p*", off, 2 * bound)
 
 
-def opening(judge: Judge) -> Iterator[Row]:
-    """Opening of a closed trough at a finite strength."""
-    if judge.standard.nodes is not None:
-        return  # a grid has no range of adhesion
-    profile = Profile(PERIOD, np.array([0, -0.15, -0.5], dtype=np.complex128)).scaled(AMPLITUDE)
-    scale = MODULUS * AMPLITUDE / PERIOD  # of stresses
-    gamma, strength = 0.075 * scale * AMPLITUDE, 3.0 * scale
-    problem = Problem(profile, HALF_SPACE, gamma, strength=strength)
-    accuracy = max(judge.standard.accuracy, 1e-4)  # s depends on the tension's tolerance
-    method = make_method(judge.name, problem, accuracy=accuracy)
-    result = run_loop(method, max_penetration=0.99, load_steps=5)
-    opened = [jump for jump in result.jumps if jump.kind == "opening"]
-    if not opened:
-        raise RuntimeError("no patch opens from inside")
-    exact = LastGap(profile, MODULUS, gamma)
-
-    def separation(tension: float, beyond: float = 0.0) -> float:
-        """Compute s at which the closed trough carries a tension, the edges being elsewhere."""
-        b = exact.half_length_at(tension, PERIOD / 2, 0.05 * PERIOD, 0.25 * PERIOD)
-        return exact.separation(b + beyond)
-
-    s = separation(strength)
-    late = separation(strength * (1 + _TENSION)) - s
-    edge = separation(strength, judge.standard.edge * PERIOD) - s
-    yield judge.row(
-        "a closed trough opens where its tension reaches the strength: s",
-        opened[0].separation / s - 1,
-        (late + edge) / s,
-        f"s = {s / profile.h_max:.3f} h_max",
-    )
-    half = griffith_length(strength, MODULUS, gamma) / 2
-    # the tension of the trough's wave falls by this share of the strength over the crack
-    curved = 0.5 * (4 * np.pi * half / PERIOD) ** 2 * exact.amplitude / strength
-    yield judge.row(
-        "its barrier is that of Griffith's crack, γl/2",
-        opened[0].barrier * PERIOD / (gamma * half) - 1,
-        curved + 3 * _TENSION + _CRACK_STEPS,
-        f"l = {2 * half / PERIOD:.2g} λ",
-    )
-
-
 def audit(judge: Judge) -> Iterator[Row]:
     """Energy audit: loop integral = sum of drops."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=2, ratio=16, seed=1, h_rms=1e-6)
@@ -381,6 +334,5 @@ def audit(judge: Judge) -> Iterator[Row]:
 
 
 CLAIMS = (
-    losses, order, branch, fold, westergaard, full_contact, punch, parabola, controls, opening,
-    audit,
+    losses, order, branch, fold, westergaard, full_contact, punch, parabola, controls, audit,
 )  # fmt: skip

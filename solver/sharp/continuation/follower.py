@@ -29,8 +29,7 @@ from adhesis.solver.sharp.continuation.jump import (
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.gap.ends import lengths_of, move_edges, positions, step_limits
 from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
-from adhesis.solver.sharp.nucleation.crack import Crack, Cracks
-from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation, Touch, locate
+from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import EQUAL, PINNED_PLACE, SECOND_FOLD_DISPLACED
 from adhesis.solver.values import with_values
@@ -43,15 +42,14 @@ class Follower:
         self, problem: Problem, edges: EdgeMechanics, states: States, resolution: Resolution
     ) -> None:
         self.edges, self.states, self.resolution = edges, states, resolution
-        self.nucleation, self.cracks = Nucleation(problem, edges), Cracks(problem, edges)
+        self.nucleation = Nucleation(problem, edges)
         self.jumps = Jumps(edges, self.nucleation, states)
         self._came_on: Branch | None = None
-        self._opened: list[tuple[Point, int]] = []  # points that patches opened from, and heals
 
     def recall_point(self, data: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if these are the data of its state."""
         self.nucleation.healed = []
-        self.nucleation.searched, self._came_on, self._opened = SearchedGaps(), None, []
+        self.nucleation.searched, self._came_on = SearchedGaps(), None
         if data is None or data.stopped is None:
             return None
         d, nearly, rate, slope, previous, pinned, searched, name = data.stopped
@@ -73,9 +71,6 @@ class Follower:
             point = point.with_previous(None) if turned is None else turned
             history.states.append(self.states.of_point(point))
         self._came_on = None
-        jump = self._cracks_at(point, target)
-        if jump is not None:
-            return jump.d, history.commit(jump)
         branch = StableBranch(self.edges, self.resolution, self.states, point, target)
         while branch.point.d != target.d:
             event = branch.advance()
@@ -154,9 +149,9 @@ class Follower:
         return bool(self.nucleation.minimum(point.field)[0] <= closing)
 
     def _nucleation_jump(self, branch: StableBranch, target: Target) -> ComputedJump | None:
-        """Compute the jump where contact first appears in a gap, or a gap in contact; else None.
+        """Compute the jump where contact first appears in a gap; None if it does not.
 
-        The trail is searched for both, and begins anew.
+        The trail is searched for it, and begins anew.
         """
         trail, start = branch.trail, branch.trail[0].d
         if len(trail) == 1:
@@ -165,15 +160,7 @@ class Follower:
         fold, beyond = branch.fold_ahead
         # This ends: a touch that does not hold is found again only where its gap closes further.
         while True:
-            near = 0.2 * self.nucleation.tolerance  # no gap closes by as much on so short a way
-            touched = locate(self.nucleation, self.edges, trail, near)
-            opened = None
-            if self.cracks.is_possible:
-                opened = locate(self.cracks, self.edges, trail, self.resolution.field_limit)
-            if opened is not None and (
-                touched is None or abs(opened.point.d - start) < abs(touched.point.d - start)
-            ):
-                return self._crack_jump(opened, target)
+            touched = self.nucleation.locate(trail)
             if touched is None:
                 return None
             apart = math.copysign(1.0, target.d - start) * (fold - touched.point.d)
@@ -184,47 +171,8 @@ class Follower:
             if jump is not None:
                 return jump
 
-    def _cracks_at(self, point: Point, target: Target) -> ComputedJump | None:
-        """Compute the jump at the start of a branch where patches open at once; else None.
-
-        Raises
-        ------
-        NoState
-            If they have opened from the same edges at this d before, and closed again: they would
-            without end.
-        """
-        if not self.cracks.is_possible:
-            return None
-        least, found = self.cracks.minimum(point.field)
-        if least > 0:
-            return None
-        # touches that did not hold since then are not tried again: another end is possible
-        heals = self.nucleation.heals
-        self._opened = [opened for opened in self._opened if opened[0].d == point.d]
-        for other, heals_then in self._opened:
-            if heals_then == heals and self.jumps.descents.is_same(other.gaps, point.gaps):
-                raise NoState("patches open and close in turn", point.d)
-        self._opened.append((point, heals))
-        return self._crack_jump(Located(point, self.cracks.choose(found), 0.0), target)
-
-    def _crack_jump(self, opened: Located[Crack], target: Target) -> ComputedJump:
-        """Compute the jump from a point at which patches open inside."""
-        point = opened.point
-        event = Event(
-            self.states.of_point(point),
-            point.d,
-            point.gaps,
-            self.cracks.insert(point.gaps, opened.places),
-            barrier=sum(crack.barrier for crack in opened.places),
-            late=opened.late,
-        )
-        jump = self.jumps.compute(event, target.direction)
-        if jump.point is not None and self.jumps.descents.is_same(jump.point.gaps, point.gaps):
-            raise NoState("a crack that grows at both tips closes again", point.d)
-        return jump
-
     def _touch_jump(
-        self, touched: Located[Touch], beyond: float | None, target: Target
+        self, touched: Located, beyond: float | None, target: Target
     ) -> ComputedJump | None:
         """Compute the jump from the point of a branch at which surfaces touch inside a gap.
 
@@ -232,20 +180,20 @@ class Follower:
         d.
         """
         point = touched.point
-        if self.edges.critical > 0 and touched.places[0].opening < -self.nucleation.tolerance:
+        if self.edges.critical > 0 and touched.touches[0].opening < -self.nucleation.tolerance:
             raise NoState("surfaces overlap, and no first touch is found", point.d)
-        since = self.nucleation.way_since_healed(touched.places, point.d)
+        since = self.nucleation.way_since_healed(touched.touches, point.d)
         event = Event(
             self.states.of_point(point),
             point.d,
             point.gaps,
-            self.nucleation.insert(point.gaps, touched.places),
+            self.nucleation.insert(point.gaps, touched.touches),
             late=touched.late,
             orders=None if beyond is None else EventOrders(beyond, (point.gaps,)),
         )
         jump = self.jumps.compute(event, target.direction)
-        gained = self.jumps.has_gained(point, jump.point, touched.places)
-        if not gained and self.nucleation.heal(touched.places, point.d):
+        gained = self.jumps.has_gained(point, jump.point, touched.touches)
+        if not gained and self.nucleation.heal(touched.touches, point.d):
             return None
         # they hold from somewhere since they last did not, where no energy is lost
         healed = self.states.work(event.before, jump.states[-1], since)

@@ -73,7 +73,7 @@ class EventOrders:
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """An event by which a branch is left: a touch, a fold, an opening, or something that vanishes.
+    """An event by which a branch is left: a touch, a fold, or something that vanishes.
 
     Attributes
     ----------
@@ -84,8 +84,6 @@ class Event:
         Gaps of the branch there; empty out of contact.
     start : array, shape (L, 2)
         Gaps from which the edges run, with what has nucleated and without what has vanished.
-    barrier : float
-        That of cracks in ``start``, in units of γ/q0.
     late : float
         How far in d the event may have come before.
     orders : EventOrders, optional
@@ -96,7 +94,6 @@ class Event:
     d: float
     left: Array
     start: Array
-    barrier: float = 0.0
     late: float = 0.0
     orders: EventOrders | None = None
 
@@ -171,7 +168,7 @@ class Jumps:
         unlike = point is not None and self.symmetry.is_broken(event.left, point.gaps)
         if at_stake is None and unlike:
             at_stake = 0.0
-        jump = self.states.jump(before, after, direction, at_stake, event.barrier)
+        jump = self.states.jump(before, after, direction, at_stake)
         misplaced = self.states.work(before, after, event.late)
         return ComputedJump(d, (before, after), jump, point, misplaced)
 

@@ -15,8 +15,6 @@ any output grid: it is exact to rounding.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from adhesis.solver.model.problem import Problem
@@ -77,14 +75,6 @@ class RefinedTension:
         return None
 
 
-class TensionMaximum(NamedTuple):
-    """A local maximum of tension inside a patch."""
-
-    theta: float
-    tension: float
-    edge_distance: float
-
-
 class InnerTension:
     """Local maxima of tension inside patches, for the fields of one problem.
 
@@ -102,14 +92,14 @@ class InnerTension:
         size = profile.highest_harmonic + 1
         self._full[:size] = harmonic[:size] * profile.coefficients[:size] * (profile.q0 * n)
 
-    def maxima(self, field: GapField, least: float) -> list[TensionMaximum]:
-        """Find the maxima of a field above ``least``; of many the largest ones."""
+    def maxima(self, field: GapField, least: float) -> list[tuple[float, float]]:
+        """Find places and values of the maxima above ``least``; of many the largest ones."""
         nodes = highest_peaks(self._at_nodes(field), MOST_MAXIMA, least)
         if not nodes:
             return []
         refined = RefinedTension(field)
         found = (refined.maximum(node * self._step, self._step) for node in nodes)
-        return [TensionMaximum(*one, refined.edge_distance(one[0])) for one in found if one]
+        return [one for one in found if one]
 
     def _at_nodes(self, field: GapField) -> Array:
         """Compute the tension at the nodes, NaN outside contact."""

@@ -1,4 +1,4 @@
-"""Measure gaps, insert gaps and patches, and drop those that have closed or vanished.
+"""Measure gaps, insert patches, and drop those that have closed or vanished.
 
 Gaps are an array of shape (L, 2) of θ = q0 x: left and right ends, ascending.
 """
@@ -69,14 +69,6 @@ def _open(gaps: Array) -> Array:
     """Drop gaps that end where they begin, or before; the last gap never closes."""
     opened = gaps[:, 1] > gaps[:, 0]
     return gaps[opened] if opened.any() else gaps
-
-
-def with_gaps(gaps: Array, centres: Array, widths: Array) -> Array:
-    """Insert gaps of the given widths into patches."""
-    left = centres % (2 * np.pi) - widths / 2
-    left = np.where(left < gaps[-1, 1] - 2 * np.pi, left + 2 * np.pi, left)
-    both = np.concatenate([gaps, np.stack([left, left + widths], axis=1)])
-    return np.asarray(both[np.argsort(both[:, 0], kind="stable")])
 
 
 def union_of(one: Array, other: Array) -> Array:

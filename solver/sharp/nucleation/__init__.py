@@ -1,1 +1,1 @@
-"""Nucleation of contact inside a gap, and of a crack inside a patch."""
+"""Nucleation of contact inside a gap."""

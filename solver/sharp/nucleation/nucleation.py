@@ -1,9 +1,7 @@
-"""Locate on a branch where contact appears in a gap, or a gap in contact; insert contact in gaps.
+"""Locate on a branch where contact appears in a gap, and insert it (docs/methods.md, rules 4, 11).
 
-Both are the same search: a :class:`Criterion` has a value for every field, positive while nothing
-nucleates; where it is not at the end of a trail of points, :func:`locate` finds the place from
-which on it is not. :class:`Nucleation` is the criterion of touches (docs/methods.md, rules 4 and
-11), ``crack.Cracks`` that of gaps that open inside patches.
+The least clearance of a field is positive while nothing touches; where it is not at the end of a
+trail of points, :meth:`Nucleation.locate` finds the place from which on it is not.
 
 With adhesion a touching point grows at once to its first equilibrium; on the parabola κx²/2 half
 its width is nearly b = (16 Γ/(π κ²))^(1/3), Γ = 2γ q0/E* (lengths in 1/q0). A seed b/2 wide, but no
@@ -18,7 +16,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,46 +33,11 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics, Point
 from adhesis.solver.sharp.tolerances import (
     GROWTH,
     HEALED_OPENING,
-    IN_PATCH,
-    LONGEST_TRIAL_HALF_LENGTH,
+    IN_GAP,
+    LONGEST_TRIAL_HALF_WIDTH,
     OVERLAP,
     TRIAL_WIDTHS,
 )
-
-Place = TypeVar("Place")
-
-
-@dataclass(frozen=True, eq=False)
-class Located(Generic[Place]):
-    """Point of a branch at which something nucleates, the places, and how late it is in d."""
-
-    point: Point
-    places: list[Place]
-    late: float
-
-
-class Criterion(Protocol[Place]):
-    """Nucleation criterion: a value for every field, positive while nothing nucleates."""
-
-    @property
-    def tolerance(self) -> float:
-        """Value below zero that is allowed in a state."""
-        ...
-
-    def minimum(self, field: GapField) -> tuple[float, Any]:
-        """Return the least value of a field, and the candidates of places."""
-        ...
-
-    def choose(self, candidates: Any) -> list[Place]:
-        """Choose the place of the least value and those that equal it; none if it is positive."""
-        ...
-
-    def is_located(self, value: float, near: bool) -> bool:
-        """Return whether a point with this value is located finely enough.
-
-        ``near`` states whether one with a positive value is as near as the resolution.
-        """
-        ...
 
 
 @dataclass(frozen=True)
@@ -84,6 +47,15 @@ class Touch:
     theta: float
     opening: float
     width: float
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Point of a branch at which surfaces touch, the touches, and how late it is in d."""
+
+    point: Point
+    touches: list[Touch]
+    late: float
 
 
 class Minima(NamedTuple):
@@ -99,7 +71,7 @@ class Minima(NamedTuple):
 
 
 class Nucleation:
-    """Criterion of touches for ``locate``, which also inserts seed patches.
+    """Finds touches in the gaps of a field and along a branch, and inserts their seed patches.
 
     Attributes
     ----------
@@ -225,7 +197,7 @@ class Nucleation:
         """
         first = float(theta[0])
         apart = np.abs((gaps.ravel() - first + np.pi) % (2 * np.pi) - np.pi).min(initial=np.inf)
-        longest = 2 * min(LONGEST_TRIAL_HALF_LENGTH * self.edges.wave, IN_PATCH * apart)
+        longest = 2 * min(LONGEST_TRIAL_HALF_WIDTH * self.edges.wave, IN_GAP * apart)
 
         def release(width: float) -> float:
             if not self.edges.narrowest <= width <= longest:
@@ -241,13 +213,6 @@ class Nucleation:
         # G falls with the square of the opening, or more slowly
         left = opening * (1 - 1 / math.sqrt(GROWTH * max(rate, 1e-300)))
         return max(opening - self.range, left), width
-
-    def is_located(self, value: float, near: bool) -> bool:
-        """Return whether a touch is located finely enough; see ``Criterion``.
-
-        Within the range a value may fall at once, where surfaces part beside a minimum.
-        """
-        return value > -0.5 * self.tolerance or (near and value > -self.range)
 
     def insert(self, gaps: Array, touches: list[Touch]) -> Array:
         """Return the gaps with a seed patch at each touch."""
@@ -282,57 +247,52 @@ class Nucleation:
             return bool(healed)
         return False
 
+    def locate(self, trail: list[Point]) -> Located | None:
+        """Locate where along a trail surfaces begin to touch, and at which places.
 
-def locate(
-    criterion: Criterion[Place],
-    edges: EdgeMechanics,
-    trail: list[Point],
-    resolution: float,
-) -> Located[Place] | None:
-    """Locate where along a trail a criterion begins to be met, and at which places.
-
-    None if it is not met at its end. The trail starts at a point known to be clear; between its
-    points the search ends at ``resolution`` (d).
-    """
-    if criterion.minimum(trail[-1].field)[0] > 0:
-        return None
-    # Each trial is expensive: the values at both ends show where to begin.
-    clear, hit = trail[:2]
-    clear_value, _ = criterion.minimum(clear.field)
-    hit_value, hit_candidates = criterion.minimum(hit.field)
-    for point in trail[2:]:
-        if hit_value <= 0:
-            break
-        clear, clear_value, hit = hit, hit_value, point
-        hit_value, hit_candidates = criterion.minimum(hit.field)
-    aim = 0.2 * criterion.tolerance  # so far below zero
-    # The least value may be that of another candidate than the hit: then a secant creeps. As long
-    # as an end stays its value counts half as much with every trial (the Illinois method).
-    cleared: bool | None = None  # whether the last trial was clear
-    stayed = 1.0  # share with which the value at the other end counts
-    for _ in range(sys.float_info.mant_dig):
-        if criterion.is_located(hit_value, abs(clear.d - hit.d) <= resolution):
-            break
-        share = 0.5
-        if clear_value > 0:
-            above = (clear_value + aim) * (stayed if cleared is False else 1.0)
-            below = (hit_value + aim) * (stayed if cleared else 1.0)
-            share = min(max(above / (above - below), 0.02), 0.98)  # off both ends
-        trial = clear.d + (hit.d - clear.d) * share
-        if trial in (clear.d, hit.d):  # there its value differs by the error of the field
-            return Located(clear, criterion.choose(hit_candidates), 0.0)
-        between = edges.equilibrium_between(clear, hit, trial)
-        if between is None:
-            break
-        value, candidates = criterion.minimum(between.field)
-        stayed = 0.5 * stayed if cleared == (value > 0) else 1.0
-        cleared = value > 0
-        if cleared:
-            clear, clear_value = between, value
-        else:
-            hit, hit_candidates, hit_value = between, candidates, value
-    # estimate the distance from the exact location by a secant
-    late = abs(clear.d - hit.d)
-    if clear_value > hit_value:
-        late *= -hit_value / (clear_value - hit_value)
-    return Located(hit, criterion.choose(hit_candidates), late)
+        None if they do not at its end. The trail starts at a point known to be clear.
+        """
+        if self.minimum(trail[-1].field)[0] > 0:
+            return None
+        # Each trial is expensive: the values at both ends show where to begin.
+        clear, hit = trail[:2]
+        clear_value, _ = self.minimum(clear.field)
+        hit_value, hit_minima = self.minimum(hit.field)
+        for point in trail[2:]:
+            if hit_value <= 0:
+                break
+            clear, clear_value, hit = hit, hit_value, point
+            hit_value, hit_minima = self.minimum(hit.field)
+        aim = 0.2 * self.tolerance  # so far below zero, and in d: no gap closes by as much in that
+        # The least value may be that of another minimum than the hit: then a secant creeps. As long
+        # as an end stays its value counts half as much with every trial (the Illinois method).
+        cleared: bool | None = None  # whether the last trial was clear
+        stayed = 1.0  # share with which the value at the other end counts
+        for _ in range(sys.float_info.mant_dig):
+            # within the range a value may fall at once, where surfaces part beside a minimum
+            is_near = abs(clear.d - hit.d) <= aim and hit_value > -self.range
+            if is_near or hit_value > -0.5 * self.tolerance:
+                break
+            share = 0.5
+            if clear_value > 0:
+                above = (clear_value + aim) * (stayed if cleared is False else 1.0)
+                below = (hit_value + aim) * (stayed if cleared else 1.0)
+                share = min(max(above / (above - below), 0.02), 0.98)  # off both ends
+            trial = clear.d + (hit.d - clear.d) * share
+            if trial in (clear.d, hit.d):  # there its value differs by the error of the field
+                return Located(clear, self.choose(hit_minima), 0.0)
+            between = self.edges.equilibrium_between(clear, hit, trial)
+            if between is None:
+                break
+            value, minima = self.minimum(between.field)
+            stayed = 0.5 * stayed if cleared == (value > 0) else 1.0
+            cleared = value > 0
+            if cleared:
+                clear, clear_value = between, value
+            else:
+                hit, hit_minima, hit_value = between, minima, value
+        # estimate the distance from the exact location by a secant
+        late = abs(clear.d - hit.d)
+        if clear_value > hit_value:
+            late *= -hit_value / (clear_value - hit_value)
+        return Located(hit, self.choose(hit_minima), late)

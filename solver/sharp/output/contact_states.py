@@ -174,15 +174,10 @@ class States:
         after: ContactState,
         direction: Branch,
         at_stake: float | None = None,
-        barrier: float = 0.0,
     ) -> Jump:
-        """Make the jump between two states; ``at_stake`` in J/m² if it raced, else None.
-
-        ``barrier`` is that of an opening, in units of γ/q0.
-        """
-        barrier *= self.problem.work_of_adhesion / (self.q0 * self.period)
+        """Make the jump between two states; ``at_stake`` in J/m² if it raced, else None."""
         return Jump.between(
             before, after, direction, self.period, raced=at_stake is not None,
-            at_stake=at_stake or 0.0, barrier=barrier,
+            at_stake=at_stake or 0.0,
             falls_off=self.problem.control.is_load and not after.patches,
         )  # fmt: skip
